@@ -1,6 +1,6 @@
 //! `sightglass status`: how the station and its plant stand, for people and for scripts.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use serde_json::{Value, json};
@@ -8,13 +8,15 @@ use serde_json::{Value, json};
 use crate::{
     history::{Answer, Query},
     plant::{
-        Snapshot,
+        PlantDef, Snapshot,
         alarm::manager::subject_name,
         event::LineState,
         line_minute::LineMinute,
+        line_report::{LineReport, PollReport},
         north_def::NorthStatus,
         sample::{Quality, Sample},
         snapshot::{ActiveAlarm, DeviceState, SuppressedAlarm},
+        tag::Poll,
     },
     report::period_parser,
 };
@@ -92,7 +94,8 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
     let time = local(snapshot.at, def);
     let mut lines = vec![format!("plant    {} ({}) at {time}", def.title, def.name)];
     for (line, status) in def.lines.iter().zip(&snapshot.lines) {
-        lines.push(format!("line     {:12} {}", line.name, line_words(&status.state)));
+        let scan = status.report.as_ref().map_or(String::new(), |report| scan_words(report));
+        lines.push(format!("line     {:12} {}{scan}", line.name, line_words(&status.state)));
     }
     for (device, status) in def.devices.iter().zip(&snapshot.devices) {
         let why = status.diagnosis.map(|reason| format!(": {reason}")).unwrap_or_default();
@@ -111,6 +114,7 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
         let (rows, lost) = (snapshot.history.rows, snapshot.history.lost);
         lines.push(format!("history  {trouble}, {rows} rows, {lost} lost{epoch}"));
     }
+    lines.extend(snapshot.load.iter().map(|load| format!("program  {}", load.words())));
     lines.extend(snapshot.north.iter().map(|north| format!("data out {}", north_words(snapshot, north))));
     lines.extend(snapshot.suppressed.iter().map(|alarm| format!("suppressed {}", suppressed_words(snapshot, alarm))));
     if client::is_withheld(snapshot) {
@@ -167,6 +171,29 @@ fn line_words(state: &LineState) -> String {
     }
 }
 
+/// `; load 12 %, scan at worst 664 ms, measured 511 ms; dispatch p99 1.1 ms`
+fn scan_words(report: &LineReport) -> String {
+    let (scan, load) = (report.scan(), report.counters.utilisation_minute * 100.0);
+    let span = |span: Option<Duration>| span.map_or("-".to_owned(), |span| format!("{:.1} ms", in_ms(span)));
+    let (worst, measured, late) = (span(Some(scan.worst)), span(scan.measured), span(report.dispatch.p99()));
+    format!("; load {load:.0} %, scan at worst {worst}, measured {measured}; dispatch p99 {late}")
+}
+
+fn in_ms(span: Duration) -> f64 {
+    span.as_secs_f64() * 1e3
+}
+
+/// A block of the read plan with what its reads take in milliseconds; `null` until it was read.
+fn poll_json(def: &PlantDef, poll: &PollReport) -> Value {
+    let (read, ms) = (&poll.stats.read_time, |span: Option<Duration>| span.map(in_ms));
+    let period = if let Poll::Every(period) = poll.poll { Some(period) } else { None };
+    json!({
+        "device": def.device(poll.device).name, "function": poll.table.read_fc(), "address": poll.address,
+        "count": poll.count, "reads": poll.stats.ok, "period_ms": ms(period), "worst_ms": in_ms(poll.cost), "median_ms": ms(read.median()),
+        "p99_ms": ms(read.p99()), "max_ms": ms(read.max()), "margin_ms": ms(poll.margin()),
+    })
+}
+
 fn device_word(state: DeviceState) -> &'static str {
     match state {
         DeviceState::Unknown => "not polled yet",
@@ -189,6 +216,10 @@ fn in_json(snapshot: &Snapshot) -> Value {
             "name": line.name, "connected": connected, "state": line_words(&status.state),
             "requests": count(counters.requests), "ok": count(counters.ok), "timeouts": count(counters.timeouts),
             "corrupt": count(counters.corrupt), "exceptions": count(counters.exceptions),
+            "polls": status.report.as_ref().map(|report| {
+                report.polls.iter().map(|poll| poll_json(def, poll)).collect::<Vec<_>>()
+            }),
+            "dispatch_p99_ms": status.report.as_ref().and_then(|report| report.dispatch.p99()).map(in_ms),
         })
     });
     let devices = def.devices.iter().zip(&snapshot.devices).map(|(device, status)| {
@@ -196,7 +227,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
             "name": device.name, "unit": device.unit, "state": device_word(status.state),
             "responding": status.state == DeviceState::Responding,
             "ne107": status.diagnosis.map(|reason| reason.to_string()),
-            "reply_ms": status.response_time.map(|reply| reply.as_secs_f64() * 1e3),
+            "reply_ms": status.response_time.map(in_ms),
             "ok": count(status.ok), "failed": count(status.failed),
         })
     });
@@ -238,6 +269,9 @@ fn in_json(snapshot: &Snapshot) -> Value {
             "waiting": snapshot.history.waiting, "waiting_max": snapshot.history.waiting_max,
             "committed_at": snapshot.history.committed_at.map(|at| at.to_string()),
         },
+        "program": snapshot.load.map(|load| json!({
+            "cpu": load.cpu, "wake_ups_per_s": load.wake_ups, "memory_bytes": load.memory, "computer_idle": load.idle,
+        })),
         "north": snapshot.north.as_ref().map(|north| json!({
             "connected": north.connected, "sent": north.sent, "refused": north.refused,
             "sent_until": north.sent_until.to_string(), "error": north.error,

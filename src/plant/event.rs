@@ -11,6 +11,7 @@ use super::{
     id::{DeviceId, LineId, TagId, WriteId},
     line_report::LineReport,
     north_def::NorthStatus,
+    process_load::ProcessLoad,
     station::{FaultState, StationFault},
     traffic::Exchange,
 };
@@ -90,6 +91,13 @@ pub enum Event {
         at: Timestamp,
         /// The state.
         status: Arc<NorthStatus>,
+    },
+    /// What the program takes of its computer, every few seconds.
+    Load {
+        /// When.
+        at: Timestamp,
+        /// `None` where it cannot be read.
+        load: Option<ProcessLoad>,
     },
     /// The station itself has a fault, or no longer has it.
     Station {

@@ -69,6 +69,19 @@ impl LineReport {
         }
     }
 
+    /// What the periodic reads take.
+    pub fn scan(&self) -> Scan {
+        let mut scan = Scan { blocks: 0, worst: Duration::ZERO, measured: Some(Duration::ZERO), load: 0.0 };
+        for poll in &self.polls {
+            let Poll::Every(period) = poll.poll else { continue };
+            scan.blocks += 1;
+            scan.worst += poll.cost;
+            scan.measured = scan.measured.zip(poll.stats.read_time.last()).map(|(sum, one)| sum + one);
+            scan.load += poll.cost.as_secs_f64() / period.as_secs_f64();
+        }
+        scan
+    }
+
     /// The poll that reads a tag.
     pub fn poll_of(&self, tag: TagId) -> Option<&PollReport> {
         self.polls.iter().find(|poll| poll.tags.contains(&tag))
@@ -88,6 +101,19 @@ impl LineReport {
     pub fn device(&self, id: DeviceId) -> Option<&RequestStats> {
         self.devices.iter().find(|(device, _)| *device == id).map(|(_, stats)| stats)
     }
+}
+
+/// All periodic reads of a line, once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scan {
+    /// How many they are.
+    pub blocks: usize,
+    /// All of them at worst.
+    pub worst: Duration,
+    /// What the last read of each has taken; `None` until each was read.
+    pub measured: Option<Duration>,
+    /// Share of the line's time at worst.
+    pub load: f64,
 }
 
 /// One block of the read plan.

@@ -52,6 +52,7 @@ pub(crate) mod ne107;
 pub(crate) mod step_response;
 pub(crate) mod tuning;
 pub mod restore;
+pub mod process_load;
 pub mod station;
 pub mod sweep;
 pub mod snapshot;

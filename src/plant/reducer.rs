@@ -28,6 +28,7 @@ use super::{
     north_def::NorthStatus,
     parameter_set::StoredSet,
     process_image::ProcessImage,
+    process_load::ProcessLoad,
     program::ProgramWatch,
     record::{ActionRecord, Record},
     restore::Restore,
@@ -104,6 +105,7 @@ pub struct Plant {
     programs: Vec<ProgramWatch>,
     /// How far the data out has come.
     north: Option<Arc<NorthStatus>>,
+    load: Option<ProcessLoad>,
 }
 
 impl Plant {
@@ -130,6 +132,7 @@ impl Plant {
             tunings: vec![TuningTracker::default(); def.devices.len()],
             programs: vec![ProgramWatch::default(); def.devices.len()],
             north: None,
+            load: None,
             def,
             at,
             run: at.as_microsecond().cast_unsigned(),
@@ -179,6 +182,10 @@ impl Plant {
             }
             Event::North { at, status } => {
                 self.north = Some(status);
+                (at, None)
+            }
+            Event::Load { at, load } => {
+                self.load = load;
                 (at, None)
             }
             Event::Unlocked { at, id, unlock_tag, result } => {
@@ -328,6 +335,7 @@ impl Plant {
             programs: self.programs.iter().map(ProgramWatch::elapsed).collect(),
             runs: self.runs.iter().map(RunTracker::shown).collect(),
             north: self.north.clone(),
+            load: self.load,
             speed: self.speed,
         }
     }

@@ -23,6 +23,7 @@ use super::{
     north_def::NorthStatus,
     number::to_u32,
     parameter_set::StoredSet,
+    process_load::ProcessLoad,
     record::{ChainHash, FirstOut},
     restore::Restore,
     sample::{Cause, Sample},
@@ -88,6 +89,8 @@ pub struct Snapshot {
     pub runs: Vec<Option<Arc<ControlRun>>>,
     /// How far the data out has come; `None` for a plant that sends nothing.
     pub north: Option<Arc<NorthStatus>>,
+    /// What the program takes of its computer; `None` until it is known.
+    pub load: Option<ProcessLoad>,
     /// Plant seconds per real second; 1 except in demonstrations.
     pub speed: f64,
 }
@@ -120,6 +123,7 @@ impl Snapshot {
             programs: vec![None; devices],
             runs: vec![None; def.runs.len()],
             north: None,
+            load: None,
             speed: 1.0,
             def,
         }

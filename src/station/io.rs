@@ -1,6 +1,7 @@
 //! Starts the tasks of a station and stops them in order.
 
 mod delivery;
+mod process_load;
 pub(crate) mod report_files;
 pub mod reports;
 
@@ -248,6 +249,9 @@ fn assemble(
     let plant_task = PlantTask::new(plant, clock, links, file, persistence, publish);
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
     tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
+    if store.is_some() {
+        tasks.push(tokio::spawn(process_load::run(clock, events.clone(), stopped.clone())));
+    }
     if let (Some((_, history)), Some(mqtt)) = (&store, &def.north.mqtt) {
         let (snapshots, queries, events) = (snapshots.clone(), queries.clone(), events.clone());
         let (def, mqtt, history, history_file) = (def.clone(), mqtt.clone(), history.clone(), history_file.clone());

@@ -28,7 +28,6 @@ use crate::plant::{
     def::LineDef,
     event::LineState,
     number::to_u16,
-    snapshot::LineStatus,
 };
 
 /// Draws the whole screen.

@@ -17,6 +17,7 @@ use crate::plant::{
     def::*,
     event::{Fault, LineCounters, LineState},
     parameter_set::StoredSet,
+    process_load::ProcessLoad,
     restore::Restore,
     sample::{Cause, Sample},
     snapshot::{ActiveAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot, SuppressedAlarm},
@@ -195,6 +196,7 @@ impl Fixture {
             history: HistoryStatus { rows: 5_000, committed_at: Some(now()), ..HistoryStatus::default() },
             station: Arc::new(self.station.clone()),
             north: None,
+            load: Some(ProcessLoad { cpu: 0.021, wake_ups: 140.0, idle: 0.96, memory: 86_000_000 }),
             speed: 1.0,
             def: Arc::new(self.def.clone()),
         })

@@ -13,6 +13,7 @@ pub(crate) mod io;
 pub(crate) mod interlock;
 pub(crate) mod keys;
 pub(crate) mod layout;
+pub(crate) mod line_state;
 pub(crate) mod modal;
 pub(crate) mod mouse;
 pub(crate) mod msg;

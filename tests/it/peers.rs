@@ -6,9 +6,13 @@ use std::{
     net::TcpListener,
     path::{Path, PathBuf},
     process::Command,
+    time::{Duration, Instant},
 };
 
-use crate::support::{Cable, Process, folder, free_port, have, libmodbus_server, python, sightglass};
+use serde_json::Value;
+use sightglass::access::io::own_user;
+
+use crate::support::{Cable, Process, folder, free_port, have, libmodbus_server, python, sightglass, sockets};
 
 /// What the slave of `peers/slave.py` holds, as an operator should see it.
 const SEEN: [(&str, &str); 8] = [
@@ -301,5 +305,43 @@ fn raw_asks_the_server_of_libmodbus() {
         let mut raw = Process::start(sightglass().args(["send", "127.0.0.1:1502"]).args(bytes.split(' ')));
         raw.end();
         assert!(raw.said.iter().any(|line| line.contains(expect)), "{bytes}: {}", raw.said.join("\n"));
+    }
+}
+
+/// Three devices that take 5, 25 and 60 ms for a response.
+#[test]
+fn no_read_takes_longer_than_its_worst_case() {
+    let Some(python) = python().filter(|_| have("socat", "socat")) else { return };
+    let (folder, sockets) = (folder(), sockets());
+    let cable = Cable::plug(folder.path());
+    let _slave = slave(&python, "rtu", cable.ends[1].to_str().unwrap());
+    let file = folder.path().join("paced.toml");
+    let trusted = format!("[[access.trusted]]\nuser = \"{}\"\nrole = \"viewer\"\n", own_user());
+    fs::write(&file, plant_with(&[("A", 3, "705"), ("B", 4, "725"), ("C", 5, "760")], "rtu") + &trusted).unwrap();
+    fs::copy(plant("number.toml"), folder.path().join("number.toml")).unwrap();
+    let command = |name: &str| {
+        let mut command = sightglass();
+        command.arg(name).env("XDG_STATE_HOME", folder.path()).env("XDG_RUNTIME_DIR", &sockets);
+        command
+    };
+    let port = format!("L1={}", cable.ends[0].display());
+    let mut station = Process::start(command("run").arg(&file).args(["--port", &port]));
+    station.wait_for("A (unit 3): responding");
+    let end = Instant::now() + Duration::from_secs(60);
+    loop {
+        let status = command("status").arg("--json").output().unwrap();
+        let status: Value = serde_json::from_slice(&status.stdout).unwrap_or_default();
+        let polls = status["lines"][0]["polls"].as_array().cloned().unwrap_or_default();
+        for poll in polls.iter().filter(|poll| !poll["max_ms"].is_null()) {
+            let [worst, p99, max] = ["worst_ms", "p99_ms", "max_ms"].map(|key| poll[key].as_f64().unwrap());
+            assert!(p99 <= max && max <= worst, "{poll}");
+            assert!(poll["address"].as_f64().unwrap() - 700.0 <= max, "{poll}");
+        }
+        let enough = |poll: &Value| 12 <= poll["reads"].as_u64().unwrap_or_default();
+        let load = &status["program"]["memory_bytes"];
+        if polls.len() == 3 && polls.iter().all(enough) && load.is_number() {
+            break;
+        }
+        assert!(Instant::now() < end, "{status:#}");
     }
 }

@@ -7,6 +7,7 @@ holds its address, and the address says what is wrong with the answer:
 
     200-299 comes 1.5 s late      300-399 has a wrong check (over TCP: a foreign transaction number)
     400-499 never comes           600-699 breaks off
+    700-799 comes as many milliseconds late as the address is above 700
     500-599 has noise before it (over TCP: an answer with a foreign transaction number and another value)
 
 It says "ready" when it serves, then one line for each request that it answers. "calm": nothing moves, nothing is wrong.
@@ -96,6 +97,9 @@ def trace_packet(sending, frame):
             return b"\xff\x00\x55" + frame
         case 6:
             return frame[:-4]
+        case 7:
+            asyncio.get_running_loop().call_later((asked["address"] - 700) / 1000, send, frame)
+            return b""
         case _:
             return frame
 

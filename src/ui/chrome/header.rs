@@ -2,7 +2,13 @@
 
 use super::*;
 use crate::plant::time::elapsed;
-use crate::{t, ui::rights};
+use crate::{
+    t,
+    ui::{
+        line_state::{is_overloaded, is_well, replies},
+        rights,
+    },
+};
 
 pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
@@ -13,9 +19,15 @@ pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let fits = |parts: &[(usize, String, Style)]| {
         parts.iter().map(|(_, text, _)| width(text) + 2).sum::<u16>() <= end.saturating_sub(start) + 2
     };
-    let shorter = [(true, Lines::Whole), (false, Lines::Whole), (false, Lines::Short), (false, Lines::Count)];
+    let shorter = [
+        (true, Lines::Whole),
+        (false, Lines::Whole),
+        (false, Lines::Short),
+        (false, Lines::Count),
+        (false, Lines::Total),
+    ];
     let mut parts = shorter.iter().map(|(role, lines)| header_parts(model, cx, *role, *lines));
-    let mut parts = parts.find(|parts| fits(parts)).unwrap_or_else(|| header_parts(model, cx, false, Lines::Count));
+    let mut parts = parts.find(|parts| fits(parts)).unwrap_or_else(|| header_parts(model, cx, false, Lines::Total));
     while !fits(&parts) {
         let Some(least) = parts.iter().map(|(need, _, _)| *need).max() else { break };
         parts.retain(|(need, _, _)| *need != least);
@@ -26,7 +38,7 @@ pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     }
 }
 
-/// How much the header says of lines that are well; what is wrong with one is always said in words.
+/// How much the header says of lines; what is wrong with one is said in words where there is room for them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Lines {
     /// `L1 load 62 %`.
@@ -35,6 +47,8 @@ pub(super) enum Lines {
     Short,
     /// `3 lines OK`, one part for all of them.
     Count,
+    /// `64 lines, 2 failed`: what is wrong with each is on tab Bus.
+    Total,
 }
 
 /// What the header tells, from the right, each with its need: the greatest number is the first to be left out.
@@ -63,18 +77,25 @@ pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool, lines: L
     } else if history.trouble.is_some() {
         parts.push((2, t!("history: see 3").to_owned(), theme.trouble()));
     }
+    let count = cx.def().lines.len();
     let (well, other): (Vec<&LineDef>, Vec<&LineDef>) = cx.def().lines.iter().rev().partition(|line| is_well(cx, line));
+    if lines == Lines::Total && 1 < other.len() {
+        parts.push((3, t!("{count} lines, {failed} failed", count, failed = other.len()), theme.trouble()));
+        return parts;
+    }
     parts.extend(other.into_iter().map(|line| {
         let (text, style) = line_words(cx, line);
         (3, text, style)
     }));
     match (lines, well.as_slice()) {
-        (Lines::Count, [_, _, ..]) => parts.push((10, t!("{count} lines OK", count = well.len()), theme.normal())),
+        (Lines::Count | Lines::Total, [_, _, ..]) => {
+            parts.push((10, t!("{count} lines OK", count = well.len()), theme.normal()))
+        }
         (Lines::Whole, _) => parts.extend(well.into_iter().map(|line| {
             let (text, style) = line_words(cx, line);
             (10, text, style)
         })),
-        (Lines::Short | Lines::Count, _) => parts.extend(well.into_iter().map(|line| {
+        (Lines::Short | Lines::Count | Lines::Total, _) => parts.extend(well.into_iter().map(|line| {
             let busy = cx.snapshot.line(line.id).counters.utilisation * 100.0;
             (10, t!("{name} {busy} %", name = line.name, busy = format!("{busy:.0}")), theme.normal())
         })),
@@ -93,21 +114,6 @@ pub(super) fn who_text(model: &Model, cx: &ViewContext, role: bool) -> (usize, S
         None if role => (9, t!("user: {user} ({title})", user, title = rights::title(who.role)), theme.dim()),
         None => (9, user, theme.dim()),
     }
-}
-
-/// Is a line connected, does it reply, and has it time for its polls?
-fn is_well(cx: &ViewContext, line: &LineDef) -> bool {
-    let status = cx.snapshot.line(line.id);
-    status.state == LineState::Connected && !is_overloaded(status) && replies(cx, status)
-}
-
-/// Without a request no reply is missed.
-fn replies(cx: &ViewContext, status: &LineStatus) -> bool {
-    let counters = &status.counters;
-    let recent = |at: Option<jiff::Timestamp>| {
-        at.is_some_and(|at| elapsed(at, cx.now).as_secs_f64() < 3.0 * cx.snapshot.speed.max(1.0))
-    };
-    recent(counters.last_rx) || counters.last_tx <= counters.last_rx
 }
 
 /// A line in the header: `L1 load 62 %`, or why it is not connected and when it is tried again.
@@ -142,10 +148,6 @@ pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
     }
 }
 
-pub(super) fn is_overloaded(line: &LineStatus) -> bool {
-    line.report.as_ref().is_some_and(|report| report.strain.is_some())
-}
-
 #[cfg(test)]
 mod tests {
     use jiff::SignedDuration;
@@ -160,12 +162,10 @@ mod tests {
             let name = format!("L{}", n + 1);
             fixture.def.lines.push(LineDef { id: crate::plant::def::LineId(n), name, ..fixture.def.lines[0].clone() });
         }
-        let check = |down: Option<usize>, width: u16, expect: &[&str]| {
+        let check = |down: &[usize], width: u16, expect: &[&str]| {
             let mut snapshot = (*fixture.snapshot()).clone();
             snapshot.lines = vec![fixture.line.clone(); 8];
-            if let Some(line) = down {
-                snapshot.lines[line].state = LineState::Disconnected;
-            }
+            down.iter().for_each(|line| snapshot.lines[*line].state = LineState::Disconnected);
             let mut model = Model::new(
                 std::sync::Arc::new(snapshot),
                 crate::ui::theme::Theme::FULL,
@@ -176,11 +176,13 @@ mod tests {
             let header = shown.lines().next().unwrap_or_default();
             assert!(expect.iter().all(|words| header.contains(words)), "{width}: {header}");
         };
-        check(None, 200, &["L1 load 62 %", "L8 load 62 %"]);
-        check(None, 120, &["L1 62 %", "L8 62 %"]);
-        check(None, 80, &["8 lines OK"]);
-        check(None, 60, &["8 lines OK"]);
-        check(Some(2), 80, &["7 lines OK", "L3 DISCONNECTED"]);
+        check(&[], 200, &["L1 load 62 %", "L8 load 62 %"]);
+        check(&[], 120, &["L1 62 %", "L8 62 %"]);
+        check(&[], 80, &["8 lines OK"]);
+        check(&[], 60, &["8 lines OK"]);
+        check(&[2], 80, &["7 lines OK", "L3 DISCONNECTED"]);
+        check(&[2, 3, 5], 80, &["8 lines, 3 failed"]);
+        check(&[2, 3, 5], 60, &["8 lines, 3 failed"]);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 mod frames;
 mod keys;
 mod line;
+mod lines;
 mod plan;
 mod registers;
 mod request;
@@ -289,7 +290,7 @@ impl Bus {
 
     /// So many lines on, around the end.
     fn choose_line(&mut self, cx: &ViewContext, by: isize) {
-        self.line = LineId(to_u16(around(self.line.index(), by, cx.def().lines.len())));
+        self.line = lines::next(cx, self.line, by);
         (self.scroll, self.plan) = (Scroll::default(), plan::Plan::default());
         self.frames.forget();
         self.test.first = None;
@@ -335,8 +336,10 @@ impl Bus {
             1 => String::new(),
             count => format!(" {}/{count}", at.id.0 + 1),
         };
-        let words =
-            fit_words(&format!("{}{place}  {}", at.settings.name, state_text(cx, at)), end.saturating_sub(x + 2));
+        let words = fit_words(
+            &format!("{}{place}  {}", at.settings.name, lines::state_text(cx, at)),
+            end.saturating_sub(x + 2),
+        );
         let style = if at.status.state == LineState::Connected { cx.theme.normal() } else { cx.theme.trouble() };
         canvas.text(end.saturating_sub(width(&words)), 0, &words, style);
     }
@@ -376,24 +379,4 @@ pub fn retry(cx: &ViewContext, line: Option<LineId>) -> Vec<UiAction> {
         DeviceState::Unknown | DeviceState::Responding => false,
     };
     cx.def().devices.iter().filter(silent).map(|device| UiAction::Command(CommandKind::Refresh(device.id))).collect()
-}
-
-/// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.
-fn state_text(cx: &ViewContext, at: &LineView) -> String {
-    let zone = &cx.def().time_zone;
-    let since = at
-        .status
-        .since
-        .map_or(String::new(), |since| t!(" since {moment}", moment = text::moment(since, cx.now, zone)));
-    match &at.status.state {
-        LineState::Connected => t!("connected{since}", since),
-        LineState::Connecting => t!("connecting").to_owned(),
-        LineState::Waiting { why, retry_at } => {
-            let lost =
-                at.status.lost_since.map_or(String::new(), |lost| format!(" {}", running(elapsed(lost, cx.now))));
-            t!("DOWN{lost}, next try in {between}s: {why}", lost, between = elapsed(cx.now, *retry_at).as_secs(), why)
-        }
-        LineState::Disconnected => t!("DISCONNECTED by an operator{since}", since),
-        LineState::Testing => t!("TEST{since}, polling stopped", since),
-    }
 }

@@ -14,6 +14,7 @@ mod point;
 mod preview;
 mod shift;
 mod steps;
+mod totals;
 #[cfg(test)]
 mod tests;
 

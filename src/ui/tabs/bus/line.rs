@@ -5,9 +5,8 @@ mod worries;
 use worries::worries;
 
 use super::{
-    LineView,
+    LineView, lines,
     rows::{self, Row, flow, number, plain, words},
-    state_text,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -16,7 +15,6 @@ use crate::{
         event::{Fault, LineState},
         line_report::LineReport,
         request_stats::RequestStats,
-        tag::Poll,
     },
     ui::{modal::faceplate::retry_text, tabs::controllers::signal_mark, widgets::spark},
 };
@@ -29,7 +27,7 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     if cx.is_past() {
         return past(cx, at);
     }
-    let mut rows = lines(cx, at);
+    let mut rows = lines::rows(cx, at);
     rows.extend(worries(cx, at).iter().flat_map(|worry| sentence(cx, worry, width)));
     rows.extend(settings(cx, at, width));
     let Some(report) = at.report else {
@@ -42,6 +40,9 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     rows.push(Row::new());
     rows.extend(cycle(cx, report, width));
     rows.extend(counters(cx, at, report, width));
+    if let Some(load) = cx.snapshot.load {
+        rows.extend(flow(t!("program"), cx.theme.dim(), width, [plain(load.words(), cx.theme.normal())]));
+    }
     rows
 }
 
@@ -61,23 +62,6 @@ fn past(cx: &ViewContext, at: &LineView) -> Vec<Row> {
     };
     let kept = t!("Plan, frames, tests and registers are not kept in the history.");
     vec![plain(words, cx.theme.normal()), plain(kept, cx.theme.dim())]
-}
-
-/// Every line with its state, to choose one; nothing where there is only one.
-fn lines(cx: &ViewContext, at: &LineView) -> Vec<Row> {
-    let lines = &cx.def().lines;
-    if lines.len() < 2 {
-        return Vec::new();
-    }
-    let row = |line: &LineDef| {
-        let chosen = line.id == at.id;
-        let place = LineView::new(cx, line.id)?;
-        let busy = f64::from(place.status.counters.utilisation) * 100.0;
-        let words = format!("{:8} {}  {busy:.0} %  {}", line.name, place.settings.transport, state_text(cx, &place));
-        let style = row_style(cx, chosen, place.status.state != LineState::Connected);
-        Some(plain(format!("{} {words}", if chosen { "▸" } else { " " }), style))
-    };
-    lines.iter().filter_map(row).chain([Row::new()]).collect()
 }
 
 /// `! what is wrong`, over as many rows as it needs.
@@ -121,42 +105,16 @@ fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
 }
 
 fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
-    let plan = Planned::new(report);
+    let plan = report.scan();
     let measured = plan.measured.map_or(t!("not yet").to_owned(), ms);
     let parts = [
         value(cx, t!("blocks"), &plan.blocks.to_string()),
-        value(cx, t!("worst-case scan time"), &t!("{ms}, measured {measured}", ms = ms(plan.round), measured)),
+        value(cx, t!("worst-case scan time"), &t!("{ms}, measured {measured}", ms = ms(plan.worst), measured)),
         value(cx, t!("worst-case load"), &format!("{:.0} %", plan.load * 100.0)),
         count(cx, t!("missed"), report.counters.missed, missed_lately(report)),
         value(cx, t!("dispatch p99"), &report.dispatch.p99().map_or("–".to_owned(), ms)),
     ];
     flow(t!("cycle"), cx.theme.dim(), width, parts)
-}
-
-/// What the periodic reads take.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Planned {
-    blocks: usize,
-    /// All of them once, at worst.
-    round: Duration,
-    /// What the last read of each has taken; `None` until each was read.
-    measured: Option<Duration>,
-    /// Share of the line's time at worst.
-    load: f64,
-}
-
-impl Planned {
-    fn new(report: &LineReport) -> Planned {
-        let mut plan = Planned { blocks: 0, round: Duration::ZERO, measured: Some(Duration::ZERO), load: 0.0 };
-        for poll in &report.polls {
-            let Poll::Every(period) = poll.poll else { continue };
-            plan.blocks += 1;
-            plan.round += poll.cost;
-            plan.measured = plan.measured.zip(poll.stats.read_time.last()).map(|(sum, one)| sum + one);
-            plan.load += poll.cost.as_secs_f64() / period.as_secs_f64();
-        }
-        plan
-    }
 }
 
 fn missed_lately(report: &LineReport) -> bool {

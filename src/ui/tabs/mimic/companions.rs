@@ -4,7 +4,7 @@ use std::{cmp::Reverse, collections::BTreeSet};
 
 use super::{
     attention::{needs_action, not_normal, sections},
-    may_change, steps,
+    may_change, steps, totals,
 };
 use crate::ui::tabs::{
     alarms::{action_text, event_text},
@@ -17,6 +17,7 @@ use crate::{
         def::Pen,
         record::{ActionRecord, AlarmRecord},
     },
+    report::ShiftReport,
     ui::{layout::Size, widgets::chart},
 };
 
@@ -39,6 +40,7 @@ const EVENTS_MAX: usize = 40;
 const EVENTS_SPAN: SignedDuration = SignedDuration::from_hours(24);
 const EVERY_S: f64 = 5.0;
 const TREND_EVERY_S: f64 = 10.0;
+const SHIFT_EVERY_S: f64 = 60.0;
 const TIMEOUT_S: f64 = 30.0;
 
 /// The parts of the tab.
@@ -82,6 +84,8 @@ pub struct Companions {
     alarms: Answered<Vec<AlarmRecord>>,
     actions: Answered<Vec<ActionRecord>>,
     curves: Answered<Vec<Series>>,
+    /// The running shift.
+    shift: Answered<Box<ShiftReport>>,
 }
 
 impl Companions {
@@ -97,6 +101,10 @@ impl Companions {
             actions.extend(self.alarms.ask(cx, (Tab::Mimic, number), every, timeout, query));
             let query = Query::Actions { from, to, limit };
             actions.extend(self.actions.ask(cx, (Tab::Mimic, number), every, timeout, query));
+            if let Some(shift) = period::at(cx.def(), cx.now) {
+                let query = Query::Report { period: shift };
+                actions.extend(self.shift.ask(cx, (Tab::Mimic, number), real(cx, SHIFT_EVERY_S), timeout, query));
+            }
         }
         let pens = pens(cx);
         if let (Some(trend), false) = (parts.trend, pens.is_empty()) {
@@ -108,13 +116,16 @@ impl Companions {
     }
 
     pub fn awaits(&self, number: u32) -> bool {
-        [&self.alarms.query, &self.actions.query, &self.curves.query].iter().any(|query| query.awaits(number))
+        [&self.alarms.query, &self.actions.query, &self.curves.query, &self.shift.query]
+            .iter()
+            .any(|query| query.awaits(number))
     }
 
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         self.alarms.on_answer(cx, number, answer);
         self.actions.on_answer(cx, number, answer);
         self.curves.on_answer(cx, number, answer);
+        self.shift.on_answer(cx, number, answer);
     }
 
     /// Draws them.
@@ -134,7 +145,9 @@ impl Companions {
     fn column(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let (width, dim) = (canvas.width(), cx.theme.dim());
         let mut lists = vec![(t!("needs action"), needs_action(cx)), (t!("not normal"), not_normal(cx))];
-        let others = [(t!("steps"), steps::rows(cx)), (t!("commands now"), may_change::rows(cx))];
+        let totals = self.shift.value.as_ref().map_or(Vec::new(), |shift| totals::rows(cx, shift));
+        let others =
+            [(t!("steps"), steps::rows(cx)), (t!("commands now"), may_change::rows(cx)), (t!("this shift"), totals)];
         lists.extend(others.into_iter().filter(|(_, rows)| !rows.is_empty()));
         let mut y = sections(cx, canvas, ROWS_MAX, &lists);
         canvas.text(0, y, t!("last events"), dim);

@@ -1,0 +1,120 @@
+//! Reads from /proc what the program takes of its computer.
+
+use std::{
+    collections::HashMap,
+    time::{Duration, Instant},
+};
+
+use procfs::{CurrentSI, KernelStats, ProcResult, process::Process, ticks_per_second};
+use tokio::sync::{mpsc, watch};
+
+use crate::{
+    bus::io::clock::Clock,
+    plant::{event::Event, number::to_f32, process_load::ProcessLoad},
+};
+
+/// Real time over which the load is taken.
+const EVERY: Duration = Duration::from_secs(5);
+
+/// Says the load until the station stops. On a computer without /proc nothing is known of it.
+pub(crate) async fn run(clock: Clock, events: mpsc::Sender<Event>, mut stopped: watch::Receiver<bool>) {
+    let follow = async {
+        let mut last = Reading::take();
+        loop {
+            tokio::time::sleep(EVERY).await;
+            let reading = Reading::take();
+            let load = match (&last, &reading) {
+                (Ok(last), Ok(reading)) => Some(reading.since(last)),
+                (Err(error), _) | (_, Err(error)) => {
+                    tracing::debug!(%error, "the load of the program cannot be read");
+                    None
+                }
+            };
+            last = reading;
+            // If the plant has no room, the next load comes soon.
+            let _ = events.try_send(Event::Load { at: clock.now(), load });
+        }
+    };
+    tokio::select! {
+        _ = stopped.wait_for(|stopped| *stopped) => {}
+        () = follow => {}
+    }
+}
+
+/// The counters of one moment.
+struct Reading {
+    at: Instant,
+    /// CPU time of the program in seconds.
+    cpu: f64,
+    /// How often each thread has waited, by its number.
+    waits: HashMap<i32, u64>,
+    /// Time of all processors in seconds: idle, and all of it.
+    idle: (f64, f64),
+    memory: u64,
+}
+
+impl Reading {
+    fn take() -> ProcResult<Reading> {
+        let (process, ticks) = (Process::myself()?, ticks_per_second() as f64);
+        let (stat, all) = (process.stat()?, KernelStats::current()?.total);
+        let mut waits = HashMap::new();
+        for thread in process.tasks()? {
+            // One that ends just now has no status any more.
+            let Ok(thread) = thread else { continue };
+            let Ok(status) = thread.status() else { continue };
+            waits.insert(thread.tid, status.voluntary_ctxt_switches.unwrap_or_default());
+        }
+        let idle = all.idle + all.iowait.unwrap_or_default();
+        let others = [all.irq, all.softirq, all.steal].map(Option::unwrap_or_default);
+        let busy = all.user + all.nice + all.system + others.iter().sum::<u64>();
+        Ok(Reading {
+            at: Instant::now(),
+            cpu: (stat.utime + stat.stime) as f64 / ticks,
+            waits,
+            idle: (idle as f64, (idle + busy) as f64),
+            memory: process.status()?.vmrss.unwrap_or_default() * 1024,
+        })
+    }
+
+    fn since(&self, last: &Reading) -> ProcessLoad {
+        let seconds = self.at.duration_since(last.at).as_secs_f64();
+        let waits =
+            self.waits.iter().map(|(thread, waits)| waits - last.waits.get(thread).copied().unwrap_or(0).min(*waits));
+        let (idle, all) = (self.idle.0 - last.idle.0, self.idle.1 - last.idle.1);
+        ProcessLoad {
+            cpu: to_f32((self.cpu - last.cpu) / seconds),
+            wake_ups: to_f32(waits.sum::<u64>() as f64 / seconds),
+            idle: if all <= 0.0 { 1.0 } else { to_f32(idle / all) },
+            memory: self.memory,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_counters_become_rates() {
+        let at = Instant::now();
+        let reading = |seconds, cpu, waits: &[(i32, u64)], idle| Reading {
+            at: at + Duration::from_secs(seconds),
+            cpu,
+            waits: waits.iter().copied().collect(),
+            idle,
+            memory: 7,
+        };
+        let first = reading(0, 1.0, &[(1, 100), (2, 5)], (100.0, 200.0));
+        // Thread 2 has ended, thread 3 is new, and the number of thread 1 was given to another.
+        let second = reading(10, 2.5, &[(1, 90), (3, 60)], (118.0, 220.0));
+        let load = second.since(&first);
+        assert_eq!(load, ProcessLoad { cpu: 0.15, wake_ups: 6.0, idle: 0.9, memory: 7 });
+    }
+
+    #[test]
+    fn the_computer_has_all_counters() {
+        let Reading { cpu, waits, idle, memory, .. } = Reading::take().expect("this computer has /proc");
+        assert!(0.0 <= cpu && !waits.is_empty() && 1_000_000 < memory, "{cpu} {waits:?} {memory}");
+        assert!(0.0 < idle.0 && idle.0 <= idle.1, "{idle:?}");
+    }
+}

@@ -1,0 +1,47 @@
+//! What the running shift has counted so far: energy, batches, run hours, starts.
+
+use super::attention::Row;
+use crate::report::{RunFigures, ShiftReport, TagFigures};
+use crate::ui::tabs::prelude::*;
+
+/// The counters that have counted and the actuators that have run, as `heater energy +2.31 kWh` and `PLC-1.P-1 1.2 h, 14 starts`.
+pub fn rows(cx: &ViewContext, report: &ShiftReport) -> Vec<Row> {
+    let name = |tag: &str| {
+        let label = cx.def().tag_named(tag).map(|id| cx.def().tag(id).label.as_str()).unwrap_or_default();
+        if label.is_empty() { tag.to_owned() } else { translate(label).to_owned() }
+    };
+    let counted = |figures: &TagFigures| {
+        let (difference, decimals) =
+            (figures.difference.filter(|counted| 0.0 < *counted)?, usize::from(figures.decimals));
+        Some(format!("{} {difference:+.decimals$} {}", name(&figures.tag), figures.unit).trim_end().to_owned())
+    };
+    let ran = |figures: &RunFigures| {
+        let (on, starts) = (figures.on.filter(|on| !on.is_zero())?, figures.starts.unwrap_or_default());
+        let hours = format!("{:.1}", on.as_secs_f64() / 3_600.0);
+        Some(t!("{name} {hours} h, {starts} starts", name = figures.tag, hours, starts))
+    };
+    let counters = report.tags.iter().filter_map(counted);
+    let rows = counters.chain(report.runs.iter().filter_map(ran));
+    rows.map(|words| (words, cx.theme.normal())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        report::testing::shift_report,
+        ui::fixture::{Fixture, with_cx},
+    };
+
+    #[test]
+    fn only_what_has_counted_or_run_is_listed() {
+        let said = |report: &ShiftReport| -> Vec<String> {
+            with_cx(&Fixture::normal().snapshot(), |cx| rows(cx, report)).into_iter().map(|(words, _)| words).collect()
+        };
+        let mut report = shift_report();
+        assert_eq!(said(&report), ["PM-1.E +12.50 kWh", "PLC-1.P-1 1.5 h, 3 starts"]);
+        report.runs[0].on = None;
+        report.tags.iter_mut().for_each(|tag| tag.difference = tag.difference.map(|_| 0.0));
+        assert_eq!(said(&report), [""; 0]);
+    }
+}
