@@ -11,11 +11,12 @@ use crate::{
         PlantDef, Snapshot,
         alarm::manager::subject_name,
         event::LineState,
+        line::LineDef,
         line_minute::LineMinute,
         line_report::{LineReport, PollReport},
         north_def::NorthStatus,
         sample::{Quality, Sample},
-        snapshot::{ActiveAlarm, DeviceState, SuppressedAlarm},
+        snapshot::{ActiveAlarm, DeviceState, LineStatus, SuppressedAlarm},
         tag::Poll,
     },
     report::period_parser,
@@ -194,6 +195,18 @@ fn poll_json(def: &PlantDef, poll: &PollReport) -> Value {
     })
 }
 
+fn line_json(def: &PlantDef, line: &LineDef, status: &LineStatus, visible: bool) -> Value {
+    let (counters, report) = (&status.counters, status.report.as_ref());
+    let count = |count: u64| visible.then_some(count);
+    json!({
+        "name": line.name, "connected": status.state == LineState::Connected, "state": line_words(&status.state),
+        "requests": count(counters.requests), "ok": count(counters.ok), "timeouts": count(counters.timeouts),
+        "corrupt": count(counters.corrupt), "exceptions": count(counters.exceptions),
+        "polls": report.map(|report| report.polls.iter().map(|poll| poll_json(def, poll)).collect::<Vec<_>>()),
+        "dispatch_p99_ms": report.and_then(|report| report.dispatch.p99()).map(in_ms),
+    })
+}
+
 fn device_word(state: DeviceState) -> &'static str {
     match state {
         DeviceState::Unknown => "not polled yet",
@@ -209,19 +222,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
     // What is not authorised is `null`, never 0.
     let visible = !client::is_withheld(snapshot);
     let count = |count: u64| visible.then_some(count);
-    let lines = def.lines.iter().zip(&snapshot.lines).map(|(line, status)| {
-        let connected = status.state == LineState::Connected;
-        let counters = &status.counters;
-        json!({
-            "name": line.name, "connected": connected, "state": line_words(&status.state),
-            "requests": count(counters.requests), "ok": count(counters.ok), "timeouts": count(counters.timeouts),
-            "corrupt": count(counters.corrupt), "exceptions": count(counters.exceptions),
-            "polls": status.report.as_ref().map(|report| {
-                report.polls.iter().map(|poll| poll_json(def, poll)).collect::<Vec<_>>()
-            }),
-            "dispatch_p99_ms": status.report.as_ref().and_then(|report| report.dispatch.p99()).map(in_ms),
-        })
-    });
+    let lines = def.lines.iter().zip(&snapshot.lines).map(|(line, status)| line_json(def, line, status, visible));
     let devices = def.devices.iter().zip(&snapshot.devices).map(|(device, status)| {
         json!({
             "name": device.name, "unit": device.unit, "state": device_word(status.state),

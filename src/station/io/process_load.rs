@@ -19,18 +19,19 @@ const EVERY: Duration = Duration::from_secs(5);
 /// Says the load until the station stops. On a computer without /proc nothing is known of it.
 pub(crate) async fn run(clock: Clock, events: mpsc::Sender<Event>, mut stopped: watch::Receiver<bool>) {
     let follow = async {
-        let mut last = Reading::take();
+        let (mut last, mut at) = (Reading::take(), Instant::now());
         loop {
             tokio::time::sleep(EVERY).await;
-            let reading = Reading::take();
+            let (reading, now) = (Reading::take(), Instant::now());
+            let seconds = now.duration_since(at).as_secs_f64();
             let load = match (&last, &reading) {
-                (Ok(last), Ok(reading)) => Some(reading.since(last)),
+                (Ok(last), Ok(reading)) => Some(reading.since(last, seconds)),
                 (Err(error), _) | (_, Err(error)) => {
                     tracing::debug!(%error, "the load of the program cannot be read");
                     None
                 }
             };
-            last = reading;
+            (last, at) = (reading, now);
             // If the plant has no room, the next load comes soon.
             let _ = events.try_send(Event::Load { at: clock.now(), load });
         }
@@ -43,7 +44,6 @@ pub(crate) async fn run(clock: Clock, events: mpsc::Sender<Event>, mut stopped: 
 
 /// The counters of one moment.
 struct Reading {
-    at: Instant,
     /// CPU time of the program in seconds.
     cpu: f64,
     /// How often each thread has waited, by its number.
@@ -68,7 +68,6 @@ impl Reading {
         let others = [all.irq, all.softirq, all.steal].map(Option::unwrap_or_default);
         let busy = all.user + all.nice + all.system + others.iter().sum::<u64>();
         Ok(Reading {
-            at: Instant::now(),
             cpu: (stat.utime + stat.stime) as f64 / ticks,
             waits,
             idle: (idle as f64, (idle + busy) as f64),
@@ -76,8 +75,8 @@ impl Reading {
         })
     }
 
-    fn since(&self, last: &Reading) -> ProcessLoad {
-        let seconds = self.at.duration_since(last.at).as_secs_f64();
+    /// The load of so many seconds since the last reading.
+    fn since(&self, last: &Reading, seconds: f64) -> ProcessLoad {
         let waits =
             self.waits.iter().map(|(thread, waits)| waits - last.waits.get(thread).copied().unwrap_or(0).min(*waits));
         let (idle, all) = (self.idle.0 - last.idle.0, self.idle.1 - last.idle.1);
@@ -96,18 +95,12 @@ mod tests {
 
     #[test]
     fn the_counters_become_rates() {
-        let at = Instant::now();
-        let reading = |seconds, cpu, waits: &[(i32, u64)], idle| Reading {
-            at: at + Duration::from_secs(seconds),
-            cpu,
-            waits: waits.iter().copied().collect(),
-            idle,
-            memory: 7,
-        };
-        let first = reading(0, 1.0, &[(1, 100), (2, 5)], (100.0, 200.0));
+        let reading =
+            |cpu, waits: &[(i32, u64)], idle| Reading { cpu, waits: waits.iter().copied().collect(), idle, memory: 7 };
+        let first = reading(1.0, &[(1, 100), (2, 5)], (100.0, 200.0));
         // Thread 2 has ended, thread 3 is new, and the number of thread 1 was given to another.
-        let second = reading(10, 2.5, &[(1, 90), (3, 60)], (118.0, 220.0));
-        let load = second.since(&first);
+        let second = reading(2.5, &[(1, 90), (3, 60)], (118.0, 220.0));
+        let load = second.since(&first, 10.0);
         assert_eq!(load, ProcessLoad { cpu: 0.15, wake_ups: 6.0, idle: 0.9, memory: 7 });
     }
 
