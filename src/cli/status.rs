@@ -116,7 +116,8 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
         lines.push(format!("history  {trouble}, {rows} rows, {lost} lost{epoch}"));
     }
     lines.extend(snapshot.load.iter().map(|load| format!("program  {}", load.words())));
-    lines.extend(snapshot.north.iter().map(|north| format!("data out {}", north_words(snapshot, north))));
+    let until = |north: &NorthStatus| local(north.sent_until, def);
+    lines.extend(snapshot.north.iter().map(|north| format!("data out {}", north.words(&until(north)))));
     lines.extend(snapshot.suppressed.iter().map(|alarm| format!("suppressed {}", suppressed_words(snapshot, alarm))));
     if client::is_withheld(snapshot) {
         lines.push("tag      values are shown after a login: --user NAME".to_owned());
@@ -152,14 +153,6 @@ fn suppressed_words(snapshot: &Snapshot, alarm: &SuppressedAlarm) -> String {
     let active = if alarm.active { ", ACTIVE" } else { "" };
     let subject = subject_name(&snapshot.def, def.subject);
     format!("{} {:10} {subject} {}{until}{active}", def.priority.number(), alarm.state.word(), def.message)
-}
-
-fn north_words(snapshot: &Snapshot, north: &NorthStatus) -> String {
-    let NorthStatus { connected, sent, refused, sent_until, error } = north;
-    let state = if *connected { "connected" } else { "not connected" };
-    let why = error.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
-    let until = local(*sent_until, &snapshot.def);
-    format!("{state}{why}, {sent} samples sent, {refused} refused, complete until {until}")
 }
 
 fn line_words(state: &LineState) -> String {

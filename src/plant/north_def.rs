@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::id::TagId;
+use crate::t;
 
 /// What the table `[north]` of a plant file says.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -95,4 +96,21 @@ pub struct NorthStatus {
     pub sent_until: Timestamp,
     /// What went wrong last; `None` while all is well.
     pub error: Option<String>,
+}
+
+impl NorthStatus {
+    /// `connected, 5192 samples sent, 0 refused, complete until 14:02:30`; `until` is the instant in words.
+    pub fn words(&self, until: &str) -> String {
+        let NorthStatus { connected, sent, refused, sent_until: _, error } = self;
+        let state = if *connected { t!("connected") } else { t!("not connected") };
+        let why = error.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
+        t!(
+            "{state}{why}, {sent} samples sent, {refused} refused, complete until {until}",
+            state,
+            why,
+            sent,
+            refused,
+            until
+        )
+    }
 }

@@ -40,6 +40,11 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     rows.push(Row::new());
     rows.extend(cycle(cx, report, width));
     rows.extend(counters(cx, at, report, width));
+    if let Some(north) = &cx.snapshot.north {
+        let until = moment(north.sent_until, cx.now, &cx.def().time_zone);
+        let style = if north.error.is_none() && north.connected { cx.theme.normal() } else { cx.theme.trouble() };
+        rows.extend(flow(t!("data out"), cx.theme.dim(), width, [plain(north.words(&until), style)]));
+    }
     if let Some(load) = cx.snapshot.load {
         rows.extend(flow(t!("program"), cx.theme.dim(), width, [plain(load.words(), cx.theme.normal())]));
     }
@@ -303,6 +308,27 @@ fn tenths(ms: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        plant::north_def::NorthStatus,
+        ui::fixture::{Fixture, with_cx},
+    };
+
+    #[test]
+    fn the_data_out_and_the_load_of_the_program_are_said() {
+        let mut snapshot = (*Fixture::traffic().snapshot()).clone();
+        let words = |snapshot: &Snapshot| -> String {
+            with_cx(snapshot, |cx| {
+                let at = LineView::new(cx, LineId(0)).expect("the line is there");
+                rows(cx, &at, 120).iter().flatten().map(|(words, _)| words.as_str()).collect()
+            })
+        };
+        assert!(words(&snapshot).contains("140 wake-ups/s") && !words(&snapshot).contains("data out"));
+        let sent_until = crate::ui::fixture::now();
+        let error = Some("refused".to_owned());
+        snapshot.north = Some(NorthStatus { connected: false, sent: 12, refused: 3, sent_until, error }.into());
+        let found = words(&snapshot);
+        assert!(found.contains("not connected: refused, 12 samples sent, 3 refused, complete until 14:02:"), "{found}");
+    }
 
     #[test]
     fn numbers_read_easily() {

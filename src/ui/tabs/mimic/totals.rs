@@ -17,8 +17,10 @@ pub fn rows(cx: &ViewContext, report: &ShiftReport) -> Vec<Row> {
     };
     let ran = |figures: &RunFigures| {
         let (on, starts) = (figures.on.filter(|on| !on.is_zero())?, figures.starts.unwrap_or_default());
-        let hours = format!("{:.1}", on.as_secs_f64() / 3_600.0);
-        Some(t!("{name} {hours} h, {starts} starts", name = figures.tag, hours, starts))
+        let (minutes, hours) = (on.as_secs_f64() / 60.0, on.as_secs_f64() / 3_600.0);
+        let on =
+            if hours < 1.0 { t!("{minutes} min", minutes = format!("{minutes:.0}")) } else { format!("{hours:.1} h") };
+        Some(t!("{name} {on}, {starts} starts", name = figures.tag, on, starts))
     };
     let counters = report.tags.iter().filter_map(counted);
     let rows = counters.chain(report.runs.iter().filter_map(ran));
@@ -40,6 +42,8 @@ mod tests {
         };
         let mut report = shift_report();
         assert_eq!(said(&report), ["PM-1.E +12.50 kWh", "PLC-1.P-1 1.5 h, 3 starts"]);
+        report.runs[0].on = Some(Duration::from_secs(200));
+        assert_eq!(said(&report)[1], "PLC-1.P-1 3 min, 3 starts");
         report.runs[0].on = None;
         report.tags.iter_mut().for_each(|tag| tag.difference = tag.difference.map(|_| 0.0));
         assert_eq!(said(&report), [""; 0]);
