@@ -146,6 +146,8 @@ enum Command {
     Loopback(tools::loopback::Args),
     /// Send bytes to a line and show everything that comes back
     Send(tools::send::Args),
+    /// Listen to the line of another master without sending a byte: frames of both sides, statistics, values
+    Listen(tools::listen::Args),
 }
 
 /// What every command that starts a station takes.
@@ -299,6 +301,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Probe(args)) => tools::probe::main(args),
         Some(Command::Loopback(args)) => tools::loopback::main(args),
         Some(Command::Send(args)) => tools::send::main(args),
+        Some(Command::Listen(args)) => tools::listen::main(args),
     }
 }
 

@@ -104,6 +104,12 @@ fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, Strin
 }
 
 async fn open_tcp(host: &str, port: u16) -> Result<Opened, String> {
+    let stream = connect(host, port).await?;
+    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: None })
+}
+
+/// A TCP connection; the error is in words for an operator.
+pub(super) async fn connect(host: &str, port: u16) -> Result<TcpStream, String> {
     let connect = TcpStream::connect((host, port));
     let stream = match tokio::time::timeout(CONNECT_TIMEOUT, connect).await {
         Err(_) => return Err(format!("{host}:{port}: no connection within {} s", CONNECT_TIMEOUT.as_secs())),
@@ -115,7 +121,7 @@ async fn open_tcp(host: &str, port: u16) -> Result<Opened, String> {
     if let Err(error) = notice_silence(&stream) {
         tracing::debug!(%error, "no keepalive on {host}:{port}");
     }
-    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: None })
+    Ok(stream)
 }
 
 /// A peer that has vanished without a word is noticed within half a minute, and what was sent to it is taken back: left to

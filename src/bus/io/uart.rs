@@ -6,7 +6,7 @@
 use std::{
     ffi::c_void,
     io,
-    os::fd::{AsRawFd, BorrowedFd, OwnedFd},
+    os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd},
 };
 
 use rustix::ioctl::{Ioctl, IoctlOutput, Opcode};
@@ -18,8 +18,11 @@ use crate::plant::{def::Rs485, event::UartCounters};
 /// Reads the error counters of a port whenever it is called; `None` for a port whose driver does not count (a
 /// pseudo-terminal, many USB adapters).
 pub fn counter(port: &SerialStream) -> Option<CountUart> {
-    // A second handle, so that the counters outlive no port: it is closed with this closure.
-    let handle: OwnedFd = borrowed(port).try_clone_to_owned().ok()?;
+    count(borrowed(port).try_clone_to_owned().ok()?)
+}
+
+/// The same for a second handle of a port, which is closed with the counter.
+pub(super) fn count(handle: OwnedFd) -> Option<CountUart> {
     // SAFETY: TIOCGICOUNT fills one `serial_icounter_struct`, which `Counts` is, field by field.
     let read = move || unsafe { rustix::ioctl::ioctl(&handle, ReadCounts(Counts::default())) }.ok();
     let first = read()?;
@@ -45,6 +48,13 @@ pub fn set_rs485(port: &SerialStream, mode: Rs485) -> io::Result<()> {
     let config = Rs485Config { flags, delays: [0; 2], padding: [0; 5] };
     // SAFETY: TIOCSRS485 reads and writes back one `serial_rs485`, which `Rs485Config` is, field by field.
     unsafe { rustix::ioctl::ioctl(borrowed(port), SetRs485(config)) }.map_err(io::Error::from)
+}
+
+/// Lowers RTS, where there is one.
+pub(super) fn lower_rts(port: &impl AsFd) {
+    const RTS: i32 = 4;
+    // SAFETY: TIOCMBIC reads one int, the signals to lower. A pseudo-terminal has none, and says so.
+    let _ = unsafe { rustix::ioctl::ioctl(port, rustix::ioctl::Setter::<0x5417, i32>::new(RTS)) };
 }
 
 fn borrowed(port: &SerialStream) -> BorrowedFd<'_> {

@@ -1,5 +1,6 @@
 //! Tools for a line without a plant: which port, which settings, and the output of findings.
 
+pub mod listen;
 pub mod loopback;
 mod network;
 pub mod probe;

@@ -112,6 +112,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("src/cli/source.rs", &["channels", "clock"]),
     ("src/cli/sql.rs", &["tasks", "files", "clock", "process"]),
     ("src/cli/systemd_unit.rs", &["process"]),
+    ("src/cli/tools/listen.rs", &["tasks", "clock", "process"]),
+    ("src/cli/tools/listen/capture_file.rs", &["files"]),
     ("src/cli/tools/mod.rs", &["tasks", "files", "terminal", "clock", "process"]),
     ("src/cli/tools/network.rs", &["tasks", "process", "network"]),
     ("src/station/audit_queue.rs", &["channels", "clock"]),
