@@ -6,6 +6,7 @@ pub mod ports;
 pub mod network;
 pub mod transport;
 pub mod tap;
+pub mod signals;
 pub mod pause;
 pub mod wire;
 pub mod link;

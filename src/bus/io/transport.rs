@@ -80,6 +80,20 @@ async fn open(transport: &Transport) -> Result<Opened, String> {
 }
 
 fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, String> {
+    let stream = serial_stream(path, serial)?;
+    // A driver remembers what an earlier opening has switched on; one that never could needs no call.
+    let switched = uart::set_rs485(&stream, rs485);
+    if rs485 != Rs485::Off {
+        switched.map_err(|error| {
+            format!("{path}: its driver does not switch the direction of RS-485 ({error}); use rs485 = \"off\"")
+        })?;
+    }
+    let count = uart::counter(&stream);
+    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: count })
+}
+
+/// A serial port, taken exclusively: a second master on the line is refused by the system.
+pub(super) fn serial_stream(path: &str, serial: Serial) -> Result<SerialStream, String> {
     use tokio_serial::{DataBits, FlowControl, StopBits};
     let builder = tokio_serial::new(path, serial.baud)
         .data_bits(if serial.data_bits == 7 { DataBits::Seven } else { DataBits::Eight })
@@ -90,17 +104,7 @@ fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, Strin
         })
         .stop_bits(if serial.stop_bits == 2 { StopBits::Two } else { StopBits::One })
         .flow_control(FlowControl::None);
-    // The port is taken exclusively: a second master on the line is refused by the system.
-    let stream: SerialStream = builder.open_native_async().map_err(|error| ports::why_not(path, &error))?;
-    // A driver remembers what an earlier opening has switched on; one that never could needs no call.
-    let switched = uart::set_rs485(&stream, rs485);
-    if rs485 != Rs485::Off {
-        switched.map_err(|error| {
-            format!("{path}: its driver does not switch the direction of RS-485 ({error}); use rs485 = \"off\"")
-        })?;
-    }
-    let count = uart::counter(&stream);
-    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: count })
+    builder.open_native_async().map_err(|error| ports::why_not(path, &error))
 }
 
 async fn open_tcp(host: &str, port: u16) -> Result<Opened, String> {

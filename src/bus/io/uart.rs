@@ -1,6 +1,6 @@
-//! What only the driver of a serial port knows or can do: its error counters, and the direction of RS-485.
+//! What only the driver of a serial port knows or can do: its error counters, its signals, and the direction of RS-485.
 //!
-//! The two kernel interfaces have no safe wrapper in any library we use; each is one call with a structure of its own.
+//! These kernel interfaces have no safe wrapper in any library we use; each is one call with one structure.
 #![allow(unsafe_code)]
 
 use std::{
@@ -48,6 +48,17 @@ pub fn set_rs485(port: &SerialStream, mode: Rs485) -> io::Result<()> {
     let config = Rs485Config { flags, delays: [0; 2], padding: [0; 5] };
     // SAFETY: TIOCSRS485 reads and writes back one `serial_rs485`, which `Rs485Config` is, field by field.
     unsafe { rustix::ioctl::ioctl(borrowed(port), SetRs485(config)) }.map_err(io::Error::from)
+}
+
+/// The bits of the signals of a port; `None` where its driver has none.
+pub(super) fn signals(port: &SerialStream) -> Option<u32> {
+    // SAFETY: TIOCMGET fills one int.
+    unsafe { rustix::ioctl::ioctl(borrowed(port), rustix::ioctl::Getter::<0x5415, u32>::new()) }.ok()
+}
+
+/// Holds the data line low for a quarter of a second.
+pub(super) fn send_break(port: &SerialStream) -> io::Result<()> {
+    rustix::termios::tcsendbreak(borrowed(port)).map_err(io::Error::from)
 }
 
 /// Lowers RTS, where there is one.

@@ -5,6 +5,7 @@ pub mod loopback;
 mod network;
 pub mod probe;
 pub mod send;
+pub mod signals;
 pub mod scan;
 
 use std::{io::IsTerminal, path::Path, sync::Arc, time::Duration};
