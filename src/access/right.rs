@@ -71,7 +71,7 @@ pub fn of_command(kind: &CommandKind) -> Right {
 fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
     match diagnostic {
         // Raw bytes may be a write.
-        Diagnostic::Send(_) | Diagnostic::Write(_) => Right::Engineer,
+        Diagnostic::Send(_) | Diagnostic::Write(_) | Diagnostic::Pattern { .. } => Right::Engineer,
         // While other settings are tried the line is not polled.
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Right::Engineer,
         Diagnostic::Scan(_)

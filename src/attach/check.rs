@@ -225,6 +225,10 @@ mod tests {
         for (diagnostic, expect) in [(loopback(1_000), true), (loopback(1_001), false), (loopback(0), false)] {
             check(diagnostic, expect);
         }
+        let pattern = |count| Diagnostic::Pattern { bits: 8, count };
+        for (diagnostic, expect) in [(pattern(500), true), (pattern(501), false), (pattern(0), false)] {
+            check(diagnostic, expect);
+        }
         for (length, expect) in [(0, false), (513, true), (514, false)] {
             check(Diagnostic::Send(vec![0; length]), expect);
         }

@@ -4,7 +4,10 @@
 //! 4.1: with T1 ≤ … ≤ Tn it can, whatever the phases, if and only if ΣC/T ≤ 1 and for each i ≥ 2 and each L in (T1, Ti)
 //! `L ≥ C_i + Σ_{j<i} ⌊(L−1)/T_j⌋·C_j`.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    time::Duration,
+};
 
 use super::{
     plan::{Block, Wire, cost},
@@ -14,11 +17,14 @@ use crate::plant::{
     admission::{Admission, DeadDevice, OverloadInterval, PollWords, Schedulability, Warning},
     def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Parity, PlantDef, Transport},
     device_time::{DeviceTime, SeenTime},
+    number::to_u16,
     tag::{Poll, PollClass},
 };
 
 /// A device that is given up is probed this often.
 const PROBE_EVERY: Duration = Duration::from_secs(30);
+/// Units of one load on a line of RS-485, whose drivers carry 32 loads: the master is one of them.
+const UNITS_MAX: u16 = 31;
 /// Polls that an overload interval names.
 const NAMED_MAX: usize = 3;
 
@@ -243,8 +249,20 @@ fn warnings(def: &PlantDef, line: &LineDef, blocks: &[Block], utilisation: f64) 
         timeout,
         full.then_some(Warning::NoRoomForWrites { share: WRITE_SHARE }),
         server.then_some(Warning::SerialServer),
+        too_many_units(def, line),
     ];
     warnings.into_iter().flatten().collect()
+}
+
+/// The units of a serial line against what its devices permit, or else what an RS-485 driver carries.
+fn too_many_units(def: &PlantDef, line: &LineDef) -> Option<Warning> {
+    line.transport.serial()?;
+    let on_line = || def.devices.iter().filter(|device| device.line == line.id && device.unit != 0);
+    let units = to_u16(on_line().map(|device| device.unit).collect::<BTreeSet<u8>>().len());
+    let (most, device) =
+        on_line().map(|device| (device.units_max.unwrap_or(UNITS_MAX), device)).min_by_key(|(most, _)| *most)?;
+    let device = device.units_max.map(|_| device.name.clone());
+    (most < units).then_some(Warning::TooManyUnits { units, most, device })
 }
 
 #[cfg(test)]

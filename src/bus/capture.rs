@@ -38,19 +38,34 @@ const DEVICE: [u8; 4] = [192, 0, 2, 2];
 
 /// The frames of a line, oldest first, as a pcapng file.
 pub fn pcapng(frames: &[Frame]) -> Vec<u8> {
-    let mut file = block(0x0A0D_0D0A, &[&0x1A2B_3C4D_u32.to_le_bytes()[..], &[1, 0, 0, 0], &[0xFF; 8]].concat());
-    for (link, name) in LINKS {
-        let body = [&link.to_le_bytes()[..], &[0; 6], &option(2, name.as_bytes()), &option(0, &[])].concat();
-        file.extend(block(1, &body));
+    let (mut capture, head) = Capture::begin();
+    let packets = frames.iter().flat_map(|frame| capture.packet(frame));
+    head.into_iter().chain(packets).collect()
+}
+
+/// A pcapng file as it grows.
+pub struct Capture {
+    connection: Connection,
+}
+
+impl Capture {
+    /// A new file, and what it begins with.
+    pub fn begin() -> (Capture, Vec<u8>) {
+        let mut head = block(0x0A0D_0D0A, &[&0x1A2B_3C4D_u32.to_le_bytes()[..], &[1, 0, 0, 0], &[0xFF; 8]].concat());
+        for (link, name) in LINKS {
+            let body = [&link.to_le_bytes()[..], &[0; 6], &option(2, name.as_bytes()), &option(0, &[])].concat();
+            head.extend(block(1, &body));
+        }
+        (Capture { connection: Connection { sent: 1, received: 1, packets: 0 } }, head)
     }
-    let mut connection = Connection { sent: 1, received: 1, packets: 0 };
-    for frame in frames {
+
+    /// What is appended for a frame: one whole block.
+    pub fn packet(&mut self, frame: &Frame) -> Vec<u8> {
         let tcp = frame.framing == Framing::Mbap
             && matches!(frame::mbap(&frame.bytes), Mbap::Whole { end, .. } if end == frame.bytes.len());
-        let packet = if tcp { connection.packet(frame.sent, &frame.bytes) } else { upper_pdu(frame) };
-        file.extend(packet_block(frame, u32::from(!tcp), &packet));
+        let packet = if tcp { self.connection.packet(frame.sent, &frame.bytes) } else { upper_pdu(frame) };
+        packet_block(frame, u32::from(!tcp), &packet)
     }
-    file
 }
 
 /// One line a frame: time, direction, bytes, meaning, result. `sightglass decode` reads it back.

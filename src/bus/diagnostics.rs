@@ -1,5 +1,6 @@
 //! Diagnostics of a line as pure step machines: which request is next, and what follows from its response.
 
+mod pattern;
 mod scan;
 mod sweep;
 mod write;
@@ -19,6 +20,8 @@ use crate::plant::{
     tag::Table,
     traffic::Exchange,
 };
+
+pub use pattern::PatternTally;
 
 /// What is to be sent next.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,7 +109,10 @@ impl Job {
 
     /// Does it ask so much that other requests must not wait for its end?
     pub fn is_long(&self) -> bool {
-        matches!(self.run.diagnostic, Diagnostic::Sweep(_) | Diagnostic::Scan(_) | Diagnostic::Loopback { .. })
+        matches!(
+            self.run.diagnostic,
+            Diagnostic::Sweep(_) | Diagnostic::Scan(_) | Diagnostic::Loopback { .. } | Diagnostic::Pattern { .. }
+        )
     }
 
     /// May it take no more of the line's time than live reads?
@@ -266,6 +272,11 @@ impl Job {
                 }
             }
             Diagnostic::Sweep(_) => self.sweep.as_ref().map_or(String::new(), sweep::SweepJob::conclusion),
+            Diagnostic::Pattern { bits, .. } => {
+                let tally = PatternTally::of_run(&self.run, *bits);
+                self.found(Finding::Conclusion(tally.to_string()));
+                tally.conclusion()
+            }
             Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_) => {
                 return;
             }
@@ -296,6 +307,7 @@ fn steps_in(diagnostic: &Diagnostic) -> u32 {
     match diagnostic {
         Diagnostic::Send(_) | Diagnostic::Read { .. } => 1,
         Diagnostic::Loopback { count, .. } => 1 + u32::from(*count),
+        Diagnostic::Pattern { count, .. } => u32::from(*count),
         Diagnostic::Identify { .. } => 2,
         Diagnostic::Write(_) => write::STEPS,
         Diagnostic::Scan(scan) => scan::steps_in(scan),
@@ -307,6 +319,9 @@ fn steps_in(diagnostic: &Diagnostic) -> u32 {
 fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
     match diagnostic {
         Diagnostic::Send(bytes) => Step { serial: None, timeout: None, ask: Ask::Raw(bytes.clone()) },
+        Diagnostic::Pattern { bits, .. } => {
+            Step { serial: None, timeout: None, ask: Ask::Raw(pattern::bytes(n, *bits)) }
+        }
         // An adapter that gives back what it sends would pass every loopback. A read cannot be answered by itself: the link
         // knows such an adapter from then on.
         Diagnostic::Loopback { unit, .. } if n == 0 => step(read(*unit, Table::Holding, 0, 1)),

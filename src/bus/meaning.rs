@@ -3,8 +3,8 @@
 use super::codec;
 use crate::{
     plant::{
-        Snapshot,
-        def::{DeviceDef, LineId},
+        PlantDef, Snapshot,
+        def::{DeviceDef, DeviceId, LineId},
         scale,
         tag::{Point, Table, TagDef},
     },
@@ -15,13 +15,32 @@ use crate::{
 const NAMED_MAX: usize = 6;
 
 /// Places that a request reads or writes.
-struct Span {
+pub(super) struct Span {
     table: Table,
     address: u16,
     count: u16,
     /// What is written there, or was read; a bit is 0 or 1.
     words: Option<Vec<u16>>,
-    writes: bool,
+    pub writes: bool,
+}
+
+impl Span {
+    /// The tags of a device that are at these places, or in part.
+    pub fn tags<'a>(&self, def: &'a PlantDef, device: DeviceId) -> impl Iterator<Item = &'a TagDef> {
+        let (table, first, end) =
+            (self.table, u32::from(self.address), u32::from(self.address) + u32::from(self.count));
+        let touched = move |point: Point| {
+            let at = u32::from(point.address);
+            point.table == table && at < end && first < at + u32::from(point.len())
+        };
+        def.tags_of(device).filter(move |tag| tag.calculation.is_none() && touched(tag.point))
+    }
+
+    /// The words of a point, if all of them are there.
+    pub fn words_of(&self, point: Point) -> Option<&[u16]> {
+        let from = usize::from(point.address.checked_sub(self.address)?);
+        self.words.as_ref()?.get(from..from + usize::from(point.len()))
+    }
 }
 
 /// What a request message (unit and PDU) on a line would do, a line each; nothing for a unit that the plant does not have and
@@ -64,7 +83,7 @@ fn devices(snapshot: &Snapshot, line: LineId, unit: u8) -> impl Iterator<Item = 
 }
 
 /// What a message reads and writes, by its function (V1.1b3, 6); `None` where bytes are missing.
-fn spans(message: &[u8], answer: Option<&[u8]>) -> Option<Vec<Span>> {
+pub(super) fn spans(message: &[u8], answer: Option<&[u8]>) -> Option<Vec<Span>> {
     let word = |at: usize| Some(u16::from_be_bytes([*message.get(at)?, *message.get(at + 1)?]));
     let read = |table: Table, at: usize| -> Option<Span> {
         let (address, count) = (word(at)?, word(at + 2)?);
@@ -105,16 +124,10 @@ fn unpacked(table: Table, bytes: &[u8], count: u16) -> Option<Vec<u16>> {
 }
 
 fn lines(snapshot: &Snapshot, device: &DeviceDef, span: &Span) -> Vec<String> {
-    let end = u32::from(span.address) + u32::from(span.count);
-    let touched = |point: Point| {
-        let first = u32::from(point.address);
-        point.table == span.table && first < end && u32::from(span.address) < first + u32::from(point.len())
-    };
-    let own: Vec<&TagDef> = snapshot.def.tags_of(device.id).filter(|tag| tag.calculation.is_none()).collect();
-    let mut found: Vec<&TagDef> = own.iter().copied().filter(|tag| touched(tag.point)).collect();
+    let mut found: Vec<&TagDef> = span.tags(&snapshot.def, device.id).collect();
     if found.is_empty() {
         let place = span.table.modicon(span.address);
-        return match own.is_empty() {
+        return match snapshot.def.tags_of(device.id).all(|tag| tag.calculation.is_some()) {
             true => Vec::new(),
             false => vec![t!("{device} has no known tag at {place}", device = device.name, place)],
         };
@@ -122,10 +135,8 @@ fn lines(snapshot: &Snapshot, device: &DeviceDef, span: &Span) -> Vec<String> {
     let left_out = found.len().saturating_sub(NAMED_MAX);
     found.truncate(NAMED_MAX);
     let mut lines: Vec<String> = match (&span.words, span.writes) {
-        (Some(words), true) => {
-            found.iter().map(|tag| t!("writes {value}", value = valued(snapshot, tag, span, words))).collect()
-        }
-        (Some(words), false) => found.iter().map(|tag| valued(snapshot, tag, span, words)).collect(),
+        (Some(_), true) => found.iter().map(|tag| t!("writes {value}", value = valued(snapshot, tag, span))).collect(),
+        (Some(_), false) => found.iter().map(|tag| valued(snapshot, tag, span)).collect(),
         (None, writes) => {
             let names = found.iter().map(|tag| tag.name.as_str()).collect::<Vec<_>>().join(", ");
             vec![if writes { t!("writes bits of {names}", names) } else { t!("reads {names}", names) }]
@@ -138,11 +149,9 @@ fn lines(snapshot: &Snapshot, device: &DeviceDef, span: &Span) -> Vec<String> {
 }
 
 /// `TIC-1.SV = 5.0 °C, P-DP is 1`: the value, and what it hangs on.
-fn valued(snapshot: &Snapshot, tag: &TagDef, span: &Span, words: &[u16]) -> String {
+fn valued(snapshot: &Snapshot, tag: &TagDef, span: &Span) -> String {
     let name = &tag.name;
-    let from = tag.point.address.checked_sub(span.address).map(usize::from);
-    let own = from.and_then(|from| words.get(from..from + usize::from(tag.point.len())));
-    let Some(own) = own else { return t!("a part of {name}", name) };
+    let Some(own) = span.words_of(tag.point) else { return t!("a part of {name}", name) };
     if let Some(text) = codec::decode_text(tag.point, own) {
         return format!("{name} = {text}");
     }

@@ -19,6 +19,7 @@
 //! | [`diagnostics`], [`live`], [`recognise`] | the steps of a diagnostic and of a live read; which device it looks like |
 //! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
 //! | [`meaning`] | what a request means for the tags of the plant |
+//! | [`listen`] | who says what on the line of another master |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
 pub(crate) mod pdu;
@@ -44,4 +45,5 @@ pub mod diagnostics;
 pub mod live;
 pub mod recognise;
 pub mod line_stats;
+pub mod listen;
 pub mod io;

@@ -6,7 +6,7 @@ use super::{CliError, say};
 use crate::profile::FORMAT_PAGE;
 
 /// The pages: name, what it is about, text.
-const TOPICS: [(&str, &str, &str); 9] = [
+const TOPICS: [(&str, &str, &str); 10] = [
     ("commands", "what each command does", include_str!("help/commands.md")),
     ("screen", "tabs, keys, and what the signs mean", include_str!("help/screen.md")),
     ("station", "a station on a panel PC: installation, users, rights", include_str!("help/station.md")),
@@ -15,6 +15,11 @@ const TOPICS: [(&str, &str, &str); 9] = [
     ("audit-log", "the audit log: what it holds and what it promises", include_str!("help/audit.md")),
     ("reliability", "what you can rely on, and what happens when something fails", include_str!("help/reliability.md")),
     ("devices", "the shipped devices, and how well each is known", include_str!("help/devices.md")),
+    (
+        "wiring",
+        "RS-485: A and B, termination, bias, number of units, what each fault looks like",
+        include_str!("help/wiring.md"),
+    ),
     ("format", "every key of plant files and profiles, and the pictures of the mimic", FORMAT_PAGE),
 ];
 

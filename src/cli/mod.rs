@@ -20,6 +20,7 @@ mod init;
 mod log;
 mod menu;
 mod mimic;
+mod mistyped;
 mod new;
 mod open;
 mod open_log;
@@ -142,10 +143,14 @@ enum Command {
     Scan(tools::scan::Args),
     /// Read the identification or some registers of one unit
     Probe(tools::probe::Args),
-    /// Test a line by loopback: a unit returns what it is sent
+    /// Test a line by loopback: a unit, or a plug (--plug), returns what it is sent
     Loopback(tools::loopback::Args),
     /// Send bytes to a line and show everything that comes back
     Send(tools::send::Args),
+    /// Set RTS and DTR of a serial port by hand, and show CTS, DSR, DCD, RI and breaks
+    Signals(tools::signals::Args),
+    /// Listen to the line of another master without sending a byte: frames of both sides, statistics, values
+    Listen(tools::listen::Args),
 }
 
 /// What every command that starts a station takes.
@@ -223,7 +228,7 @@ pub fn main() -> ExitCode {
     // Histories, logs and reports are for the user and the group, whatever the shell says.
     let mask = rustix::process::umask(rustix::fs::Mode::empty());
     rustix::process::umask(mask | rustix::fs::Mode::from_raw_mode(0o027));
-    if let Some(message) = std::env::args_os().nth(1).and_then(|word| renamed(word.to_str()?)) {
+    if let Some(message) = std::env::args_os().nth(1).and_then(|word| mistyped::renamed(word.to_str()?)) {
         say_error(&message);
         return ExitCode::from(2);
     }
@@ -255,9 +260,8 @@ fn parse(words: Vec<std::ffi::OsString>) -> Args {
 fn run_command(args: Args) -> Result<(), CliError> {
     match args.command {
         None => match args.plant {
-            Some(plant) => {
-                run::with_terminal(&plant, &args.station, &args.terminal).map_err(|error| mistyped(&plant, error))
-            }
+            Some(plant) => run::with_terminal(&plant, &args.station, &args.terminal)
+                .map_err(|error| mistyped::meant(&plant, error)),
             None => match attach::terminal(None, &args.terminal) {
                 Err(error @ CliError::NotRunning(_)) => match menu::without_station()? {
                     Some(words) => run_command(parse(
@@ -299,26 +303,8 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Probe(args)) => tools::probe::main(args),
         Some(Command::Loopback(args)) => tools::loopback::main(args),
         Some(Command::Send(args)) => tools::send::main(args),
-    }
-}
-
-/// The answer to a command name of an earlier version.
-fn renamed(word: &str) -> Option<String> {
-    const RENAMED: [(&str, &str); 3] = [("unit", "systemd-unit"), ("frame", "decode"), ("raw", "send")];
-    let (old, new) = RENAMED.iter().find(|(old, _)| *old == word)?;
-    Some(format!("`{old}` is now `{new}`"))
-}
-
-/// Says which command was probably meant where there is no plant of this name.
-fn mistyped(word: &str, error: CliError) -> CliError {
-    let command = <Args as clap::CommandFactory>::command();
-    let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
-    match (error, profile::diagnostic::nearest(word, &names)) {
-        (CliError::Profile(why), Some(meant)) if !Path::new(word).exists() => {
-            let why = why.to_string();
-            CliError::Usage(format!("{}\ndid you mean the command `sightglass {meant}`?", why.trim_end()))
-        }
-        (error, _) => error,
+        Some(Command::Signals(args)) => tools::signals::main(args),
+        Some(Command::Listen(args)) => tools::listen::main(args),
     }
 }
 

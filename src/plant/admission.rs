@@ -126,6 +126,15 @@ pub enum Warning {
     },
     /// A serial server passes frames on over a line of which nothing is known here.
     SerialServer,
+    /// A serial line has more units than it carries: each is a load, the master too.
+    TooManyUnits {
+        /// The devices of the plant on it.
+        units: u16,
+        /// How many there may be.
+        most: u16,
+        /// The device that permits no more; `None`: RS-485 does not.
+        device: Option<String>,
+    },
 }
 
 /// `fits`, or what does not, in a sentence.
@@ -182,6 +191,14 @@ impl fmt::Display for Warning {
             Warning::SerialServer => {
                 f.write_str(t!("a serial server: the time on the line behind it is unknown and not counted"))
             }
+            Warning::TooManyUnits { units, most, device: Some(device) } => {
+                f.write_str(&t!("{units} units on the line: {device} permits {most} (help wiring)", units, device, most))
+            }
+            Warning::TooManyUnits { units, most, device: None } => f.write_str(&t!(
+                "{units} units and the master on the line: RS-485 carries {most} units of one load (help wiring; units_max for others)",
+                units,
+                most
+            )),
         }
     }
 }

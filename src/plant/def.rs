@@ -163,6 +163,8 @@ pub struct DeviceDef {
     pub write_gap: Duration,
     /// The longest that it takes itself for a response, as its profile states it.
     pub response_time: Option<Duration>,
+    /// Most devices on its serial line, as its profile states it; `None`: as many as RS-485 carries.
+    pub units_max: Option<u16>,
     /// Which tags play PV, SV and so on, if it is a controller.
     pub faceplate: Option<Faceplate>,
     /// Actions that are more than a write (save to non-volatile memory).
@@ -191,6 +193,7 @@ impl DeviceDef {
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             response_time: None,
+            units_max: None,
             faceplate: None,
             actions: Vec::new(),
             program: None,

@@ -22,6 +22,8 @@ pub const FINDINGS_MAX: usize = 1_000;
 const SEND_MAX: usize = 513;
 /// Most loopbacks of one test.
 pub const LOOPBACKS_MAX: u16 = 1_000;
+/// Most patterns of one test: each is a finding.
+pub const PATTERNS_MAX: u16 = 500;
 /// Most serial parameters of one scan: eight baud rates with each of the usual characters, twice.
 const SERIALS_MAX: usize = 64;
 
@@ -37,6 +39,13 @@ pub enum Diagnostic {
         /// The word that must come back.
         data: u16,
         /// How often.
+        count: u16,
+    },
+    /// Sends patterns that are no frames and expects each back: a loopback plug returns them, or local echo does.
+    Pattern {
+        /// Data bits of a character: 7 or 8.
+        bits: u8,
+        /// How many patterns.
         count: u16,
     },
     /// Device identification 2B/0E, and 11 report server id where that is unknown.
@@ -74,6 +83,7 @@ impl Diagnostic {
         match self {
             Diagnostic::Send(bytes) => within("bytes to send", bytes.len(), SEND_MAX),
             Diagnostic::Loopback { count, .. } => within("loopbacks", usize::from(*count), usize::from(LOOPBACKS_MAX)),
+            Diagnostic::Pattern { count, .. } => within("patterns", usize::from(*count), usize::from(PATTERNS_MAX)),
             Diagnostic::Identify { .. } => Ok(()),
             Diagnostic::Read { table, address, count, .. } => {
                 within("registers", usize::from(*count), if table.is_bits() { 2_000 } else { 125 })?;
@@ -98,6 +108,7 @@ impl std::fmt::Display for Diagnostic {
             Diagnostic::Loopback { unit, count, .. } => {
                 f.write_str(&t!("loopback unit {unit}, {count} times", unit, count))
             }
+            Diagnostic::Pattern { count, .. } => f.write_str(&t!("loopback plug, {count} patterns", count)),
             Diagnostic::Identify { unit } => f.write_str(&t!("identify unit {unit}", unit)),
             Diagnostic::Read { unit, table, address, count } => {
                 let (table, place) = (translate(table.word()), format!("{address} / 0x{address:04X}"));

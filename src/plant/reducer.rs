@@ -22,7 +22,7 @@ use super::{
     commands::CommandTracker,
     control_run::RunTracker,
     def::{LineDef, LineId, PlantDef, TagId},
-    event::{Event, LineState, WriteResult},
+    event::{Event, Fault, LineState, WriteResult},
     interlock::ActuatorTracker,
     line_minute::LineMinuteTracker,
     north_def::NorthStatus,
@@ -199,6 +199,12 @@ impl Plant {
         self.advance_restores(at, &mut effects);
         self.count_alarms(&effects.records);
         effects
+    }
+
+    /// Another master has written these tags, or tried to: they are uncertain until they are read.
+    pub fn on_foreign_write(&mut self, tags: &[TagId], fault: Option<Fault>, at: Timestamp) {
+        tags.iter().for_each(|tag| self.image.written(*tag, fault, at));
+        self.evaluate(at);
     }
 
     /// Accepts a command of an operator.

@@ -113,13 +113,14 @@ fn short_name(raw: &Raw) -> (String, Span) {
     }
 }
 
-/// What a device needs of time.
+/// What a device needs of time and of its line.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Timing {
     /// See [`crate::plant::def::DeviceDef`].
     pub gap: Duration,
     pub write_gap: Duration,
     pub response_time: Option<Duration>,
+    pub units_max: Option<u16>,
 }
 
 /// What the device and its profile say about requests, over the limits of the standard.
@@ -158,11 +159,15 @@ pub(super) fn limits(device: &DeviceTable, profile: &ProfileFile, problems: &mut
         let problem = problems.add(time.at, format!("response_time_ms = {} is not possible", time.value));
         problem.label("expected 1 to 10000");
     }
+    if let Some(count) = table.units_max.filter(|count| !(1..=247).contains(&count.value)) {
+        problems.add(count.at, format!("units_max = {} is not possible", count.value)).label("expected 1 to 247");
+    }
     let millis = |value: Option<At<u16>>| value.map(|value| Duration::from_millis(u64::from(value.value)));
     let timing = Timing {
         gap: millis(table.request_gap_ms).unwrap_or_default(),
         write_gap: millis(table.write_gap_ms).unwrap_or_default(),
         response_time: millis(table.response_time_ms),
+        units_max: table.units_max.map(|count| count.value),
     };
     (limits, timing)
 }

@@ -274,6 +274,7 @@ fn define_device<'a>(
         gap: timing.gap,
         write_gap: timing.write_gap,
         response_time: timing.response_time,
+        units_max: timing.units_max,
         faceplate: None,
         actions: Vec::new(),
         program: None,

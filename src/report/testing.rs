@@ -73,6 +73,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             response_time: None,
+            units_max: None,
             faceplate: Some(Faceplate {
                 pv: TagId(0),
                 sv: TagId(1),

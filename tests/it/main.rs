@@ -10,6 +10,7 @@
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
 //! | `peers` | our master against slaves that we did not write: pymodbus, libmodbus |
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
+//! | `listen` | the line of a master and a slave that we did not write, heard over a tap: frames, values, capture; nothing is sent |
 //! | `mqtt` | data out to a broker that is stopped and killed, as the station is; TLS and passwords |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
@@ -49,6 +50,7 @@ mod formats;
 mod guarded;
 mod hostile;
 mod kills;
+mod listen;
 mod logs;
 mod masters;
 mod mqtt;

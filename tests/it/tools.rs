@@ -1,11 +1,13 @@
 //! The tools for a line without a plant, against peers that echo, chatter and lie: what they say, and how they end.
 
 use std::{
+    fs::OpenOptions,
     io::{Read, Write},
     net::{Ipv4Addr, Ipv6Addr, TcpListener, TcpStream},
+    process::Command,
 };
 
-use crate::support::sightglass;
+use crate::support::{Cable, Process, folder, have, sightglass};
 
 /// A peer that does this with every connection. Gives its address.
 fn peer(work: impl Fn(TcpStream) + Send + 'static) -> String {
@@ -187,4 +189,66 @@ fn a_mistyped_command_gets_a_suggestion() {
     }
     let (_, said) = run(&["no-such-plant-at-all"]);
     assert!(!said.contains("did you mean the command"), "{said}");
+}
+
+#[test]
+fn a_plug_returns_every_byte() {
+    if !have("socat", "socat") {
+        return;
+    }
+    let folder = folder();
+    let port = folder.path().join("plug");
+    let end = format!("pty,raw,echo=0,link={}", port.display());
+    let mut plug = Process::start(Command::new("socat").args(["-d", "-d", &end, "exec:cat"]));
+    plug.wait_for("starting data transfer loop");
+    let (code, said) = run(&["loopback", port.to_str().unwrap(), "--plug"]);
+    let counted = "320 bytes sent, 320 received: 0 wrong, 0 missing, 0 more than sent; 0.0 % faults";
+    assert!(code == Some(0) && said.contains(counted) && said.contains("local echo"), "{code:?} {said}");
+    // In seven bits too.
+    let (code, said) = run(&["loopback", port.to_str().unwrap(), "--plug", "--mode", "ascii", "--count", "6"]);
+    assert!(code == Some(0) && said.contains("192 received: 0 wrong"), "{code:?} {said}");
+    let (code, said) = run(&["loopback", "127.0.0.1:1", "--plug"]);
+    assert!(code == Some(2) && said.contains("needs a serial line"), "{code:?} {said}");
+}
+
+#[test]
+fn a_bad_plug_and_none_are_distinguished() {
+    if !have("socat", "socat") {
+        return;
+    }
+    let [nothing, bad] = [(); 2].map(|()| folder());
+    let cable = Cable::plug(nothing.path());
+    let port = cable.ends[0].to_str().unwrap();
+    let (code, said) = run(&["loopback", port, "--plug", "--count", "2", "--timeout", "50"]);
+    assert!(code == Some(1) && said.contains("64 bytes sent, 0 received: 0 wrong, 64 missing"), "{code:?} {said}");
+    assert!(said.contains("nothing came back"), "{said}");
+    // The other end of this one loses a byte of each pattern, and changes one.
+    let cable = Cable::plug(bad.path());
+    let port = cable.ends[0].to_str().unwrap();
+    let mut other = OpenOptions::new().read(true).write(true).open(&cable.ends[1]).unwrap();
+    std::thread::spawn(move || {
+        let mut pattern = [0; 32];
+        while other.read_exact(&mut pattern).is_ok() {
+            pattern[3] ^= 0x10;
+            if other.write_all(&pattern[..31]).is_err() {
+                break;
+            }
+        }
+    });
+    let (code, said) = run(&["loopback", port, "--plug", "--count", "5"]);
+    let counted = "160 bytes sent, 155 received: 5 wrong, 5 missing, 0 more than sent; 6.2 % faults";
+    assert!(code == Some(1) && said.contains(counted), "{code:?} {said}");
+}
+
+#[test]
+fn a_port_without_signals_says_so() {
+    if !have("socat", "socat") {
+        return;
+    }
+    let folder = folder();
+    let cable = Cable::plug(folder.path());
+    let (code, said) = run(&["signals", cable.ends[0].to_str().unwrap(), "--rts", "off"]);
+    assert!(code == Some(0) && said.contains("this port has no RTS, DTR"), "{code:?} {said}");
+    let (code, said) = run(&["signals", "127.0.0.1:502"]);
+    assert!(code == Some(2) && said.contains("a serial port is needed"), "{code:?} {said}");
 }

@@ -110,3 +110,27 @@ fn an_overload_says_how_far_process_values_are_stretched() {
     let timeout = |warning: &Warning| matches!(warning, Warning::TimeoutBelowAnswer { .. });
     assert!(admission.warnings.iter().any(timeout), "an answer of 8 words takes 21 characters, 21.9 ms");
 }
+
+#[test]
+fn more_units_than_the_line_carries_are_counted() {
+    let mut def = fixture::plant();
+    let blocks = blocks(&def, LineId(0), &UnreadableRanges::default());
+    let warned = |def: &PlantDef| {
+        let warnings = admit(def, LineId(0), &blocks).warnings;
+        warnings.into_iter().map(|warning| warning.to_string()).find(|words| words.contains("units"))
+    };
+    for unit in 3..=31 {
+        def.devices.push(DeviceDef { unit, ..DeviceDef::new(DeviceId(u16::from(unit) - 1), "D", LineId(0)) });
+    }
+    assert_eq!(warned(&def), None, "31 units and the master are 32 loads");
+    def.devices[1].units_max = Some(16);
+    assert!(warned(&def).is_some_and(|words| words.contains("31 units on the line: PLC-1 permits 16")));
+    def.devices[1].units_max = Some(64);
+    def.devices.push(DeviceDef { unit: 32, ..DeviceDef::new(DeviceId(31), "D", LineId(0)) });
+    assert!(warned(&def).is_some_and(|words| words.contains("32 units and the master")));
+    def.devices.iter_mut().for_each(|device| device.units_max = Some(64));
+    assert_eq!(warned(&def), None, "all of them are a fraction of a load");
+    def.devices.iter_mut().for_each(|device| device.units_max = None);
+    def.lines[0].transport = Transport::tcp("plc", 502);
+    assert_eq!(warned(&def), None);
+}

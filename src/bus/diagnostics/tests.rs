@@ -108,6 +108,16 @@ fn loopbacks_are_counted() {
 }
 
 #[test]
+fn patterns_are_counted_and_a_plug_is_recognised() {
+    let plug = run(Diagnostic::Pattern { bits: 8, count: 6 }, |_| Err(Fault::Timeout));
+    assert!(verdict(&plug).starts_with("every byte came back"), "{}", verdict(&plug));
+    let total = Finding::Conclusion(
+        "192 bytes sent, 192 received: 0 wrong, 0 missing, 0 more than sent; 0.0 % faults".to_owned(),
+    );
+    assert_eq!((plug.done, plug.findings.contains(&total)), (6, true), "{:?}", plug.findings);
+}
+
+#[test]
 fn an_identification_in_pieces_is_asked_to_its_end() {
     let objects = ["ACME", "PM", "1.0", "http://acme.example"];
     let found = run(Diagnostic::Identify { unit: 1 }, |request| {

@@ -5,6 +5,8 @@ pub mod uart;
 pub mod ports;
 pub mod network;
 pub mod transport;
+pub mod tap;
+pub mod signals;
 pub mod pause;
 pub mod wire;
 pub mod link;

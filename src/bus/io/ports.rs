@@ -82,7 +82,7 @@ fn group_words(path: &str) -> String {
 }
 
 /// The program that has a port open, as far as we may see: `minicom (process 1234)`.
-fn holder(path: &str) -> Option<String> {
+pub(super) fn holder(path: &str) -> Option<String> {
     let port = fs::canonicalize(path).ok()?;
     let processes = fs::read_dir("/proc").ok()?.flatten();
     let own = std::process::id().to_string();

@@ -80,18 +80,7 @@ async fn open(transport: &Transport) -> Result<Opened, String> {
 }
 
 fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, String> {
-    use tokio_serial::{DataBits, FlowControl, StopBits};
-    let builder = tokio_serial::new(path, serial.baud)
-        .data_bits(if serial.data_bits == 7 { DataBits::Seven } else { DataBits::Eight })
-        .parity(match serial.parity {
-            Parity::None => tokio_serial::Parity::None,
-            Parity::Even => tokio_serial::Parity::Even,
-            Parity::Odd => tokio_serial::Parity::Odd,
-        })
-        .stop_bits(if serial.stop_bits == 2 { StopBits::Two } else { StopBits::One })
-        .flow_control(FlowControl::None);
-    // The port is taken exclusively: a second master on the line is refused by the system.
-    let stream: SerialStream = builder.open_native_async().map_err(|error| ports::why_not(path, &error))?;
+    let stream = serial_stream(path, serial)?;
     // A driver remembers what an earlier opening has switched on; one that never could needs no call.
     let switched = uart::set_rs485(&stream, rs485);
     if rs485 != Rs485::Off {
@@ -103,7 +92,28 @@ fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, Strin
     Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: count })
 }
 
+/// A serial port, taken exclusively: a second master on the line is refused by the system.
+pub(super) fn serial_stream(path: &str, serial: Serial) -> Result<SerialStream, String> {
+    use tokio_serial::{DataBits, FlowControl, StopBits};
+    let builder = tokio_serial::new(path, serial.baud)
+        .data_bits(if serial.data_bits == 7 { DataBits::Seven } else { DataBits::Eight })
+        .parity(match serial.parity {
+            Parity::None => tokio_serial::Parity::None,
+            Parity::Even => tokio_serial::Parity::Even,
+            Parity::Odd => tokio_serial::Parity::Odd,
+        })
+        .stop_bits(if serial.stop_bits == 2 { StopBits::Two } else { StopBits::One })
+        .flow_control(FlowControl::None);
+    builder.open_native_async().map_err(|error| ports::why_not(path, &error))
+}
+
 async fn open_tcp(host: &str, port: u16) -> Result<Opened, String> {
+    let stream = connect(host, port).await?;
+    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: None })
+}
+
+/// A TCP connection; the error is in words for an operator.
+pub(super) async fn connect(host: &str, port: u16) -> Result<TcpStream, String> {
     let connect = TcpStream::connect((host, port));
     let stream = match tokio::time::timeout(CONNECT_TIMEOUT, connect).await {
         Err(_) => return Err(format!("{host}:{port}: no connection within {} s", CONNECT_TIMEOUT.as_secs())),
@@ -115,7 +125,7 @@ async fn open_tcp(host: &str, port: u16) -> Result<Opened, String> {
     if let Err(error) = notice_silence(&stream) {
         tracing::debug!(%error, "no keepalive on {host}:{port}");
     }
-    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: None })
+    Ok(stream)
 }
 
 /// A peer that has vanished without a word is noticed within half a minute, and what was sent to it is taken back: left to

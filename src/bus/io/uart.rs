@@ -1,12 +1,12 @@
-//! What only the driver of a serial port knows or can do: its error counters, and the direction of RS-485.
+//! What only the driver of a serial port knows or can do: its error counters, its signals, and the direction of RS-485.
 //!
-//! The two kernel interfaces have no safe wrapper in any library we use; each is one call with a structure of its own.
+//! These kernel interfaces have no safe wrapper in any library we use; each is one call with one structure.
 #![allow(unsafe_code)]
 
 use std::{
     ffi::c_void,
     io,
-    os::fd::{AsRawFd, BorrowedFd, OwnedFd},
+    os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd},
 };
 
 use rustix::ioctl::{Ioctl, IoctlOutput, Opcode};
@@ -18,8 +18,11 @@ use crate::plant::{def::Rs485, event::UartCounters};
 /// Reads the error counters of a port whenever it is called; `None` for a port whose driver does not count (a
 /// pseudo-terminal, many USB adapters).
 pub fn counter(port: &SerialStream) -> Option<CountUart> {
-    // A second handle, so that the counters outlive no port: it is closed with this closure.
-    let handle: OwnedFd = borrowed(port).try_clone_to_owned().ok()?;
+    count(borrowed(port).try_clone_to_owned().ok()?)
+}
+
+/// The same for a second handle of a port, which is closed with the counter.
+pub(super) fn count(handle: OwnedFd) -> Option<CountUart> {
     // SAFETY: TIOCGICOUNT fills one `serial_icounter_struct`, which `Counts` is, field by field.
     let read = move || unsafe { rustix::ioctl::ioctl(&handle, ReadCounts(Counts::default())) }.ok();
     let first = read()?;
@@ -45,6 +48,24 @@ pub fn set_rs485(port: &SerialStream, mode: Rs485) -> io::Result<()> {
     let config = Rs485Config { flags, delays: [0; 2], padding: [0; 5] };
     // SAFETY: TIOCSRS485 reads and writes back one `serial_rs485`, which `Rs485Config` is, field by field.
     unsafe { rustix::ioctl::ioctl(borrowed(port), SetRs485(config)) }.map_err(io::Error::from)
+}
+
+/// The bits of the signals of a port; `None` where its driver has none.
+pub(super) fn signals(port: &SerialStream) -> Option<u32> {
+    // SAFETY: TIOCMGET fills one int.
+    unsafe { rustix::ioctl::ioctl(borrowed(port), rustix::ioctl::Getter::<0x5415, u32>::new()) }.ok()
+}
+
+/// Holds the data line low for a quarter of a second.
+pub(super) fn send_break(port: &SerialStream) -> io::Result<()> {
+    rustix::termios::tcsendbreak(borrowed(port)).map_err(io::Error::from)
+}
+
+/// Lowers RTS, where there is one.
+pub(super) fn lower_rts(port: &impl AsFd) {
+    const RTS: i32 = 4;
+    // SAFETY: TIOCMBIC reads one int, the signals to lower. A pseudo-terminal has none, and says so.
+    let _ = unsafe { rustix::ioctl::ioctl(port, rustix::ioctl::Setter::<0x5417, i32>::new(RTS)) };
 }
 
 fn borrowed(port: &SerialStream) -> BorrowedFd<'_> {

@@ -1,11 +1,13 @@
-//! `sightglass loopback`: does a unit send back what it is sent.
+//! `sightglass loopback`: does a unit, or a plug, send back what it is sent.
 
 use super::{UnitArgs, exchange_lines, run};
 use crate::{
+    bus::{diagnostics::PatternTally, frame::hex},
     cli::{CliError, say},
     plant::{
         diagnostics::{Diagnostic, Finding},
         event::Fault,
+        line::Framing,
     },
 };
 
@@ -17,10 +19,16 @@ pub struct Args {
     /// How often
     #[arg(long, short, default_value = "10", value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: u16,
+    /// Send patterns that a loopback plug returns (RX joined to TX), instead of asking a unit; at most 500
+    #[arg(long)]
+    plug: bool,
 }
 
 /// Diagnostics 08/00 with a number that counts up.
 pub fn main(args: Args) -> Result<(), CliError> {
+    if args.plug {
+        return plug(&args);
+    }
     let (line, unit) = args.of.line_and_unit()?;
     say(&format!("loopback 08/00 to unit {} on {}", unit, line.transport));
     let diagnostic = Diagnostic::Loopback { unit, data: 0xA537, count: args.count };
@@ -41,4 +49,32 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let lost = |finding: &&Finding| matches!(finding, Finding::Failed { fault, .. } if !refused(fault));
     let lost = run.findings.iter().filter(lost).count();
     if lost == 0 { Ok(()) } else { Err(CliError::Failed(format!("{lost} of {} did not come back", args.count))) }
+}
+
+/// Patterns, each compared with what comes back.
+fn plug(args: &Args) -> Result<(), CliError> {
+    let line = args.of.port.line()?;
+    if line.transport.framing() == Framing::Mbap {
+        return Err(CliError::Usage("--plug: Modbus TCP has no plug: this needs a serial line".into()));
+    }
+    let bits = line.transport.serial().map_or(8, |serial| serial.data_bits);
+    let diagnostic = Diagnostic::Pattern { bits, count: args.count };
+    diagnostic.check().map_err(CliError::Usage)?;
+    say(&format!("{diagnostic} on {}", line.transport));
+    let run = run(&line, diagnostic, |finding| match finding {
+        Finding::Bytes { bytes, .. } if args.of.verbose => vec![format!("RX {}", hex(bytes))],
+        Finding::Conclusion(words) => vec![words.clone()],
+        Finding::Exchange(_)
+        | Finding::Written(_)
+        | Finding::Swept(_)
+        | Finding::Failed { .. }
+        | Finding::Bytes { .. }
+        | Finding::Unit { .. }
+        | Finding::Object { .. }
+        | Finding::Values { .. } => Vec::new(),
+    })?;
+    match PatternTally::of_run(&run, bits).faults() {
+        0 => Ok(()),
+        faults => Err(CliError::Failed(format!("{faults} bytes did not come back as they were sent"))),
+    }
 }

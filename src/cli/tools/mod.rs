@@ -1,9 +1,11 @@
 //! Tools for a line without a plant: which port, which settings, and the output of findings.
 
+pub mod listen;
 pub mod loopback;
 mod network;
 pub mod probe;
 pub mod send;
+pub mod signals;
 pub mod scan;
 
 use std::{io::IsTerminal, path::Path, sync::Arc, time::Duration};

@@ -71,6 +71,8 @@ toml_tables! {
         opt "write_gap_ms" write_gap_ms: u16,
         /// The longest that the device itself takes for a response: part of the worst case of its polls.
         opt "response_time_ms" response_time_ms: u16,
+        /// Most devices on its line, as its manual says.
+        opt "units_max" units_max: u16,
     }
 
     /// A `[[tag]]` of a profile, or a `[[device.tag]]` of a plant file.

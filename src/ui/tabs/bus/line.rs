@@ -162,6 +162,10 @@ fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) ->
         ];
         rows.extend(flow(t!("port"), dim, width, kinds.map(|(name, times)| count(name, u64::from(times)))));
     }
+    if counters.echoes {
+        let words = t!("local echo: the adapter gives back what it sends (removed from answers)");
+        rows.extend(flow(t!("port"), dim, width, [plain(words, cx.theme.normal())]));
+    }
     rows
 }
 

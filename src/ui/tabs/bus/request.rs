@@ -25,7 +25,7 @@ use crate::{
     },
     plant::{
         def::{Framing, Parity, Serial},
-        diagnostics::{Diagnostic, Scan},
+        diagnostics::{Diagnostic, PATTERNS_MAX, Scan},
         number::{to_u8, to_u32, to_u64},
         tag::Table,
     },
@@ -86,6 +86,7 @@ impl Form {
                 [vec![unit, function], functions::fields(FUNCTIONS[0], &[])].concat()
             }
             Tried::Loopback => vec![unit, typed(t!("times"), "10", "1 – 1000")],
+            Tried::Plug => vec![typed(t!("patterns"), "60", "1 – 500")],
             Tried::Identify => vec![unit],
             Tried::Scan => {
                 let mut settings = vec![t!("current settings: {transport}", transport = at.settings.transport)];
@@ -209,6 +210,15 @@ impl Form {
                 let words = t!("sends a word to unit {unit} and expects it back, {count} times", unit, count);
                 (Diagnostic::Loopback { unit, data: 0xA537, count }, vec![words])
             }
+            Tried::Plug if framing == Framing::Mbap => {
+                return Err(t!("Modbus TCP has no plug: this needs a serial line").to_owned());
+            }
+            Tried::Plug => {
+                let count = to_u16(number(&self.text(0), t!("patterns"), 1..=i64::from(PATTERNS_MAX))?);
+                let bits = line.transport.serial().map_or(8, |serial| serial.data_bits);
+                let words = t!("sends {count} patterns of 32 bytes and compares what comes back", count);
+                (Diagnostic::Pattern { bits, count }, vec![words])
+            }
             Tried::Identify => {
                 let unit = unit(0)?;
                 let words = t!("reads vendor, product and version of unit {unit}, or else its server id", unit);
@@ -295,6 +305,7 @@ impl Form {
         match self.tried {
             Tried::Bytes | Tried::Request => t!("request by fields"),
             Tried::Loopback => t!("loopback"),
+            Tried::Plug => t!("loopback plug"),
             Tried::Identify => t!("identify a device"),
             Tried::Scan => t!("scan for units"),
             Tried::Sweep => t!("map of addresses"),

@@ -10,12 +10,14 @@ use super::{
 use crate::ui::{chrome::outcome_words, tabs::prelude::*};
 use crate::{
     bus::{
+        diagnostics::PatternTally,
         dissect::{self, Direction},
         meaning,
     },
     plant::{
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
         event::Fault,
+        number::to_u32,
         sweep::{SweptOutcome, SweptRange},
     },
 };
@@ -38,9 +40,15 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
             wrap(&dissection.summary, room - 3).into_iter().map(|line| plain(format!("   {line}"), theme.dim())),
         );
     }
-    for finding in &run.findings {
+    for (n, finding) in run.findings.iter().enumerate() {
         match finding {
-            Finding::Bytes { bytes, response_time: reply } => rows.extend(came_back(cx, at, run, bytes, *reply, room)),
+            Finding::Bytes { bytes, response_time: reply } => {
+                if let Diagnostic::Pattern { bits, .. } = run.diagnostic {
+                    rows.extend(pattern_row(cx, n, PatternTally::of(to_u32(n), bits, bytes)));
+                } else {
+                    rows.extend(came_back(cx, at, run, bytes, *reply, room));
+                }
+            }
             Finding::Exchange(exchange) if matches!(run.diagnostic, Diagnostic::Loopback { .. }) => {
                 let reply = exchange
                     .response_time
@@ -84,6 +92,12 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     rows
 }
 
+/// What became of a pattern, unless all of it came back.
+fn pattern_row(cx: &ViewContext, n: usize, tally: PatternTally) -> Option<Row> {
+    let words = || t!("✗ pattern {number}: {tally}", number = n + 1, tally);
+    (0 < tally.faults()).then(|| plain(words(), cx.theme.trouble()))
+}
+
 /// What, by whom, when, how it stands; and how far it has come.
 fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
     let theme = cx.theme;
@@ -97,6 +111,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
     let what = match &run.diagnostic {
         Diagnostic::Send(_) => t!("sent").to_owned(),
         diagnostic @ (Diagnostic::Loopback { .. }
+        | Diagnostic::Pattern { .. }
         | Diagnostic::Identify { .. }
         | Diagnostic::Read { .. }
         | Diagnostic::Write(_)
@@ -163,6 +178,7 @@ fn came_back(
     let asked = match &run.diagnostic {
         Diagnostic::Send(sent) => dissect::message_of(sent, framing),
         Diagnostic::Loopback { .. }
+        | Diagnostic::Pattern { .. }
         | Diagnostic::Identify { .. }
         | Diagnostic::Read { .. }
         | Diagnostic::Write(_)

@@ -38,6 +38,8 @@ pub enum Tried {
     Request,
     /// Diagnostics 08/00.
     Loopback,
+    /// Patterns that a plug returns.
+    Plug,
     /// Device identification.
     Identify,
     /// Which units answer.
@@ -47,7 +49,8 @@ pub enum Tried {
 }
 
 impl Tried {
-    const ALL: [Tried; 6] = [Tried::Bytes, Tried::Request, Tried::Loopback, Tried::Identify, Tried::Scan, Tried::Sweep];
+    const ALL: [Tried; 7] =
+        [Tried::Bytes, Tried::Request, Tried::Loopback, Tried::Plug, Tried::Identify, Tried::Scan, Tried::Sweep];
 
     /// Its key, its name and what it is for.
     fn words(self) -> [&'static str; 3] {
@@ -57,6 +60,7 @@ impl Tried {
                 ["f", t!("request by fields"), t!("unit, function, address (41003 or 0x03EA), count or value")]
             }
             Tried::Loopback => ["b", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
+            Tried::Plug => ["p", t!("loopback plug"), t!("bytes that a plug returns; wrong, missing, local echo")],
             Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
             Tried::Scan => ["s", t!("scan for units"), t!("units that respond, with these or all serial settings")],
             Tried::Sweep => ["m", t!("map of addresses"), t!("which of the addresses 0 to 65535 a unit answers at")],
@@ -95,13 +99,13 @@ impl Bench {
                 bare: self.bare,
                 problem: None,
             }),
-            Tried::Request | Tried::Loopback | Tried::Identify | Tried::Scan | Tried::Sweep => {
+            Tried::Request | Tried::Loopback | Tried::Plug | Tried::Identify | Tried::Scan | Tried::Sweep => {
                 let last = self.form.take_if(|form| form.is(at.id, tried));
                 Window::Form(last.unwrap_or_else(|| Form::new(cx, at, tried)))
             }
         };
         // What is sent as it was typed may be a write.
-        let diagnostic = match matches!(tried, Tried::Bytes | Tried::Request) {
+        let diagnostic = match matches!(tried, Tried::Bytes | Tried::Request | Tried::Plug) {
             true => Diagnostic::Send(Vec::new()),
             false => Diagnostic::Identify { unit: 1 },
         };
@@ -150,7 +154,13 @@ impl Bench {
 fn begin(at: &LineView) -> usize {
     match at.status.test.as_ref().map(|run| &run.diagnostic) {
         Some(Diagnostic::Loopback { .. } | Diagnostic::Scan(_) | Diagnostic::Sweep(_)) => usize::MAX,
-        Some(Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_))
+        Some(
+            Diagnostic::Send(_)
+            | Diagnostic::Pattern { .. }
+            | Diagnostic::Identify { .. }
+            | Diagnostic::Read { .. }
+            | Diagnostic::Write(_),
+        )
         | None => 0,
     }
 }
@@ -195,6 +205,10 @@ fn danger(cx: &ViewContext, at: &LineView, diagnostic: &Diagnostic) -> Option<St
         | Diagnostic::Loopback { .. }
         | Diagnostic::Identify { .. }
         | Diagnostic::Read { .. } => None,
+        Diagnostic::Pattern { .. } => Some(
+            t!("Sends bytes that are no Modbus, between the polls: units on the line may count errors. Start it?")
+                .to_owned(),
+        ),
         Diagnostic::Write(_) => {
             Some(t!("{diagnostic}. This bypasses all limits of the plant file. Write it?", diagnostic))
         }

@@ -1,0 +1,137 @@
+//! Opens a port or connection to listen: it is read, and nothing can be written to it.
+
+use std::{
+    fs::{self, OpenOptions},
+    io,
+    os::unix::fs::OpenOptionsExt,
+};
+
+use rustix::{
+    fs::{FlockOperation, OFlags, flock},
+    termios::{self, ControlModes, OptionalActions, QueueSelector},
+};
+use tokio::{io::AsyncRead, net::unix::pipe};
+
+use super::{
+    ports,
+    transport::{CountUart, connect},
+    uart,
+};
+use crate::plant::{
+    event::UartCounters,
+    line::{Parity, Serial, Transport},
+};
+
+/// The bytes of both sides of a line.
+pub struct Tap {
+    /// They are read here; there is no way to write.
+    pub bytes: Box<dyn AsyncRead + Send + Unpin>,
+    uart: Option<CountUart>,
+}
+
+impl Tap {
+    /// Opens a serial port for reading only, or a connection to what forwards the bytes of both sides; the error is in words
+    /// for an operator. `rts`: the signal stays as the system sets it when a port is opened.
+    pub async fn open(transport: &Transport, rts: bool) -> Result<Tap, String> {
+        match transport {
+            Transport::Serial { port, serial, .. } => open_serial(port, *serial, rts),
+            Transport::Tcp { host, port, .. } => Ok(Tap { bytes: Box::new(connect(host, *port).await?), uart: None }),
+        }
+    }
+
+    /// What the driver of a serial port has counted since then; `None` where it does not count.
+    pub fn uart(&self) -> Option<UartCounters> {
+        self.uart.as_ref().and_then(|uart| uart())
+    }
+}
+
+fn open_serial(path: &str, serial: Serial, rts: bool) -> Result<Tap, String> {
+    let in_use = |holder: Option<String>| {
+        let holder = holder.unwrap_or_else(|| "another program".to_owned());
+        format!(
+            "{path}: in use by {holder}: two programs at one port take each other's bytes; to listen needs a port of its own"
+        )
+    };
+    // A pseudo-terminal is held open by what joins it to another.
+    let is_joined = fs::canonicalize(path).is_ok_and(|path| path.starts_with("/dev/pts"));
+    if let Some(holder) = ports::holder(path).filter(|_| !is_joined) {
+        return Err(in_use(Some(holder)));
+    }
+    let failed = |error: io::Error| ports::why_not(path, &error.into());
+    let flags = (OFlags::NONBLOCK | OFlags::NOCTTY).bits().cast_signed();
+    let port = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
+    flock(&port, FlockOperation::NonBlockingLockExclusive).map_err(|_| in_use(ports::holder(path)))?;
+    if !rustix::termios::isatty(&port) {
+        return Err(format!("{path}: not a serial port"));
+    }
+    // Opening it has raised RTS, by which some adapters switch their driver on: it would hold the line.
+    if !rts {
+        uart::lower_rts(&port);
+    }
+    set(&port, serial).map_err(|error| failed(error.into()))?;
+    let uart = uart::count(port.try_clone().map_err(failed)?.into());
+    let bytes = pipe::Receiver::from_file_unchecked(port).map_err(failed)?;
+    Ok(Tap { bytes: Box::new(bytes), uart })
+}
+
+/// Raw bytes with these parameters; what came before is dropped, and no other program opens the port.
+fn set(port: &std::fs::File, serial: Serial) -> rustix::io::Result<()> {
+    termios::ioctl_tiocexcl(port)?;
+    let mut settings = termios::tcgetattr(port)?;
+    settings.make_raw();
+    settings.set_speed(serial.baud)?;
+    let modes = &mut settings.control_modes;
+    modes.remove(
+        ControlModes::CSIZE
+            | ControlModes::PARENB
+            | ControlModes::PARODD
+            | ControlModes::CSTOPB
+            | ControlModes::CRTSCTS,
+    );
+    modes.insert(ControlModes::CREAD | ControlModes::CLOCAL);
+    modes.insert(if serial.data_bits == 7 { ControlModes::CS7 } else { ControlModes::CS8 });
+    modes.insert(match serial.parity {
+        Parity::None => ControlModes::empty(),
+        Parity::Even => ControlModes::PARENB,
+        Parity::Odd => ControlModes::PARENB | ControlModes::PARODD,
+    });
+    modes.set(ControlModes::CSTOPB, serial.stop_bits == 2);
+    termios::tcsetattr(port, OptionalActions::Now, &settings)?;
+    termios::tcflush(port, QueueSelector::IFlush)
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    use tokio_serial::{SerialPort, SerialPortBuilderExt, SerialStream};
+
+    use super::*;
+
+    #[tokio::test]
+    async fn a_port_is_read_and_kept_for_itself() {
+        let (mut master, slave) = SerialStream::pair().expect("a pseudo-terminal is free");
+        let path = slave.name().expect("it has a name");
+        let transport = Transport::rtu(&path, Serial { baud: 14_400, parity: Parity::Even, ..Serial::USUAL });
+        drop(slave);
+        let mut tap = Tap::open(&transport, false).await.expect("the port opens");
+        let mut heard = [0; 6];
+        master.write_all(&[0x0A, 0x0D, 0x11, 0x13, 0x00, 0xFF]).await.expect("it takes bytes");
+        tap.bytes.read_exact(&mut heard).await.expect("they come");
+        assert_eq!(heard, [0x0A, 0x0D, 0x11, 0x13, 0x00, 0xFF], "nothing is translated");
+        assert_eq!(tap.uart(), None);
+        let second = Tap::open(&transport, false).await.err().unwrap_or_default();
+        assert!(second.contains("in use by this program"), "{second}");
+        assert!(tokio_serial::new(&path, 9_600).open_native_async().is_err());
+    }
+
+    #[tokio::test]
+    async fn what_cannot_be_listened_to_is_named() {
+        let folder = tempfile::tempdir().expect("a folder of its own");
+        let file = folder.path().join("file");
+        fs::write(&file, "text").expect("it can be written");
+        for (path, part) in [("/dev/no-such-port", "no such port ("), (&file.to_string_lossy(), "not a serial port")] {
+            let failed = Tap::open(&Transport::rtu(path, Serial::USUAL), false).await.err().unwrap_or_default();
+            assert!(failed.contains(part), "{path}: {failed}");
+        }
+    }
+}
