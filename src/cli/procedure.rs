@@ -6,7 +6,7 @@ use crate::{
         command::{CommandKind, Outcome},
         def::ProcedureId,
         number::to_u16,
-        procedure::ProcedureEnd,
+        procedure::{ProcedureEnd, ProcedureRun},
     },
     report::procedures,
 };
@@ -70,12 +70,12 @@ pub fn main(args: Args) -> Result<(), CliError> {
         for (line, _) in procedures::progress(&snapshot, id) {
             say(&format!("  {line}"));
         }
-        match run.and_then(|run| run.end()) {
-            Some(ProcedureEnd::Done) | None => Ok(()),
-            Some(ProcedureEnd::Failed(_) | ProcedureEnd::Aborted(_) | ProcedureEnd::Interrupted) if args.wait => {
-                Err(CliError::Failed(format!("{name} is not done")))
-            }
-            Some(_) => Ok(()),
+        // An abort is done once the safe state is written.
+        let is_done =
+            |run: &ProcedureRun| if args.abort { !run.is_fault() } else { run.end() == Some(&ProcedureEnd::Done) };
+        match args.wait && !run.is_some_and(is_done) {
+            true => Err(CliError::Failed(format!("{name} is not done"))),
+            false => Ok(()),
         }
     })
 }

@@ -129,7 +129,7 @@ pub struct Reference {
 pub struct ProcedureRun {
     /// Who started it.
     pub by: Arc<str>,
-    /// The place of that user.
+    /// The place of that user, or of the one who has aborted it.
     pub from: Arc<str>,
     /// When.
     pub started: Timestamp,
@@ -226,6 +226,23 @@ impl ProcedureRun {
             return None;
         }
         Some(self.safe.iter().all(|write| write.outcome.as_ref().is_some_and(Outcome::is_done)))
+    }
+
+    /// Who is responsible for what it does now: who has aborted it, else who has started it.
+    pub(super) fn actor(&self) -> &Arc<str> {
+        match self.end() {
+            Some(ProcedureEnd::Aborted(by)) => by,
+            Some(ProcedureEnd::Done | ProcedureEnd::Failed(_) | ProcedureEnd::Interrupted) | None => &self.by,
+        }
+    }
+
+    /// Did it end as it should not have? An abort that reached the safe state is no fault.
+    pub fn is_fault(&self) -> bool {
+        match self.end() {
+            None | Some(ProcedureEnd::Done) => false,
+            Some(ProcedureEnd::Failed(_) | ProcedureEnd::Interrupted) => true,
+            Some(ProcedureEnd::Aborted(_)) => self.is_safe() == Some(false),
+        }
     }
 
     pub(super) fn times(&mut self) -> [&mut Timestamp; 2] {

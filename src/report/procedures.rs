@@ -6,8 +6,9 @@ use super::control_runs::clock;
 use crate::{
     plant::{
         Snapshot,
+        command::Outcome,
         def::{ProcedureDef, ProcedureId, ProcedureStep, Reference, TagId},
-        procedure::{ProcedureEnd, ProcedureRun, ProcedureState},
+        procedure::{ProcedureEnd, ProcedureRun, ProcedureState, SafeWrite},
         time::elapsed,
     },
     t,
@@ -30,15 +31,6 @@ pub fn state(snapshot: &Snapshot, id: ProcedureId) -> String {
     }
 }
 
-/// Is it at work or ended as it should not have?
-pub fn is_trouble(run: &ProcedureRun) -> bool {
-    match run.end() {
-        None | Some(ProcedureEnd::Done) => false,
-        Some(ProcedureEnd::Failed(_) | ProcedureEnd::Interrupted) => true,
-        Some(ProcedureEnd::Aborted(_)) => run.is_safe() == Some(false),
-    }
-}
-
 /// How it stands, a sentence a line; what is trouble is marked.
 pub fn progress(snapshot: &Snapshot, id: ProcedureId) -> Vec<(String, bool)> {
     let (def, Some(run)) = (snapshot.def.procedure(id), run_of(snapshot, id)) else { return Vec::new() };
@@ -53,10 +45,10 @@ pub fn progress(snapshot: &Snapshot, id: ProcedureId) -> Vec<(String, bool)> {
         (Some(ProcedureEnd::Done) | None, _) => {}
         (Some(end), Some((place, words))) => {
             let words = words.unwrap_or_default();
-            lines.push((t!("{end}, at step {place} of {count}: {words}", end, place, count, words), is_trouble(run)));
+            lines.push((t!("{end}, at step {place} of {count}: {words}", end, place, count, words), run.is_fault()));
         }
         (Some(end), None) => {
-            lines.push((t!("{end}; what was written before is in the audit log", end), is_trouble(run)));
+            lines.push((t!("{end}; what was written before is in the audit log", end), run.is_fault()));
         }
     }
     lines.extend(safe_words(snapshot, def, run));
@@ -128,14 +120,12 @@ fn safe_words(snapshot: &Snapshot, def: &ProcedureDef, run: &ProcedureRun) -> Ve
         let words = t!("safe state not written: {writes}", writes = safe_state(snapshot, def).join(", "));
         return if interrupted { vec![(words, true)] } else { Vec::new() };
     }
-    let is_open = |write: &&crate::plant::procedure::SafeWrite| {
-        !write.outcome.as_ref().is_some_and(crate::plant::command::Outcome::is_done)
-    };
+    let is_open = |write: &&SafeWrite| !write.outcome.as_ref().is_some_and(Outcome::is_done);
     let open: Vec<_> = run.safe.iter().filter(is_open).collect();
     if open.is_empty() {
         return vec![(t!("safe state written: {writes}", writes = safe_state(snapshot, def).join(", ")), false)];
     }
-    let line = |write: &&crate::plant::procedure::SafeWrite| {
+    let line = |write: &&SafeWrite| {
         let words = write_words(snapshot, (write.tag, write.value));
         match &write.outcome {
             Some(outcome) => (t!("safe state: {words}: {outcome}", words, outcome), true),

@@ -16,6 +16,7 @@ use crate::plant::{
     number::to_u16,
     procedure::{self, Instruction, ProcedureEnd, ProcedureRun, View},
     record::{ActionRecord, Record},
+    station::{FaultState, StationFault},
 };
 
 impl Plant {
@@ -42,6 +43,10 @@ impl Plant {
         effects: &mut Effects,
     ) -> Outcome {
         let Some(run) = &self.procedures[id.index()] else { return Outcome::Unchanged };
+        if let Some(other) = self.procedure_at_work().filter(|place| *place != id.index()) {
+            let name = self.def.procedures[other].name.to_string();
+            return Outcome::Refused(Refusal::ProcedureAtWork(name));
+        }
         match run.end() {
             None | Some(ProcedureEnd::Interrupted) => {}
             Some(ProcedureEnd::Done | ProcedureEnd::Failed(_) | ProcedureEnd::Aborted(_)) => return Outcome::Unchanged,
@@ -49,6 +54,7 @@ impl Plant {
         let mut run = (**run).clone();
         let def = self.def.clone();
         let todo = run.stop(def.procedure(id), ProcedureEnd::Aborted(status.by.clone()), status.at);
+        run.from = status.from.clone();
         self.carry_out(id, &mut run, todo, status.at, effects);
         self.procedures[id.index()] = Some(Arc::new(run));
         Outcome::Verified
@@ -111,14 +117,13 @@ impl Plant {
             let run = ProcedureRun::interrupted(latest.by.clone(), latest.from.clone(), latest.at, self.at);
             *shown = Some(Arc::new(run));
         }
-        let ended = ActionRecord {
-            at: self.at,
-            action: procedure::END.into(),
-            outcome: format!("{}: the station stopped", procedure::INTERRUPTED).into(),
-            chain_hash: None,
-            ..latest.clone()
-        };
-        if is_started { vec![Record::Action(ended)] } else { Vec::new() }
+        if !is_started {
+            return Vec::new();
+        }
+        let outcome = format!("{}: the station stopped", procedure::INTERRUPTED);
+        self.faults.set(StationFault::Procedure, occurred(&latest.target, &outcome));
+        let (at, action, outcome) = (self.at, procedure::END.into(), outcome.into());
+        vec![Record::Action(ActionRecord { at, action, outcome, chain_hash: None, ..latest.clone() })]
     }
 
     /// Does what a procedure instructs, and what follows from that.
@@ -154,14 +159,11 @@ impl Plant {
                 }
                 Instruction::Record => {
                     let def = self.def.procedure(id);
-                    let by = match run.end() {
-                        Some(ProcedureEnd::Aborted(by)) => by,
-                        Some(ProcedureEnd::Done | ProcedureEnd::Failed(_) | ProcedureEnd::Interrupted) | None => {
-                            &run.by
-                        }
-                    };
                     let outcome = run.recorded(def.steps.len());
-                    let action = ActionRecord::new(at, by.clone(), procedure::END, def.name.clone(), outcome);
+                    if run.is_fault() {
+                        self.faults.set(StationFault::Procedure, occurred(&def.name, &outcome));
+                    }
+                    let action = ActionRecord::new(at, run.actor().clone(), procedure::END, def.name.clone(), outcome);
                     effects.records.push(Record::Action(action));
                 }
             }
@@ -184,7 +186,7 @@ impl Plant {
         let expected_value = self.image.sample(tag).value;
         let note = Some(format!("procedure {}", self.def.procedure(id).name).into());
         let request = Command { expected_value, note, ..Command::new(self.run, command, kind) };
-        let status = CommandStatus { from: run.from.clone(), ..CommandStatus::new(request, run.by.clone(), at) };
+        let status = CommandStatus { from: run.from.clone(), ..CommandStatus::new(request, run.actor().clone(), at) };
         effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
         command
     }
@@ -199,4 +201,9 @@ impl Plant {
     fn tracker_of(&self, controller: DeviceId) -> Option<usize> {
         self.def.runs.iter().position(|def| def.controller == controller)
     }
+}
+
+/// The procedure has failed: an alarm that waits for its acknowledgement.
+fn occurred(name: &str, outcome: &str) -> FaultState {
+    FaultState::Occurred(format!("{name}: {outcome}").into())
 }

@@ -6,7 +6,7 @@ use super::*;
 use crate::plant::{
     command::BusRequest,
     control_run::{DURATION_MAX, Figure, RunCause, RunDef},
-    def::{PlantDef, ProcedureDef, ProcedureStep},
+    def::{AlarmId, PlantDef, ProcedureDef, ProcedureStep},
     event::{Event, Fault, WriteResult},
     expr::{Compare, Expr},
     fixture::{self, DP, FAULT, PLC, PV, RUN, SV, TIC},
@@ -203,6 +203,30 @@ fn a_safe_state_that_is_not_reached_is_said() {
 }
 
 #[test]
+fn a_failure_is_an_alarm_with_the_reason() {
+    let mut def = def();
+    let id = AlarmId(to_u16(def.alarms.len()));
+    def.alarms.push(StationFault::Procedure.alarm(id));
+    let is_raised = |plant: &mut Plant| {
+        plant.on_tick(at(5));
+        plant.snapshot().alarms.iter().any(|alarm| alarm.id == id)
+    };
+    let mut plant = plant_of(def.clone());
+    let started = start(&mut plant);
+    let failed = end(&mut plant, &started, 2, |_| WriteResult::NotRead(Fault::Timeout));
+    end(&mut plant, &failed, 3, WriteResult::ReadBack);
+    assert!(is_raised(&mut plant));
+    let details = plant.snapshot().fault_details(id).to_owned();
+    assert!(details.starts_with("heat: failed: not confirmed") && details.ends_with("safe state written"), "{details}");
+    let mut plant = plant_of(def);
+    let started = start(&mut plant);
+    command(&mut plant, 2, CommandKind::AbortProcedure(HEAT), 2);
+    let over = end(&mut plant, &started, 3, WriteResult::ReadBack);
+    end(&mut plant, &over, 4, WriteResult::ReadBack);
+    assert!(!is_raised(&mut plant), "an abort that reached the safe state is none");
+}
+
+#[test]
 fn an_interlock_that_refuses_ends_it() {
     let mut def = def();
     let (tag, value, of, message) = (RUN, 1.0, PV, "too cold".to_owned());
@@ -252,6 +276,18 @@ fn an_abort_writes_the_safe_state_at_once() {
 }
 
 #[test]
+fn the_safe_state_is_written_by_who_aborts() {
+    let mut plant = plant();
+    waiting(&mut plant);
+    let abort = Command::new(1, CommandId { terminal: 2, number: 1 }, CommandKind::AbortProcedure(HEAT));
+    let status = CommandStatus { from: "pts/9".into(), ..CommandStatus::new(abort, "bob", at(9)) };
+    let aborted = plant.on_command(status, at(9));
+    let (_, request) = &aborted.bus[0];
+    let requested = plant.write_requested_record(request).expect("a write");
+    assert_eq!((&*requested.by, &*requested.from), ("bob", "pts/9"));
+}
+
+#[test]
 fn an_abort_waits_only_for_a_write_to_the_same_tag() {
     let mut plant = plant();
     let started = start(&mut plant);
@@ -275,6 +311,10 @@ fn one_procedure_at_a_time() {
     let second = command(&mut plant, 2, CommandKind::StartProcedure(OTHER), 2);
     assert_eq!(actions(&second), ["anna start procedure other refused: procedure heat is running"]);
     assert_eq!(plant.snapshot().procedure_at_work().map(|(id, _)| id), Some(HEAT));
+    // Nor is the safe state of another one written meanwhile.
+    plant.restore_procedures(Some(&ActionRecord::new(at(-50), "anna", procedure::START, "other", "verified")));
+    let aborted = command(&mut plant, 3, CommandKind::AbortProcedure(OTHER), 3);
+    assert_eq!(actions(&aborted), ["anna abort procedure other refused: procedure heat is running"]);
 }
 
 #[test]

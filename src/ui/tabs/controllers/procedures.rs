@@ -9,7 +9,7 @@ use crate::{
     plant::{
         control_run::{ControlRun, RunCause},
         def::ProcedureDef,
-        procedure::ProcedureEnd,
+        procedure::{ProcedureEnd, ProcedureRun},
     },
     report::{control_runs, procedures},
 };
@@ -165,7 +165,7 @@ impl Procedures {
         let reference = def.reference.as_ref().map(|reference| procedures::reference(reference, decimals));
         let [at_sv_ref, steady_ref, over_ref] = reference.unwrap_or_default();
         let cells = [mark, &def.name, &state, &at_sv, &at_sv_ref, &steady, &steady_ref, &over, &over_ref];
-        (draw::columns(WIDTHS, cells), run.is_some_and(procedures::is_trouble))
+        (draw::columns(WIDTHS, cells), run.is_some_and(ProcedureRun::is_fault))
     }
 
     /// The selected one in words.
