@@ -107,6 +107,7 @@
 //! | epoch | counts the steps of the clock, so that records of a doubled time can be distinguished |
 //! | batch, phase | what the plant makes between two conditions of its file; a value of its phase tag |
 //! | control run | what a control loop did after a change of its setpoint, a program step or the start of a batch |
+//! | procedure, safe state | steps of the plant file that the station carries out on request; what it writes when one fails or is aborted |
 //! | total | what an expression adds up to: an integral, hours, starts |
 //! | aggregate | mean, least and greatest of a period, from samples that hold until the next |
 //! | tier, archive, manifest | samples, minutes or hours; the files of closed hours; the table that names these |

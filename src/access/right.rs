@@ -58,6 +58,8 @@ pub fn of_command(kind: &CommandKind) -> Right {
         | CommandKind::SaveSet { .. }
         | CommandKind::Restore(_)
         | CommandKind::StopRestore(_)
+        | CommandKind::StartProcedure(_)
+        | CommandKind::AbortProcedure(_)
         | CommandKind::HandOver
         | CommandKind::TakeOver => Right::Operate,
         CommandKind::Alarm(AlarmCommand::OutOfService(_) | AlarmCommand::InService(_))
@@ -84,7 +86,7 @@ fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
 
 /// The least role that may give a command: what it writes may need more than its right.
 pub fn needs(def: &PlantDef, kind: &CommandKind) -> Role {
-    let written = kind.writes().map(|(tag, value)| interlock::role_to_write(def, tag, value));
+    let written = kind.writes(def).map(|(tag, value)| interlock::role_to_write(def, tag, value));
     of_command(kind).role().max(written.max().unwrap_or(Role::Viewer))
 }
 

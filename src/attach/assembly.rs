@@ -42,7 +42,8 @@ impl Assembly {
         let fits = by_tag == [def.tags.len(); 4]
             && by_device == [def.devices.len(); 3]
             && snapshot.lines.len() == def.lines.len()
-            && snapshot.runs.len() == def.runs.len();
+            && snapshot.runs.len() == def.runs.len()
+            && snapshot.procedures.len() == def.procedures.len();
         if !fits {
             return Err(OtherPlant);
         }

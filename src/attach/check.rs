@@ -57,6 +57,9 @@ pub fn command(def: &PlantDef, kind: &CommandKind) -> Result<(), String> {
             line(def, settings.id)
         }
         CommandKind::Restore(request) => of_restore(def, request),
+        CommandKind::StartProcedure(id) | CommandKind::AbortProcedure(id) => {
+            known("procedure", id.0, def.procedures.len())
+        }
     }
 }
 

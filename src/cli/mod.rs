@@ -3,6 +3,7 @@
 mod act;
 mod attach;
 mod batches;
+mod procedure;
 mod runs;
 mod audit;
 mod alarms;
@@ -137,6 +138,8 @@ enum Command {
     Batches(batches::Args),
     /// List the control runs of a period: when SV was reached, overshoot, offset, rise, energy
     Runs(runs::Args),
+    /// List the procedures of the running station; start one, abort one, wait for its end
+    Procedure(procedure::Args),
     /// Decode a Modbus frame: every field, its checksum, and what is wrong with it
     Decode(decode::Args),
     /// Scan a line for units: addresses, baud rates, parities
@@ -298,6 +301,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Alarms(args)) => alarms::main(args),
         Some(Command::Batches(args)) => batches::main(args),
         Some(Command::Runs(args)) => runs::main(args),
+        Some(Command::Procedure(args)) => procedure::main(args),
         Some(Command::Decode(args)) => decode::main(args),
         Some(Command::Scan(args)) => tools::scan::main(args),
         Some(Command::Probe(args)) => tools::probe::main(args),

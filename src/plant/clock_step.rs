@@ -118,6 +118,9 @@ impl Snapshot {
             tuning.times().for_each(|at| move_by(at, by));
         });
         self.runs.iter_mut().flatten().for_each(|run| Arc::make_mut(run).move_by(by));
+        self.procedures.iter_mut().flatten().for_each(|run| {
+            Arc::make_mut(run).times().into_iter().for_each(|at| move_by(at, by));
+        });
     }
 }
 

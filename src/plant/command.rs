@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 pub use super::id::WriteId;
 use super::{
     alarm::{AlarmCommand, AlarmRefusal},
-    def::{DeviceId, LineDef, LineId, TagId},
+    def::{DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::Diagnostic,
     event::{ExceptionCode, Fault},
+    procedure::ProcedureDef,
     restore::RestoreRequest,
     snapshot::Snapshot,
 };
@@ -99,6 +100,10 @@ pub enum CommandKind {
     Restore(Box<RestoreRequest>),
     /// Stop the restore of a device after the write under way.
     StopRestore(DeviceId),
+    /// Carry out a procedure of the plant file.
+    StartProcedure(ProcedureId),
+    /// End the procedure at work, or one that was interrupted, with the writes of its safe state.
+    AbortProcedure(ProcedureId),
     /// Hand the plant over to the next shift; the note of the command is for that shift.
     HandOver,
     /// Take the plant over from the shift before.
@@ -114,13 +119,19 @@ impl CommandKind {
         }
     }
 
-    /// Each tag with the value that it gets: of a write one, of a restore all its changes.
-    pub fn writes(&self) -> impl Iterator<Item = (TagId, f64)> {
+    /// Each tag with the value that it gets: of a write one, of a restore all its changes, of a procedure those of all steps
+    /// and of its safe state.
+    pub fn writes<'a>(&'a self, def: &'a PlantDef) -> impl Iterator<Item = (TagId, f64)> + 'a {
         let changes = match self {
             CommandKind::Restore(request) => &request.changes[..],
             _ => &[],
         };
-        self.written().into_iter().chain(changes.iter().map(|change| (change.tag, change.new)))
+        let procedure = match self {
+            CommandKind::StartProcedure(id) => def.procedures.get(id.index()),
+            _ => None,
+        };
+        let changes = changes.iter().map(|change| (change.tag, change.new));
+        self.written().into_iter().chain(changes).chain(procedure.into_iter().flat_map(ProcedureDef::writes))
     }
 }
 
@@ -176,6 +187,11 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// Does the device certainly hold the value?
+    pub fn is_done(&self) -> bool {
+        matches!(self, Outcome::Verified | Outcome::Unchanged)
+    }
+
     /// The outcome without its reason, the same on screen, in the history and in CSV.
     pub fn label(&self) -> &'static str {
         match self {
@@ -286,6 +302,12 @@ pub enum Refusal {
     /// No line has this name and place.
     #[error("{}", t!("no such line"))]
     NotALine,
+    /// One procedure at a time; this one is at work.
+    #[error("{}", t!("procedure {what} is running", what = .0))]
+    ProcedureAtWork(String),
+    /// No control run can be recorded yet, and the procedure measures one.
+    #[error("{}", t!("the history is not open: nothing can be measured"))]
+    NotMeasurable,
     /// Settings or a test that a line cannot have.
     #[error("{0}")]
     NotValid(String),

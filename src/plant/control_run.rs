@@ -80,6 +80,8 @@ keyword_enum! {
         Program => "program step",
         /// The start of a batch.
         Batch => "batch",
+        /// A procedure that measures.
+        Procedure => "procedure",
     }
 }
 
@@ -91,7 +93,7 @@ keyword_enum! {
         Running => "running",
         /// The next one began, or its time was over.
         Ended => "ended",
-        /// The station stopped: its figures are as they were last stored.
+        /// The station stopped, or the procedure that measured it: its figures are as they were last stored.
         Interrupted => "interrupted",
     }
 }
@@ -131,7 +133,7 @@ pub struct ControlRun {
     pub state: RunState,
     /// What began it.
     pub cause: RunCause,
-    /// `step 2`, `hot-water-17`; empty for a setpoint.
+    /// `step 2`, `hot-water-17`, the name of the procedure; empty for a setpoint.
     pub detail: Arc<str>,
     /// Its begin was seen: else it began earlier.
     pub seen: bool,

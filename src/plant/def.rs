@@ -12,10 +12,11 @@ pub use super::{
     batch::BatchDef,
     control_run::RunDef,
     history_def::{HistoryDef, ParquetVersion},
-    id::{AlarmId, DeviceId, LineId, TagId},
+    id::{AlarmId, DeviceId, LineId, ProcedureId, TagId},
     line::{Framing, LineDef, Serial, Transport},
     mimic_def::{MimicDef, MimicPage, Picture},
     north_def::{MqttDef, NorthDef, PasswordSource, TlsRoots},
+    procedure::{ProcedureDef, ProcedureStep, Reference},
     report_def::{CsvDialect, Paper, ReportDef, Section},
     role::{Reauthentication, Role},
 };
@@ -60,6 +61,8 @@ pub struct PlantDef {
     pub batches: Vec<BatchDef>,
     /// The control runs of each controller.
     pub runs: Vec<RunDef>,
+    /// What the station can carry out on request, by [`ProcedureId`].
+    pub procedures: Vec<ProcedureDef>,
     /// Shifts in order of their start; may be empty (then only free periods are reported).
     pub shifts: Vec<ShiftDef>,
     /// What reports contain and where they go.
@@ -92,6 +95,7 @@ impl Default for PlantDef {
             trends: Vec::new(),
             batches: Vec::new(),
             runs: Vec::new(),
+            procedures: Vec::new(),
             shifts: Vec::new(),
             report: ReportDef::default(),
             history: HistoryDef::default(),
@@ -123,6 +127,10 @@ impl PlantDef {
     /// The alarm of an id.
     pub fn alarm(&self, id: AlarmId) -> &AlarmDef {
         &self.alarms[id.index()]
+    }
+    /// The procedure of an id.
+    pub fn procedure(&self, id: ProcedureId) -> &ProcedureDef {
+        &self.procedures[id.index()]
     }
     /// Looks a tag up by its full name, `TIC-1.PV`.
     pub fn tag_named(&self, name: &str) -> Option<TagId> {

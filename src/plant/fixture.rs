@@ -99,6 +99,7 @@ pub fn plant() -> PlantDef {
         trends: Vec::new(),
         batches: Vec::new(),
         runs: Vec::new(),
+        procedures: Vec::new(),
         shifts: Vec::new(),
         history: Default::default(),
         north: Default::default(),

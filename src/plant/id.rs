@@ -33,6 +33,11 @@ id!(
     AlarmId
 );
 
+id!(
+    /// A procedure in [`super::PlantDef::procedures`].
+    ProcedureId
+);
+
 /// Identifies a write on its way through the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct WriteId(pub u64);

@@ -44,6 +44,7 @@ pub mod command;
 pub(crate) mod energy;
 pub mod batch;
 pub mod control_run;
+pub mod procedure;
 pub mod report;
 pub mod record;
 pub(crate) mod interlock;

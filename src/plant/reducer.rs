@@ -4,6 +4,7 @@ mod alarms;
 mod batches;
 mod connection;
 mod health;
+mod procedures;
 mod alarm_metrics;
 mod restore;
 mod service;
@@ -27,6 +28,7 @@ use super::{
     line_minute::LineMinuteTracker,
     north_def::NorthStatus,
     parameter_set::StoredSet,
+    procedure::ProcedureRun,
     process_image::ProcessImage,
     process_load::ProcessLoad,
     program::ProgramWatch,
@@ -98,8 +100,10 @@ pub struct Plant {
     sets: Arc<Vec<StoredSet>>,
     /// The latest restore of each device that had one.
     restores: Vec<Arc<Restore>>,
-    /// Number of the last command that a restore sent.
-    last_restore_number: u32,
+    /// Each procedure at work or as it ended last, by [`super::id::ProcedureId`].
+    procedures: Vec<Option<Arc<ProcedureRun>>>,
+    /// Number of the last command that a restore or a procedure sent.
+    last_number: u32,
     /// Auto-tuning and program, by device.
     tunings: Vec<TuningTracker>,
     programs: Vec<ProgramWatch>,
@@ -128,7 +132,8 @@ impl Plant {
             faults: StationFaults::default(),
             sets: Arc::default(),
             restores: Vec::new(),
-            last_restore_number: 0,
+            procedures: vec![None; def.procedures.len()],
+            last_number: 0,
             tunings: vec![TuningTracker::default(); def.devices.len()],
             programs: vec![ProgramWatch::default(); def.devices.len()],
             north: None,
@@ -196,7 +201,7 @@ impl Plant {
         };
         let mut effects = self.evaluate(at);
         effects.records.extend(action.map(Record::Action));
-        self.advance_restores(at, &mut effects);
+        self.advance_work(at, &mut effects);
         self.count_alarms(&effects.records);
         effects
     }
@@ -243,6 +248,8 @@ impl Plant {
             | CommandKind::SaveSet { .. }
             | CommandKind::Restore(_)
             | CommandKind::StopRestore(_) => self.set_command(&status, &mut effects),
+            CommandKind::StartProcedure(id) => Some(self.start_procedure(id, &status).into()),
+            CommandKind::AbortProcedure(id) => Some(self.abort_procedure(id, &status, &mut effects)),
             CommandKind::HandOver | CommandKind::TakeOver => {
                 Some(check_note(status.command.note.as_ref()).map_err(Refusal::Alarm).into())
             }
@@ -260,8 +267,8 @@ impl Plant {
     }
 
     fn after_command(&mut self, mut effects: Effects, at: Timestamp) -> Effects {
-        self.advance_restores(at, &mut effects);
         self.at = self.at.max(at);
+        self.advance_work(at, &mut effects);
         self.count_alarms(&effects.records);
         effects
     }
@@ -279,6 +286,7 @@ impl Plant {
     /// The station stops: ends all pending commands and the runs at work.
     pub fn on_stop(&mut self) -> Effects {
         let mut effects = Effects::of_actions(self.commands.stop(&self.image, self.at));
+        self.stop_procedures(&mut effects);
         effects.records.extend(self.stop_runs());
         effects
     }
@@ -290,7 +298,7 @@ impl Plant {
             false => self.commands.undeliverable(line, request, &self.image, self.at),
         };
         let mut effects = Effects::of_actions(action);
-        self.advance_restores(self.at, &mut effects);
+        self.advance_work(self.at, &mut effects);
         effects
     }
 
@@ -303,7 +311,7 @@ impl Plant {
         let mut effects = self.evaluate(at);
         effects.records.extend(minutes);
         effects.records.extend(expired.into_iter().map(Record::Action));
-        self.advance_restores(at, &mut effects);
+        self.advance_work(at, &mut effects);
         self.count_alarms(&effects.records);
         effects
     }
@@ -340,6 +348,7 @@ impl Plant {
             tunings: self.tunings.iter().map(|tracker| tracker.tuning.clone()).collect(),
             programs: self.programs.iter().map(ProgramWatch::elapsed).collect(),
             runs: self.runs.iter().map(RunTracker::shown).collect(),
+            procedures: self.procedures.clone(),
             north: self.north.clone(),
             load: self.load,
             speed: self.speed,

@@ -132,7 +132,7 @@ impl Restore {
 
     /// Number of writes that are done.
     pub fn done(&self) -> usize {
-        self.steps.iter().filter(|step| step.outcome.as_ref().is_some_and(is_done)).count()
+        self.steps.iter().filter(|step| step.outcome.as_ref().is_some_and(Outcome::is_done)).count()
     }
 
     /// The write under way.
@@ -145,7 +145,7 @@ impl Restore {
         let Some(step) = self.steps.iter_mut().find(|step| step.command.is_some() && step.outcome.is_none()) else {
             return;
         };
-        if !is_done(&outcome) {
+        if !outcome.is_done() {
             self.state = State::Failed;
         }
         step.outcome = Some(outcome);
@@ -168,7 +168,7 @@ impl Restore {
     /// The outcome of the restore, once it has ended.
     pub fn outcome(&self, def: &PlantDef) -> Option<Outcome> {
         let (done, all) = (self.done(), self.steps.len());
-        let failed = self.steps.iter().find(|step| step.outcome.as_ref().is_some_and(|outcome| !is_done(outcome)));
+        let failed = self.steps.iter().find(|step| step.outcome.as_ref().is_some_and(|outcome| !outcome.is_done()));
         match self.state {
             State::Reading | State::Running => None,
             State::Done => Some(Outcome::Verified),
@@ -187,9 +187,4 @@ impl Restore {
             }
         }
     }
-}
-
-/// The device holds the value.
-fn is_done(outcome: &Outcome) -> bool {
-    matches!(outcome, Outcome::Verified | Outcome::Unchanged)
 }

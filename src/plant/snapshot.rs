@@ -14,7 +14,7 @@ use super::{
     },
     command::{CommandKind, CommandStatus},
     control_run::ControlRun,
-    def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, TagId},
+    def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::DiagnosticRun,
     event::{Fault, LineCounters, LineState},
     interlock::ActuatorTracker,
@@ -23,6 +23,7 @@ use super::{
     north_def::NorthStatus,
     number::to_u32,
     parameter_set::StoredSet,
+    procedure::ProcedureRun,
     process_load::ProcessLoad,
     record::{ChainHash, FirstOut},
     restore::Restore,
@@ -87,6 +88,8 @@ pub struct Snapshot {
     pub programs: Vec<Option<(Duration, bool)>>,
     /// The control run at work, or the last one, by place in [`PlantDef::runs`]; `None` before the first.
     pub runs: Vec<Option<Arc<ControlRun>>>,
+    /// Each procedure as it stands or as it ended last, by [`ProcedureId`]; `None` before its first start.
+    pub procedures: Vec<Option<Arc<ProcedureRun>>>,
     /// How far the data out has come; `None` for a plant that sends nothing.
     pub north: Option<Arc<NorthStatus>>,
     /// What the program takes of its computer; `None` until it is known.
@@ -122,6 +125,7 @@ impl Snapshot {
             tunings: vec![None; devices],
             programs: vec![None; devices],
             runs: vec![None; def.runs.len()],
+            procedures: vec![None; def.procedures.len()],
             north: None,
             load: None,
             speed: 1.0,
@@ -203,6 +207,11 @@ impl Snapshot {
     pub fn control_run(&self, id: DeviceId) -> Option<&ControlRun> {
         let place = self.def.runs.iter().position(|def| def.controller == id)?;
         self.runs.get(place)?.as_deref()
+    }
+    /// The procedure at work, and how it stands.
+    pub fn procedure_at_work(&self) -> Option<(ProcedureId, &ProcedureRun)> {
+        let mut runs = (0..).map(ProcedureId).zip(&self.procedures);
+        runs.find_map(|(id, run)| run.as_deref().filter(|run| run.at_work()).map(|run| (id, run)))
     }
     /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
     pub fn acknowledge_all(&self) -> Option<CommandKind> {

@@ -43,6 +43,8 @@ keyword_enum! {
         Reports => "automatic report fault",
         /// What is stored has not reached the broker for too long, or the broker refuses it.
         DataOut => "data out delayed",
+        /// A procedure has failed, or the station stopped meanwhile.
+        Procedure => "procedure failed",
     }
 }
 
@@ -146,6 +148,11 @@ impl StationFault {
                 "the broker or the network is down, it refuses the station, or the history does not record",
                 "the receivers of the values see old ones; nothing is lost, the history has all of them",
                 "read the details; check network, broker, user and password; what is missing is sent automatically",
+            ],
+            StationFault::Procedure => [
+                "a write was refused or not verified, a condition was not true in time, or the station stopped meanwhile",
+                "the procedure has ended; the plant is in its safe state only where the details say so",
+                "read the details and the page of the procedures (tab Controllers, e); write by hand what is missing",
             ],
         }
     }

@@ -18,6 +18,7 @@ mod address;
 mod alarm;
 mod automatic_report;
 mod batch;
+mod procedure;
 mod run;
 mod calculated;
 mod condition;

@@ -12,7 +12,7 @@ use super::{
     diagnostic::{Errors, Problems},
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
-    north, program, reader,
+    north, procedure, program, reader,
     reader::{At, OptionalKey, text},
     report, run,
     schema::{DeviceTable, PlantFile, ProfileFile},
@@ -80,6 +80,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let trends = mimic::trends(&file.trends, &defs, problems);
     let batches = batch::batches(&file.batches, &defs, problems);
     let runs = run::runs(&file.runs, &batches, &defs, problems);
+    let procedures = procedure::procedures(&file.procedures, &runs, &defs, problems);
     let shifts = report::shifts(&file.shifts, problems);
     let rules = Rules { shifts: !shifts.is_empty(), is_program: library.is_program };
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, &rules, problems);
@@ -100,6 +101,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         trends,
         batches,
         runs,
+        procedures,
         shifts,
         report,
         history,

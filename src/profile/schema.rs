@@ -37,6 +37,7 @@ toml_tables! {
         list "trend" trends: TrendTable,
         list "batch" batches: BatchTable,
         list "run" runs: RunTable,
+        list "procedure" procedures: ProcedureTable,
         list "shift" shifts: ShiftTable,
         opt "report" report: ReportTable,
         opt "history" history: HistoryTable,
@@ -199,6 +200,41 @@ toml_tables! {
         opt "energy" energy: String,
         list "batches" batches: String,
         list "tags" tags: String,
+    }
+
+    /// A `[[procedure]]`.
+    ProcedureTable, "a procedure" {
+        need "name" name: String,
+        opt "about" about: String,
+        list "steps" steps: ProcedureStepTable,
+        list "safe" safe: SafeWriteTable,
+        opt "reference" reference: ReferenceTable,
+    }
+
+    /// One of its steps: exactly one of `write`, `wait_until`, `hold`, `begin_measurement`, `end_measurement`, `steps_of`.
+    ProcedureStepTable, "a step of a procedure" {
+        opt "write" write: String,
+        opt "value" value: Choice,
+        opt "wait_until" wait_until: String,
+        opt "limit" limit: Duration,
+        opt "hold" hold: Duration,
+        opt "begin_measurement" begin_measurement: String,
+        opt "end_measurement" end_measurement: String,
+        opt "steps_of" steps_of: String,
+    }
+
+    /// A write of its safe state.
+    SafeWriteTable, "a write of the safe state" {
+        need "write" write: String,
+        need "value" value: Choice,
+    }
+
+    /// What its measurement is compared with.
+    ReferenceTable, "a reference" {
+        need "source" source: String,
+        opt "at_sv" at_sv: Duration,
+        opt "steady" steady: Duration,
+        opt "overshoot" overshoot: f64,
     }
 
     /// A `[[shift]]`.

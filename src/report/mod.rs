@@ -7,6 +7,7 @@ pub mod step_series;
 pub(crate) mod figures;
 pub mod batch;
 pub mod control_runs;
+pub mod procedures;
 pub(crate) mod alarm_metrics;
 pub mod curve;
 pub(crate) mod chart;

@@ -96,6 +96,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
         trends: Vec::new(),
         batches: Vec::new(),
         runs: Vec::new(),
+        procedures: Vec::new(),
         shifts: shifts
             .iter()
             .map(|&(name, hour, minute)| ShiftDef { name: name.into(), start: time(hour, minute, 0, 0) })

@@ -140,6 +140,10 @@ pub fn measure(recording: &[Recorded]) -> Milestones {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        plant::def::{ProcedureStep, Reference},
+        profile,
+    };
 
     fn of((second, pv_c): (u32, f64)) -> Recorded {
         Recorded { second, pv_c, mv_percent: 0.0 }
@@ -164,6 +168,31 @@ mod tests {
         assert_eq!(measure(&late), Milestones { first_at_sv_s: Some(10), steady_from_s: None, overshoot_c: 0 });
         // What jumps over SV was not at it.
         check(&[27.0, 71.0, 70.0], Some(2), Some(2), 1);
+    }
+
+    /// The shipped plant has them as procedures: with the same settings, beside the same figures of the thesis.
+    #[test]
+    fn the_procedures_of_the_shipped_plant_are_these() {
+        let def = profile::load(std::path::Path::new("tank"), &profile::Search::shipped()).expect("a shipped plant");
+        let seconds = |time: Option<Duration>| time.map(|time| to_u32(time.as_secs()));
+        for Experiment { control, thesis } in THESIS {
+            let procedure = def.procedures.iter().find(|procedure| *procedure.name == *control.name);
+            let procedure = procedure.expect(control.name);
+            let written = |name: &str| {
+                procedure.steps.iter().rev().find_map(|step| match step {
+                    ProcedureStep::Write { tag, value } if def.tag(*tag).name == name => Some(*value),
+                    _ => None,
+                })
+            };
+            let set = ["TIC-1.P", "TIC-1.I", "TIC-1.D", "TIC-1.CTRL", "TIC-1.SV"].map(written);
+            let fuzzy = f64::from(u8::from(control.fuzzy));
+            let expected = [control.p_percent, control.i_s, control.d_s, fuzzy, f64::from(SV_C)];
+            assert_eq!(set, expected.map(Some), "{}", control.name);
+            let Reference { at_sv, steady, overshoot, .. } = procedure.reference.as_ref().expect(control.name);
+            let figures = (seconds(*at_sv), seconds(*steady), *overshoot);
+            let overshoot = Some(f64::from(thesis.overshoot_c));
+            assert_eq!(figures, (thesis.first_at_sv_s, thesis.steady_from_s, overshoot), "{}", control.name);
+        }
     }
 
     /// Why fuzzy and auto-tuned tie here: both heat fully until PV is within 1.5 °C of SV, so that their settings have no time

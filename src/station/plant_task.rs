@@ -232,14 +232,15 @@ impl PlantTask {
     /// Restores alarm states and metrics from the history.
     fn restore_history(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
-        let Restored { events, recent, chain_hashes, batches, mut runs, totals, off } = past.join(restored);
+        let Restored { events, recent, chain_hashes, batches, mut runs, procedure, totals, off } = past.join(restored);
         let behind = self.clock.behind_utc();
         let off = off.map(|off| off.checked_sub(behind).unwrap_or(off));
         runs.iter_mut().for_each(|run| run.move_from_utc(behind));
         self.plant.restore_totals(&totals);
         let resumed = self.plant.restore_batches(&batches, off);
         self.dispatch(resumed);
-        let interrupted = self.plant.restore_runs(&runs);
+        let mut interrupted = self.plant.restore_runs(&runs);
+        interrupted.extend(self.plant.restore_procedures(procedure.as_ref()));
         self.dispatch(interrupted);
         if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {
             audit.compare(chain_hashes);

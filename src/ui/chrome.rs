@@ -268,6 +268,8 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> 
             )
         }
         CommandKind::StopRestore(device) => t!("stop restore of {name}", name = cx.def().device(*device).name),
+        CommandKind::StartProcedure(id) => t!("start procedure {name}", name = cx.def().procedure(*id).name),
+        CommandKind::AbortProcedure(id) => t!("abort procedure {name}", name = cx.def().procedure(*id).name),
         CommandKind::HandOver => t!("hand over").to_owned(),
         CommandKind::TakeOver => t!("take over").to_owned(),
     }

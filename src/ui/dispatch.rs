@@ -148,6 +148,7 @@ fn go(model: &mut Model, target: Target) -> Vec<UiAction> {
         Target::Tab(_)
         | Target::Overview
         | Target::Device(_)
+        | Target::Procedure(_)
         | Target::Tag(_)
         | Target::Trend(_)
         | Target::Alarm(_) => {

@@ -3,6 +3,7 @@
 use jiff::Timestamp;
 
 use super::*;
+use crate::plant::def::ProcedureId;
 use preferences::{Bookmark, Kept};
 
 /// Bookmarks of one user; the oldest make room for new ones.
@@ -22,6 +23,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 model.tabs.controllers.show(device);
                 effects.extend(show(model, Tab::Controllers));
             }
+            UiAction::ShowProcedure(id) => effects.extend(show_procedure(model, id)),
             UiAction::ShowParameter(tag) => {
                 with_tabs(model, |tabs, cx| {
                     tabs.controllers.show_parameter(cx, tag);
@@ -113,4 +115,9 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     model.tabs.shown = tab;
     let asked = with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx));
     perform(model, asked)
+}
+
+fn show_procedure(model: &mut Model, id: ProcedureId) -> Vec<Effect> {
+    model.tabs.controllers.show_procedure(id);
+    show(model, Tab::Controllers)
 }

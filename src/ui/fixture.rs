@@ -17,6 +17,7 @@ use crate::plant::{
     def::*,
     event::{Fault, LineCounters, LineState},
     parameter_set::StoredSet,
+    procedure::ProcedureRun,
     process_load::ProcessLoad,
     restore::Restore,
     sample::{Cause, Sample},
@@ -61,6 +62,8 @@ pub struct Fixture {
     pub tunings: Vec<Option<Tuning>>,
     /// Control runs, by place in [`PlantDef::runs`].
     pub runs: Vec<Option<Arc<ControlRun>>>,
+    /// Procedures, by place in [`PlantDef::procedures`].
+    pub procedures: Vec<Option<Arc<ProcedureRun>>>,
     /// How long every program has been where it is.
     pub into: Option<(Duration, bool)>,
 }
@@ -93,6 +96,7 @@ impl Fixture {
             restores: Vec::new(),
             tunings: vec![None; def.devices.len()],
             runs: vec![None; def.runs.len()],
+            procedures: vec![None; def.procedures.len()],
             into: None,
             def,
             samples,
@@ -193,6 +197,7 @@ impl Fixture {
             tunings: self.tunings.iter().cloned().map(|tuning| tuning.map(Arc::new)).collect(),
             programs: vec![self.into; self.def.devices.len()],
             runs: self.runs.clone(),
+            procedures: self.procedures.clone(),
             history: HistoryStatus { rows: 5_000, committed_at: Some(now()), ..HistoryStatus::default() },
             station: Arc::new(self.station.clone()),
             north: None,

@@ -17,7 +17,7 @@ use crate::{
     history::{Answer, HistoryError, Query},
     plant::{
         command::{Command, CommandId, CommandKind},
-        def::{DeviceId, TagId},
+        def::{DeviceId, ProcedureId, TagId},
         snapshot::Snapshot,
     },
     text::Locale,
@@ -138,7 +138,9 @@ pub enum UiAction {
     ShowOverview,
     /// Show a device on the controllers tab.
     ShowDevice(DeviceId),
-    /// The same with one of its parameters selected.
+    /// Show a procedure there.
+    ShowProcedure(ProcedureId),
+    /// Show a device with one of its parameters selected.
     ShowParameter(TagId),
     /// Show the first of these tags that the mimic has there.
     ShowOnMimic(Vec<TagId>),
@@ -216,6 +218,7 @@ impl UiAction {
             UiAction::Show(_)
             | UiAction::ShowOverview
             | UiAction::ShowDevice(_)
+            | UiAction::ShowProcedure(_)
             | UiAction::ShowParameter(_)
             | UiAction::ShowOnMimic(_)
             | UiAction::ShowOnTrends(..)

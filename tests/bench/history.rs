@@ -50,6 +50,7 @@ fn tag(id: u16) -> TagDef {
 fn tank() -> Arc<PlantDef> {
     Arc::new(PlantDef {
         runs: Vec::new(),
+        procedures: Vec::new(),
         access: Default::default(),
         name: "tank".into(),
         title: "Water tank".into(),

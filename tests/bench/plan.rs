@@ -64,6 +64,7 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
     let tags = (0..tags).map(tag).collect();
     PlantDef {
         runs: Vec::new(),
+        procedures: Vec::new(),
         access: Default::default(),
         name: "scattered".into(),
         title: String::new(),

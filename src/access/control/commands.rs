@@ -10,7 +10,7 @@ use super::{
 use crate::{
     access::Credentials,
     plant::{
-        command::{self, Command, CommandId, CommandStatus, Refusal},
+        command::{self, Command, CommandId, CommandKind, CommandStatus, Refusal},
         interlock,
     },
 };
@@ -31,7 +31,8 @@ impl AccessControl {
         command.id.terminal = terminal;
         command.note = command.note.map(|note| clean(&note).into());
         // A stop is never one command too many.
-        let stops = command.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
+        let stops = matches!(command.kind, CommandKind::AbortProcedure(_))
+            || command.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
         if !self.within_rate(terminal, at) && !stops {
             return self.undelivered(command.id, TOO_MANY);
         }

@@ -120,5 +120,5 @@ pub fn required(def: &PlantDef, kind: &CommandKind) -> Option<Reauthentication> 
         (!interlock::is_stop(def, tag, value)).then_some(kind)
     };
     // The strictest of all.
-    kind.writes().filter_map(|(tag, value)| asks(tag, value)).max()
+    kind.writes(def).filter_map(|(tag, value)| asks(tag, value)).max()
 }

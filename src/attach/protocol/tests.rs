@@ -9,7 +9,7 @@ use crate::{
     attach::check,
     plant::{
         command::CommandKind,
-        def::{AlarmId, DeviceId, LineDef, LineId, TagId},
+        def::{AlarmId, DeviceId, LineDef, LineId, ProcedureId, TagId},
         diagnostics::Diagnostic,
         role::Role,
     },
@@ -141,6 +141,7 @@ fn what_this_plant_does_not_have_never_reaches_it() {
         CommandKind::StopTest(LineId(far)),
         CommandKind::SaveSet { device: DeviceId(far), name: "x".into(), replace: false },
         CommandKind::StopRestore(DeviceId(far)),
+        CommandKind::StartProcedure(ProcedureId(far)),
     ];
     for kind in commands {
         let why = check::command(&def, &kind).unwrap_err();

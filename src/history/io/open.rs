@@ -10,6 +10,7 @@ use super::{
     compact,
     files::{self, Failure, Opening, SetAside},
     last::{self, LastCommit, Noted},
+    read::action,
     restore, sql,
     store::{Store, after, engine},
 };
@@ -23,7 +24,7 @@ use crate::{
         control_run::ControlRun,
         def::{PlantDef, TagId},
         number::to_u32,
-        record::{AlarmRecord, ChainHash},
+        record::{ActionRecord, AlarmRecord, ChainHash},
     },
     profile::io::atomic::with_suffix,
 };
@@ -51,6 +52,8 @@ pub struct Restored {
     pub batches: Vec<BatchRecord>,
     /// The latest control run of each controller.
     pub runs: Vec<ControlRun>,
+    /// The last start or end of a procedure.
+    pub procedure: Option<ActionRecord>,
     /// The last values of the tags that are totals.
     pub totals: Vec<(TagId, f64)>,
     /// When the station before this one ended.
@@ -79,7 +82,8 @@ impl Store {
             let (batches, runs) = (store.latest_batches()?, store.latest_runs()?);
             let off = store.extent().map(|(_, last)| last);
             let totals = store.last_totals()?;
-            Ok(Restored { events, recent, chain_hashes, batches, runs, totals, off })
+            let procedure = store.list(&sql::latest_procedure(), &[], action)?.pop();
+            Ok(Restored { events, recent, chain_hashes, batches, runs, procedure, totals, off })
         })
     }
 

@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use crate::{
     history::tiers::Tier,
-    plant::{def::ParquetVersion, record::NOT_PROCESS_ACTIONS},
+    plant::{command::Outcome, def::ParquetVersion, procedure, record::NOT_PROCESS_ACTIONS},
 };
 
 pub use migrations::MIGRATIONS;
@@ -166,6 +166,17 @@ pub fn audit() -> String {
             AND contains(lower(by_whom), lower($4)) AND contains(lower(action), lower($5)) AND contains(lower(concat_ws(' ', by_whom, from_where, action, target, old_value, new_value, outcome, note)),
                 lower($6))
          ORDER BY utc DESC, rowid DESC LIMIT $3"
+    )
+}
+
+/// The last start or end of a procedure; a refused start is none.
+pub fn latest_procedure() -> String {
+    format!(
+        "SELECT {ACTION} FROM operator_action WHERE (action = '{}' AND outcome = '{}') OR action = '{}'
+         ORDER BY rowid DESC LIMIT 1",
+        procedure::START,
+        Outcome::Verified.label(),
+        procedure::END
     )
 }
 

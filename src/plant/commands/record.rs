@@ -4,6 +4,7 @@ use crate::plant::{
     alarm::{AlarmCommand, manager::subject_name},
     command::{CommandKind, CommandStatus},
     def::{AlarmId, PlantDef},
+    procedure,
     process_image::ProcessImage,
     record::ActionRecord,
     tag::TagDef,
@@ -37,6 +38,8 @@ pub(super) fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImag
             ("restore set", def.device(request.device).name.clone(), Some(new))
         }
         CommandKind::StopRestore(device) => ("stop restore", def.device(*device).name.clone(), None),
+        CommandKind::StartProcedure(id) => (procedure::START, def.procedure(*id).name.to_string(), None),
+        CommandKind::AbortProcedure(id) => (procedure::ABORT, def.procedure(*id).name.to_string(), None),
         CommandKind::HandOver => (HAND_OVER, def.name.clone(), None),
         CommandKind::TakeOver => (TAKE_OVER, def.name.clone(), None),
     };

@@ -47,6 +47,8 @@ pub struct RunTracker {
     known: bool,
     /// A batch that started while the target was not known.
     started: Option<String>,
+    /// The name of the measurement that begins as soon as the target is known.
+    measurement: Option<Arc<str>>,
     open: Option<Open>,
     /// The last run that ended.
     ended: Option<Arc<ControlRun>>,
@@ -83,6 +85,24 @@ impl RunTracker {
     /// The station stops: what must be stored of the run at work.
     pub fn stop(&mut self, at: Timestamp) -> Option<ControlRun> {
         self.close(at, RunState::Interrupted)
+    }
+
+    /// Begins a run for a procedure with the next update; `false` where none can be recorded yet.
+    pub fn begin_measurement(&mut self, label: &Arc<str>) -> bool {
+        self.measurement = Some(label.clone()).filter(|_| self.is_ready());
+        self.is_ready()
+    }
+
+    /// Can runs be recorded?
+    pub fn is_ready(&self) -> bool {
+        self.last_number.is_some()
+    }
+
+    /// Ends the run of a procedure; `None` where there is none that is long enough to be kept.
+    pub fn end_measurement(&mut self, at: Timestamp, state: RunState) -> Option<ControlRun> {
+        self.measurement = None;
+        let is_measured = self.open.as_ref().is_some_and(|open| open.run.cause == RunCause::Procedure);
+        if is_measured { self.close(at, state) } else { None }
     }
 
     /// What must be stored of the runs as they stand now.
@@ -124,12 +144,15 @@ impl RunTracker {
 
     /// Cause, detail and setpoint of the run that begins now, if one does.
     fn beginning(
-        &self,
+        &mut self,
         target: Option<f64>,
         step: Option<usize>,
         batch: Option<&str>,
     ) -> Option<(RunCause, String, f64)> {
         let sv = target?;
+        if let Some(label) = self.measurement.take() {
+            return Some((RunCause::Procedure, label.to_string(), sv));
+        }
         let changed = self.target.is_some_and(|before| before != sv);
         match (step, batch, changed) {
             (Some(step), ..) => Some((RunCause::Program, format!("step {}", step + 1), sv)),

@@ -18,8 +18,8 @@ use crate::plant::{
     time::elapsed,
 };
 
-/// The terminal number of the writes of a restore; terminals count from 1.
-const PLANT: u32 = 0;
+/// The terminal number of the writes of restores and procedures; terminals count from 1.
+pub(super) const PLANT: u32 = 0;
 
 /// Work with the folder of parameter sets. The station reads the folder after each.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,6 +74,8 @@ impl Plant {
             | CommandKind::SaveSettings(_)
             | CommandKind::Test(..)
             | CommandKind::StopTest(_)
+            | CommandKind::StartProcedure(_)
+            | CommandKind::AbortProcedure(_)
             | CommandKind::HandOver
             | CommandKind::TakeOver => None,
         }
@@ -177,7 +179,7 @@ impl Plant {
                     ))),
                 }
             }
-            let (by, line_changed, number) = (run.by.clone(), run.line_changed, &mut self.last_restore_number);
+            let (by, line_changed, number) = (run.by.clone(), run.line_changed, &mut self.last_number);
             let Some(step) = run.begin_next() else { break };
             *number = number.wrapping_add(1);
             let id = CommandId { terminal: PLANT, number: *number };

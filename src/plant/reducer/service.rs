@@ -44,6 +44,8 @@ impl Plant {
             | CommandKind::SaveSet { .. }
             | CommandKind::Restore(_)
             | CommandKind::StopRestore(_)
+            | CommandKind::StartProcedure(_)
+            | CommandKind::AbortProcedure(_)
             | CommandKind::HandOver
             | CommandKind::TakeOver => {}
         }

@@ -1,4 +1,6 @@
-//! Batches and control runs of a plant file.
+//! Batches, control runs and procedures of a plant file.
+
+mod procedures;
 
 use std::time::Duration;
 

@@ -166,6 +166,8 @@ impl Confirm {
             ConfirmAction::Command(CommandKind::Test(_, Diagnostic::Write(_))) => t!("write and verify"),
             ConfirmAction::Command(CommandKind::Test(..)) => t!("send"),
             ConfirmAction::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => t!("stop"),
+            ConfirmAction::Command(CommandKind::StartProcedure(_)) => t!("start"),
+            ConfirmAction::Command(CommandKind::AbortProcedure(_)) => t!("abort"),
             ConfirmAction::Command(CommandKind::ReadSets) => t!("read"),
             ConfirmAction::Command(CommandKind::HandOver) => t!("hand over"),
             ConfirmAction::Command(CommandKind::TakeOver) => t!("take over"),

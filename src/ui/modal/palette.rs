@@ -12,7 +12,10 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Faceplate, Guidance, Modal, Next, line::Line, window};
 use crate::{
-    plant::def::{AlarmId, DeviceId, TagId},
+    plant::{
+        def::{AlarmId, DeviceId, ProcedureId, TagId},
+        number::to_u16,
+    },
     t,
     text::{searchable, translate},
     ui::{
@@ -47,6 +50,8 @@ pub enum Target {
     Overview,
     /// A device, on the controllers tab.
     Device(DeviceId),
+    /// A procedure, on the controllers tab.
+    Procedure(ProcedureId),
     /// The faceplate of a tag.
     Tag(TagId),
     /// The curve of a tag.
@@ -65,7 +70,7 @@ impl Target {
     fn rank(self) -> u8 {
         match self {
             Target::Instant(_) | Target::Tab(_) | Target::Overview => 0,
-            Target::Device(_) => 1,
+            Target::Device(_) | Target::Procedure(_) => 1,
             Target::Tag(_) => 2,
             Target::Trend(_) => 3,
             Target::Alarm(_) => 4,
@@ -278,6 +283,11 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     let trends = stored.map(|tag| Row::new(Target::Trend(tag.id), t!("trend"), &tag.name, &tag.label));
     let overview = Row::new(Target::Overview, t!("page"), t!("overview"), t!("all devices at a glance"));
     let overview = Some(overview).filter(|_| !def.is_bench());
+    let procedures = def.procedures.iter().enumerate().filter(|_| !cx.is_past());
+    let procedures = procedures.map(|(place, def)| {
+        Row::new(Target::Procedure(ProcedureId(to_u16(place))), t!("procedure"), &def.name, &def.about)
+    });
+    let devices = devices.chain(procedures);
     tabs.chain(overview).chain(active).chain(devices).chain(tags).chain(trends).chain(keys).chain(others).collect()
 }
 
@@ -287,6 +297,7 @@ pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
         Target::Tab(tab) => vec![UiAction::Show(tab)],
         Target::Overview => vec![UiAction::ShowOverview],
         Target::Device(device) => vec![UiAction::ShowDevice(device)],
+        Target::Procedure(id) => vec![UiAction::ShowProcedure(id)],
         Target::Tag(tag) => {
             let faceplate = Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]);
             faceplate.map(|faceplate| UiAction::Open(Modal::Faceplate(faceplate))).into_iter().collect()

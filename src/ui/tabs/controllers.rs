@@ -11,6 +11,7 @@ mod lamps;
 pub(super) mod list;
 mod faceplate;
 pub(super) mod program;
+mod procedures;
 mod runs;
 mod sets;
 mod table;
@@ -25,7 +26,8 @@ pub use keys::Action;
 use self::{
     actions::{notice, write},
     compare::Compare,
-    keys::{needing, page_keys},
+    keys::page_keys,
+    procedures::Procedures,
     program::Cell,
     runs::Runs,
     sets::Source,
@@ -35,10 +37,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::parameter_set,
-    ui::{
-        keys::{find, hide, hints},
-        layout::Size,
-    },
+    ui::{keys::find, layout::Size},
 };
 
 /// The small trend is asked for again after this time.
@@ -63,8 +62,10 @@ pub enum Page {
     Compare(Compare),
     /// Its control runs.
     Runs,
-    /// Some of them over each other.
-    Overlay,
+    /// The procedures of the plant.
+    Procedures,
+    /// Some runs over each other, and the page to go back to.
+    Overlay(Box<Page>),
     /// Words to read, and the page to go back to.
     Guide(usize, Box<Page>),
 }
@@ -87,6 +88,7 @@ pub struct Controllers {
     /// The devices as faceplates or as a table; `None` as there is room.
     wall: Option<bool>,
     runs: Runs,
+    procedures: Procedures,
     /// The selected row of the sets.
     set: usize,
     asked_for: Asked,
@@ -104,7 +106,8 @@ impl TabView for Controllers {
             Page::Device => self.table.tag(cx, device.id).map(|tag| tag.id),
             Page::List => device.faceplate.as_ref().map(|faceplate| faceplate.pv),
             Page::Program => device.program.as_ref().and_then(|program| self.cell.tag(program)),
-            Page::Lamps | Page::Sets | Page::Compare(..) | Page::Runs | Page::Overlay | Page::Guide(..) => None,
+            Page::Lamps | Page::Sets | Page::Compare(..) | Page::Runs | Page::Guide(..) => None,
+            Page::Procedures | Page::Overlay(_) => None,
         });
         tag.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
@@ -147,6 +150,11 @@ impl TabView for Controllers {
                 (self.page, self.runs) = (Page::Runs, Runs::default());
             }
             Action::Runs => return notice(device, t!("this device has no SV and PV")),
+            Action::Procedures if cx.is_past() || cx.def().procedures.is_empty() => {
+                return notice(device, procedures::why_none(cx));
+            }
+            Action::Procedures => self.page = Page::Procedures,
+            Action::Abort => return self.procedures.abort(cx),
             Action::Trend => return self.runs.trend(cx, device.id).into_iter().collect(),
             Action::Mark => self.runs.mark(),
             Action::Overlay => self.swap_overlay(cx, device.id),
@@ -180,40 +188,7 @@ impl TabView for Controllers {
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let mut keys = page_keys(&self.page);
-        let device = cx.def().devices.get(self.device.index());
-        if let Some(device) = device {
-            let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
-            let copies = matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. }));
-            let lacking = [
-                (Action::Tune, faceplate.is_none_or(|faceplate| faceplate.tune.is_none())),
-                (Action::Run, faceplate.is_none_or(|faceplate| faceplate.run.is_none())),
-                (Action::Lamps, !lamps::has_any(cx, device)),
-                (Action::Program, program.is_none()),
-                (Action::Runs, !cx.snapshot.has_runs(device.id)),
-                (Action::Actions, device.actions.is_empty()),
-                (Action::Defaults, cx.def().tags_of(device.id).all(|tag| tag.default.is_none())),
-                (Action::Control(keys::ProgramCommand::Hold), program.is_none_or(|program| program.halt.is_none())),
-                (Action::Stop, cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work())),
-                (Action::SwapDirection, !copies),
-            ];
-            hide(&mut keys, &lacking);
-            keys = needing(keys, |action| self.role_for(cx, device, action));
-        }
-        let mut hints = hints(&keys);
-        // On the page of a device there is no room left for a key that every operator tries anyway; in the past there is.
-        let leads_back = match self.page {
-            Page::List => false,
-            Page::Device => cx.is_past() && 1 < cx.def().devices.len(),
-            Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
-            Page::Lamps | Page::Runs | Page::Overlay => true,
-        };
-        if leads_back {
-            let enter = keys.iter().position(|key| key.chord == code(KeyCode::Enter));
-            let place = enter.map_or(keys.len(), |enter| enter + 1);
-            hints.insert(place, Hint::new("Esc", t!("back"), t!("previous page")));
-        }
-        hints
+        self.page_hints(cx)
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
@@ -230,9 +205,11 @@ impl TabView for Controllers {
                 Page::List
             }
             Page::Lamps | Page::Program | Page::Sets | Page::Runs => Page::Device,
-            Page::Overlay => {
+            Page::Procedures if alone => Page::Device,
+            Page::Procedures => Page::List,
+            Page::Overlay(before) => {
                 self.runs.overlay = None;
-                Page::Runs
+                *before
             }
             Page::Compare(_) => Page::Sets,
             Page::Guide(_, before) => *before,
@@ -250,24 +227,27 @@ impl TabView for Controllers {
                 Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
             }
             (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_), _)
-            | (Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..), _) => Rows::default(),
+            | (Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay(_) | Page::Guide(..), _) => Rows::default(),
         }
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        if cx.is_past() && matches!(self.page, Page::Sets | Page::Compare(_)) {
+        if cx.is_past() && matches!(self.page, Page::Sets | Page::Compare(_) | Page::Procedures) {
             self.page = Page::Device;
         }
         let device = cx.def().devices.get(self.device.index());
-        if let (Page::Runs | Page::Overlay, Some(device)) = (&self.page, device) {
+        if let (Page::Runs | Page::Overlay(_), Some(device)) = (&self.page, device) {
             return self.runs.ask(cx, device, &mut self.asked);
+        }
+        if self.page == Page::Procedures {
+            return self.procedures.ask(cx, &mut self.asked);
         }
         let faceplate = device.and_then(|device| device.faceplate.as_ref());
         let tags = match &self.page {
             Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
             Page::List if self.is_wall(cx) => wall::tags(cx, self.device.index()),
             Page::List | Page::Program | Page::Sets | Page::Compare(_) => Vec::new(),
-            Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..) => Vec::new(),
+            Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay(_) | Page::Guide(..) => Vec::new(),
         };
         if tags.is_empty() {
             return Vec::new();
@@ -283,12 +263,13 @@ impl TabView for Controllers {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.trend.query.awaits(number) || self.runs.awaits(number)
+        self.trend.query.awaits(number) || self.runs.awaits(number) || self.procedures.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.trend.on_answer(cx, number, &answer);
         self.runs.on_answer(cx, number, &answer);
+        self.procedures.on_answer(cx, number, &answer);
         Vec::new()
     }
 
@@ -317,7 +298,7 @@ impl TabView for Controllers {
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        if let (Page::Overlay, Some(overlay)) = (&self.page, &self.runs.overlay) {
+        if let (Page::Overlay(_), Some(overlay)) = (&self.page, &self.runs.overlay) {
             return overlay.view(cx, frame, area);
         }
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
@@ -336,7 +317,8 @@ impl TabView for Controllers {
                 let trend = self.trend.value.as_ref().and_then(|series| series.first());
                 device::view(cx, &mut canvas, device, &self.table, trend)
             }
-            (Page::Runs | Page::Overlay, _) => self.runs.view(cx, &mut canvas, device),
+            (Page::Procedures, _) => self.procedures.view(cx, &mut canvas),
+            (Page::Runs | Page::Overlay(_), _) => self.runs.view(cx, &mut canvas, device),
             (Page::Sets, _) => sets::view(cx, &mut canvas, device, self.set),
             (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
             (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
@@ -347,7 +329,7 @@ impl TabView for Controllers {
     fn chords() -> crate::ui::keys::PageChords {
         let compare = Page::Compare(Compare::new(Source::Set(String::new())));
         let guide = Page::Guide(0, Box::new(Page::List));
-        let runs = [Page::Runs, Page::Overlay];
+        let runs = [Page::Runs, Page::Procedures, Page::Overlay(Box::new(Page::Runs))];
         let pages = [Page::List, Page::Device, Page::Lamps, Page::Program, Page::Sets, compare, guide];
         let pages = pages.into_iter().chain(runs);
         pages.map(|page| ("controllers", crate::ui::keys::chords_of(&page_keys(&page)))).collect()
@@ -357,8 +339,21 @@ impl TabView for Controllers {
 impl Controllers {
     fn on_page(page: Page, device: DeviceId, table: Table) -> Controllers {
         let (cell, asked_for, trend) = (Cell::default(), Asked::Filter, Answered::default());
-        let (runs, curves) = (Runs::default(), Vec::new());
-        Controllers { page, device, table, cell, wall: None, runs, set: 0, asked_for, trend, curves, asked: 0 }
+        let (runs, procedures, curves) = (Runs::default(), Procedures::default(), Vec::new());
+        Controllers {
+            page,
+            device,
+            table,
+            cell,
+            wall: None,
+            runs,
+            procedures,
+            set: 0,
+            asked_for,
+            trend,
+            curves,
+            asked: 0,
+        }
     }
 
     /// Are the devices shown as faceplates? So they are on a wide screen, unless the operator wants the table.
@@ -383,6 +378,12 @@ impl Controllers {
     pub fn show(&mut self, device: DeviceId) {
         let table = Table { defaults: self.table.defaults, ..Table::default() };
         *self = Controllers { asked: self.asked, wall: self.wall, ..Controllers::on_page(Page::Device, device, table) };
+    }
+
+    /// Shows a procedure.
+    pub fn show_procedure(&mut self, id: ProcedureId) {
+        self.page = Page::Procedures;
+        self.procedures.select(id);
     }
 
     /// Shows the device of a tag with the tag selected.

@@ -20,7 +20,7 @@ pub(super) use crate::{
     history::{Answer, HistoryError, Query},
     plant::{
         command::CommandKind,
-        def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
+        def::{DeviceDef, DeviceId, LineDef, LineId, ProcedureId, TagId},
         number::to_u16,
         role::Role,
         snapshot::{DeviceState, Snapshot},

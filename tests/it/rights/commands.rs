@@ -7,7 +7,7 @@ use sightglass::plant::{
     PlantDef,
     alarm::AlarmCommand,
     command::CommandKind,
-    def::{AlarmId, DeviceId, LineId, Serial},
+    def::{AlarmId, DeviceId, LineId, ProcedureId, Serial},
     diagnostics::{Diagnostic, Scan},
     parameter_set::ParameterSet,
     restore::RestoreRequest,
@@ -55,6 +55,9 @@ pub fn of_command(def: &PlantDef, kind: &CommandKind) -> Row {
         CommandKind::SaveSet { .. } => row("save set", "--TS--"),
         CommandKind::Restore(_) => row("restore set", "--TS--"),
         CommandKind::StopRestore(_) => row("stop restore", "--TS--"),
+        // The shipped ones tune the controller, which is for a Supervisor.
+        CommandKind::StartProcedure(_) => row("start procedure", "---S--"),
+        CommandKind::AbortProcedure(_) => row("abort procedure", "--TS--"),
         CommandKind::HandOver => row("hand over", "--TS--"),
         CommandKind::TakeOver => row("take over", "--TS--"),
     }
@@ -107,6 +110,8 @@ pub fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
         CommandKind::SaveSet { device, name: format!("of {person}").into(), replace: false },
         CommandKind::Restore(Box::new(RestoreRequest { device, from, set: Arc::new(set), changes })),
         CommandKind::StopRestore(device),
+        CommandKind::StartProcedure(ProcedureId(0)),
+        CommandKind::AbortProcedure(ProcedureId(0)),
         CommandKind::Connect(line, false),
         CommandKind::Connect(line, true),
         CommandKind::Configure(Box::new(def.lines[0].clone())),

@@ -15,6 +15,7 @@ mod flips;
 mod import;
 mod alarm_metrics;
 mod pieces;
+mod procedures;
 mod reading;
 mod runs;
 mod steps;

@@ -1,10 +1,18 @@
 //! What can be done with a device on any of its pages, and the windows that ask before it.
 
-use super::{Action, Controllers, Page, keys::ProgramCommand};
+use super::{
+    Action, Controllers, Page,
+    compare::Compare,
+    keys::{self, ProgramCommand, needing, page_keys},
+    lamps,
+    sets::Source,
+};
 use crate::ui::tabs::prelude::*;
 use crate::{
+    access::right,
     plant::interlock::role_to_write,
     ui::{
+        keys::{hide, hints},
         modal::{Choice, Settings},
         rights,
         tabs::line_switch,
@@ -57,6 +65,8 @@ impl Controllers {
             | Action::Turn(_)
             | Action::Save
             | Action::Runs
+            | Action::Procedures
+            | Action::Abort
             | Action::Trend
             | Action::Mark
             | Action::Overlay
@@ -76,6 +86,10 @@ impl Controllers {
                 self.table.tag(cx, device.id).filter(|tag| tag.writable()).map(|tag| tag.id)
             }
             (Action::Open, Page::Program) => program.and_then(|program| self.cell.tag(program)),
+            (Action::Open, Page::Procedures) => {
+                let id = self.procedures.id(cx)?;
+                return Some(right::needs(cx.def(), &CommandKind::StartProcedure(id)));
+            }
             (Action::Open, Page::Compare(compare)) => return compare.role_to_restore(cx, device),
             (Action::Tune, _) => faceplate.and_then(|faceplate| faceplate.tune),
             (Action::Run, _) => faceplate.and_then(|faceplate| faceplate.run),
@@ -89,6 +103,48 @@ impl Controllers {
             _ => None,
         };
         written.map(|tag| rights::to_write(cx, [tag]))
+    }
+}
+
+impl Controllers {
+    /// The keys of the page, without those that this device or this moment has no use for.
+    pub(super) fn page_hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        let mut keys = page_keys(&self.page);
+        let device = cx.def().devices.get(self.device.index());
+        if let Some(device) = device {
+            let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
+            let copies = matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. }));
+            let lacking = [
+                (Action::Tune, faceplate.is_none_or(|faceplate| faceplate.tune.is_none())),
+                (Action::Run, faceplate.is_none_or(|faceplate| faceplate.run.is_none())),
+                (Action::Lamps, !lamps::has_any(cx, device)),
+                (Action::Program, program.is_none()),
+                (Action::Runs, !cx.snapshot.has_runs(device.id)),
+                (Action::Procedures, cx.def().procedures.is_empty() || cx.is_past()),
+                (Action::Abort, self.procedures.to_abort(cx).is_none()),
+                (Action::Actions, device.actions.is_empty()),
+                (Action::Defaults, cx.def().tags_of(device.id).all(|tag| tag.default.is_none())),
+                (Action::Control(keys::ProgramCommand::Hold), program.is_none_or(|program| program.halt.is_none())),
+                (Action::Stop, cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work())),
+                (Action::SwapDirection, !copies),
+            ];
+            hide(&mut keys, &lacking);
+            keys = needing(keys, |action| self.role_for(cx, device, action));
+        }
+        let mut hints = hints(&keys);
+        // On the page of a device there is no room left for a key that every operator tries anyway; in the past there is.
+        let leads_back = match self.page {
+            Page::List => false,
+            Page::Device => cx.is_past() && 1 < cx.def().devices.len(),
+            Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
+            Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay(_) => true,
+        };
+        if leads_back {
+            let enter = keys.iter().position(|key| key.chord == code(KeyCode::Enter));
+            let place = enter.map_or(keys.len(), |enter| enter + 1);
+            hints.insert(place, Hint::new("Esc", t!("back"), t!("previous page")));
+        }
+        hints
     }
 }
 

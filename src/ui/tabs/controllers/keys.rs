@@ -38,6 +38,10 @@ pub enum Action {
     Sets,
     /// The control runs.
     Runs,
+    /// The procedures of the plant.
+    Procedures,
+    /// Abort the one at work.
+    Abort,
     /// The curves of the time of the selected run.
     Trend,
     /// Mark it for the overlay, or no longer.
@@ -107,6 +111,13 @@ const SETTINGS: Key<Action> = Key::new(
     Action::Settings,
 );
 
+const PROCEDURES_PAGE: Key<Action> = Key::new(
+    char('e'),
+    "procedures",
+    "procedures: steps that the station carries out, and what they measured",
+    Action::Procedures,
+);
+
 const LIST: &[Key<Action>] = &[
     Key::new(code(KeyCode::Enter), "open", "faceplate and parameters of the device", Action::Open),
     Key::new(char('v'), "view", "devices as faceplates or as a table", Action::Wall),
@@ -114,6 +125,7 @@ const LIST: &[Key<Action>] = &[
     GUIDE,
     WHY,
     SETTINGS,
+    PROCEDURES_PAGE,
     LINE,
     Key::new(code(KeyCode::Left), "", "the faceplate to the left", Action::Column(-1)),
     Key::new(code(KeyCode::Right), "", "the faceplate to the right", Action::Column(1)),
@@ -137,6 +149,7 @@ const DEVICE: &[Key<Action>] = &[
     Key::new(char('/'), "find", "show only parameters with some words in name or meaning", Action::Find),
     Key::new(char('d'), "defaults", "mark differences from the factory default", Action::Defaults),
     Key::new(char('S'), "standby", "run or standby, if the device has it", Action::Run).needs(Role::Technician),
+    PROCEDURES_PAGE,
     LINE,
     SETTINGS,
 ];
@@ -186,6 +199,13 @@ const RUNS: &[Key<Action>] = &[
     Key::new(char('t'), "trend", "the curves of its time", Action::Trend),
     GUIDE,
 ];
+const PROCEDURES: &[Key<Action>] = &[
+    Key::new(code(KeyCode::Enter), "start", "start the procedure (asks first)", Action::Open).needs(Role::Technician),
+    Key::new(char('x'), "abort", "abort the procedure at work: the safe state is written at once", Action::Abort)
+        .needs(Role::Technician),
+    Key::new(char('o'), "overlay", "the curves of what the procedures measured last over each other", Action::Overlay),
+    GUIDE,
+];
 const OVERLAY: &[Key<Action>] = &[
     Key::new(code(KeyCode::Left), "", "previous tag", Action::Tag(-1)),
     Key::new(code(KeyCode::Right), "tag", "next tag", Action::Tag(1)),
@@ -214,7 +234,8 @@ pub fn page_keys(page: &Page) -> Vec<Key<Action>> {
         Page::Sets => [&SELECT, SETS].concat(),
         Page::Compare(_) => [&SCROLL, COMPARE].concat(),
         Page::Runs => [&SELECT, RUNS].concat(),
-        Page::Overlay => OVERLAY.to_vec(),
+        Page::Procedures => [&SELECT, PROCEDURES].concat(),
+        Page::Overlay(_) => OVERLAY.to_vec(),
         Page::Guide(..) => READ.to_vec(),
     }
 }

@@ -24,20 +24,24 @@ impl Controllers {
             Page::Sets => self.set = to(self.set, sets::sources(cx, device).len()),
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
             Page::Runs => self.runs.select(cx, motion),
-            Page::Lamps | Page::Overlay | Page::Guide(..) => {}
+            Page::Procedures => self.procedures.move_by(cx, motion),
+            Page::Lamps | Page::Overlay(_) | Page::Guide(..) => {}
         }
     }
 
-    /// Lays the marked runs over each other, or goes back to their list.
+    /// Lays the marked runs, or those of the procedures, over each other, or goes back to their list.
     pub(super) fn swap_overlay(&mut self, cx: &ViewContext, device: DeviceId) {
-        if self.page == Page::Overlay {
-            (self.page, self.runs.overlay) = (Page::Runs, None);
+        let before = std::mem::replace(&mut self.page, Page::List);
+        if let Page::Overlay(before) = before {
+            (self.page, self.runs.overlay) = (*before, None);
             return;
         }
-        self.runs.lay_over(cx, device);
-        if self.runs.overlay.is_some() {
-            self.page = Page::Overlay;
+        if before == Page::Procedures {
+            self.runs.overlay = self.procedures.overlay(cx);
+        } else {
+            self.runs.lay_over(cx, device);
         }
+        self.page = if self.runs.overlay.is_some() { Page::Overlay(Box::new(before)) } else { before };
     }
 
     /// Enter: what is selected is opened, edited or written.
@@ -62,7 +66,8 @@ impl Controllers {
                 Vec::new()
             }
             Page::Compare(compare) => open(compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm)),
-            Page::Lamps | Page::Runs | Page::Overlay | Page::Guide(..) => Vec::new(),
+            Page::Procedures => self.procedures.start(cx),
+            Page::Lamps | Page::Runs | Page::Overlay(_) | Page::Guide(..) => Vec::new(),
         }
     }
 

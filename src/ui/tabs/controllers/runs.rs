@@ -158,7 +158,7 @@ fn row(cx: &ViewContext, run: &ControlRun) -> String {
 }
 
 /// First at SV, steady from, overshoot, offset, IAE; what is a lower bound has a mark.
-fn figures(run: &ControlRun) -> [String; 5] {
+pub fn figures(run: &ControlRun) -> [String; 5] {
     let time = |figure: Figure| match figure {
         Figure::NotYet if run.is_running() => "…".to_owned(),
         Figure::NotYet => "–".to_owned(),

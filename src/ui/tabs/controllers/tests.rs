@@ -1,5 +1,6 @@
 //! The controllers tab as an operator sees it and works with it.
 
+mod procedures;
 mod runs;
 mod lamps;
 mod sets;

@@ -1,0 +1,278 @@
+//! Procedures: steps of the plant file that the station carries out on request, one procedure at a time.
+//!
+//! ```text
+//!            ┌ write ────── verified ─┐
+//!  start ──> │ wait until ─ true ─────┤──> next step … ──> done
+//!            │ hold ─────── over ─────┤
+//!            └ measurement ───────────┘
+//!                 │ refused, not verified, time limit over, or an operator aborts
+//!                 └──> safe state: each of its writes once, whatever becomes of the others ──> failed or aborted
+//! ```
+//!
+//! A station that stops in the middle goes on with nothing: its successor shows the procedure as interrupted.
+
+mod run;
+
+use std::{fmt, sync::Arc, time::Duration};
+
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    command::{CommandId, Outcome},
+    expr::Expr,
+    id::{DeviceId, TagId},
+};
+use crate::t;
+
+pub(super) use run::{Instruction, View};
+
+/// The recorded word for a procedure that an operator has started.
+pub const START: &str = "start procedure";
+/// The recorded word for its abort.
+pub const ABORT: &str = "abort procedure";
+/// The recorded word for its end, however it ended.
+pub const END: &str = "end procedure";
+/// How the outcome of that begins where the station stopped meanwhile.
+pub const INTERRUPTED: &str = "interrupted";
+
+/// A `[[procedure]]` of the plant file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProcedureDef {
+    /// `fill-5l`; the history knows its measurements by it.
+    pub name: Arc<str>,
+    /// What it does, for its operator.
+    pub about: String,
+    /// In order; those of other procedures that it names are among them.
+    pub steps: Vec<ProcedureStep>,
+    /// The writes of the safe state, in order.
+    pub safe: Vec<(TagId, f64)>,
+    /// What its measurement is compared with.
+    pub reference: Option<Reference>,
+}
+
+impl ProcedureDef {
+    /// What it may write: in its steps, and for its safe state.
+    pub fn writes(&self) -> impl Iterator<Item = (TagId, f64)> + '_ {
+        let written = self.steps.iter().filter_map(|step| match step {
+            ProcedureStep::Write { tag, value } => Some((*tag, *value)),
+            ProcedureStep::WaitUntil { .. }
+            | ProcedureStep::Hold(_)
+            | ProcedureStep::BeginMeasurement { .. }
+            | ProcedureStep::EndMeasurement { .. } => None,
+        });
+        written.chain(self.safe.iter().copied())
+    }
+
+    /// The controllers whose control runs it measures, each with the name under which the run is kept.
+    pub fn measured(&self) -> impl Iterator<Item = (DeviceId, &Arc<str>)> {
+        self.steps.iter().filter_map(|step| match step {
+            ProcedureStep::BeginMeasurement { controller, label } => Some((*controller, label)),
+            ProcedureStep::Write { .. }
+            | ProcedureStep::WaitUntil { .. }
+            | ProcedureStep::Hold(_)
+            | ProcedureStep::EndMeasurement { .. } => None,
+        })
+    }
+}
+
+/// One step of a procedure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ProcedureStep {
+    /// Write a value and verify it.
+    Write {
+        /// What.
+        tag: TagId,
+        /// The value, in its unit.
+        value: f64,
+    },
+    /// Wait until a condition is true.
+    WaitUntil {
+        /// As it is written.
+        text: Arc<str>,
+        /// What that means.
+        condition: Expr,
+        /// The procedure fails where it is not true within this time.
+        limit: Duration,
+    },
+    /// Let this time pass.
+    Hold(Duration),
+    /// Begin a control run of a controller.
+    BeginMeasurement {
+        /// The controller.
+        controller: DeviceId,
+        /// The name of the run: of the procedure that has the step.
+        label: Arc<str>,
+    },
+    /// End it: its figures are the result.
+    EndMeasurement {
+        /// The controller.
+        controller: DeviceId,
+    },
+}
+
+/// Figures of another control run, to compare with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reference {
+    /// Where they come from.
+    pub source: String,
+    /// First time at SV; `None` is never, and so it is with the others.
+    pub at_sv: Option<Duration>,
+    /// Steady from this time on.
+    pub steady: Option<Duration>,
+    /// Overshoot, in the unit of PV.
+    pub overshoot: Option<f64>,
+}
+
+/// A procedure at work, or as it ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProcedureRun {
+    /// Who started it.
+    pub by: Arc<str>,
+    /// The place of that user, or of the one who has aborted it.
+    pub from: Arc<str>,
+    /// When.
+    pub started: Timestamp,
+    /// The place of the step at work, or of the last one; `None` where a station before this one has carried it out.
+    pub step: Option<usize>,
+    /// Since when it has been in this step, or in this state.
+    pub since: Timestamp,
+    /// How it stands.
+    pub state: ProcedureState,
+    /// The safe state; empty until it is written.
+    pub safe: Vec<SafeWrite>,
+    /// The step at work has begun.
+    begun: bool,
+    /// The write of the step at work.
+    write: Option<CommandId>,
+    /// Measurements that have begun and not ended.
+    measuring: Vec<DeviceId>,
+}
+
+/// How a procedure stands.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ProcedureState {
+    /// A step is at work.
+    Running,
+    /// The safe state is being written; then it ends so.
+    WritingSafeState(ProcedureEnd),
+    /// It has ended.
+    Ended(ProcedureEnd),
+}
+
+/// How a procedure ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum ProcedureEnd {
+    /// After its last step.
+    Done,
+    /// At a step.
+    Failed(StepFailure),
+    /// By this operator.
+    Aborted(Arc<str>),
+    /// The station stopped: no safe state was written.
+    Interrupted,
+}
+
+/// Why a step failed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
+pub enum StepFailure {
+    /// The write was refused, or not verified.
+    #[error("{0}")]
+    Write(Outcome),
+    /// The write has no outcome any more.
+    #[error("{}", t!("the outcome of the write is unknown"))]
+    Forgotten,
+    /// The condition was not true in time.
+    #[error("{}", t!("not true within the time limit"))]
+    TimeLimit,
+    /// There is no control run that the measurement could have.
+    #[error("{}", t!("no control run was recorded"))]
+    NotMeasured,
+}
+
+/// One write of the safe state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SafeWrite {
+    /// What.
+    pub tag: TagId,
+    /// The value.
+    pub value: f64,
+    /// The command that writes it; `None` before its turn.
+    command: Option<CommandId>,
+    /// Its outcome; `None` before its end.
+    pub outcome: Option<Outcome>,
+}
+
+impl ProcedureRun {
+    /// Is it still carrying out steps, or writing the safe state?
+    pub fn at_work(&self) -> bool {
+        match self.state {
+            ProcedureState::Running | ProcedureState::WritingSafeState(_) => true,
+            ProcedureState::Ended(_) => false,
+        }
+    }
+
+    /// How it ended, or will once the safe state is written.
+    pub fn end(&self) -> Option<&ProcedureEnd> {
+        match &self.state {
+            ProcedureState::Running => None,
+            ProcedureState::WritingSafeState(end) | ProcedureState::Ended(end) => Some(end),
+        }
+    }
+
+    /// Was every write of the safe state verified? `None` while none is to be written, or not all have ended.
+    pub fn is_safe(&self) -> Option<bool> {
+        if self.safe.is_empty() || self.safe.iter().any(|write| write.outcome.is_none()) {
+            return None;
+        }
+        Some(self.safe.iter().all(|write| write.outcome.as_ref().is_some_and(Outcome::is_done)))
+    }
+
+    /// Who is responsible for what it does now: who has aborted it, else who has started it.
+    pub(super) fn actor(&self) -> &Arc<str> {
+        match self.end() {
+            Some(ProcedureEnd::Aborted(by)) => by,
+            Some(ProcedureEnd::Done | ProcedureEnd::Failed(_) | ProcedureEnd::Interrupted) | None => &self.by,
+        }
+    }
+
+    /// Did it end as it should not have? An abort that reached the safe state is no fault.
+    pub fn is_fault(&self) -> bool {
+        match self.end() {
+            None | Some(ProcedureEnd::Done) => false,
+            Some(ProcedureEnd::Failed(_) | ProcedureEnd::Interrupted) => true,
+            Some(ProcedureEnd::Aborted(_)) => self.is_safe() == Some(false),
+        }
+    }
+
+    pub(super) fn times(&mut self) -> [&mut Timestamp; 2] {
+        [&mut self.started, &mut self.since]
+    }
+
+    /// The outcome on record: `failed at step 3 of 9: …; safe state written`.
+    pub(super) fn recorded(&self, steps: usize) -> String {
+        let end = self.end().map_or(String::new(), ToString::to_string);
+        let place = match (self.end(), self.step) {
+            (Some(ProcedureEnd::Done) | None, _) | (_, None) => String::new(),
+            (Some(_), Some(step)) => format!(", step {} of {steps}", (step + 1).min(steps)),
+        };
+        let safe = match self.is_safe() {
+            None => "",
+            Some(true) => "; safe state written",
+            Some(false) => "; safe state NOT complete",
+        };
+        format!("{end}{place}{safe}")
+    }
+}
+
+/// `failed: not true within the time limit`.
+impl fmt::Display for ProcedureEnd {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            ProcedureEnd::Done => f.write_str(t!("done")),
+            ProcedureEnd::Failed(why) => f.write_str(&t!("failed: {why}", why)),
+            ProcedureEnd::Aborted(by) => f.write_str(&t!("aborted by {by}", by)),
+            ProcedureEnd::Interrupted => f.write_str(t!("interrupted")),
+        }
+    }
+}

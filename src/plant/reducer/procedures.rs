@@ -1,0 +1,209 @@
+//! Procedures in the reducer: what they instruct is done by the same paths as the commands of operators.
+
+#[cfg(test)]
+mod tests;
+
+use std::{collections::VecDeque, sync::Arc};
+
+use jiff::Timestamp;
+
+use super::{Effects, Plant, restore::PLANT};
+use crate::plant::{
+    command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
+    control_run::RunState,
+    def::{DeviceId, ProcedureId, TagId},
+    interlock,
+    number::to_u16,
+    procedure::{self, Instruction, ProcedureEnd, ProcedureRun, View},
+    record::{ActionRecord, Record},
+    station::{FaultState, StationFault},
+};
+
+impl Plant {
+    /// Begins a procedure, unless one is at work.
+    pub(super) fn start_procedure(&mut self, id: ProcedureId, status: &CommandStatus) -> Result<(), Refusal> {
+        if let Some(place) = self.procedure_at_work() {
+            return Err(Refusal::ProcedureAtWork(self.def.procedures[place].name.to_string()));
+        }
+        let def = &self.def;
+        let mut trackers = def.procedure(id).measured().filter_map(|(controller, _)| self.tracker_of(controller));
+        if trackers.any(|place| !self.runs[place].is_ready()) {
+            return Err(Refusal::NotMeasurable);
+        }
+        let run = ProcedureRun::new(status.by.clone(), status.from.clone(), status.at);
+        self.procedures[id.index()] = Some(Arc::new(run));
+        Ok(())
+    }
+
+    /// Ends the procedure at work. One that was interrupted gets its safe state now.
+    pub(super) fn abort_procedure(
+        &mut self,
+        id: ProcedureId,
+        status: &CommandStatus,
+        effects: &mut Effects,
+    ) -> Outcome {
+        let Some(run) = &self.procedures[id.index()] else { return Outcome::Unchanged };
+        if let Some(other) = self.procedure_at_work().filter(|place| *place != id.index()) {
+            let name = self.def.procedures[other].name.to_string();
+            return Outcome::Refused(Refusal::ProcedureAtWork(name));
+        }
+        match run.end() {
+            None | Some(ProcedureEnd::Interrupted) => {}
+            Some(ProcedureEnd::Done | ProcedureEnd::Failed(_) | ProcedureEnd::Aborted(_)) => return Outcome::Unchanged,
+        }
+        let mut run = (**run).clone();
+        let def = self.def.clone();
+        let todo = run.stop(def.procedure(id), ProcedureEnd::Aborted(status.by.clone()), status.at);
+        run.from = status.from.clone();
+        self.carry_out(id, &mut run, todo, status.at, effects);
+        self.procedures[id.index()] = Some(Arc::new(run));
+        Outcome::Verified
+    }
+
+    /// Lets restores and the procedure at work go on by what is known now.
+    pub(super) fn advance_work(&mut self, at: Timestamp, effects: &mut Effects) {
+        self.advance_restores(at, effects);
+        self.advance_procedures(at, effects);
+    }
+
+    /// Lets the procedure at work go on.
+    fn advance_procedures(&mut self, at: Timestamp, effects: &mut Effects) {
+        let Some(place) = self.procedure_at_work() else { return };
+        let Some(before) = self.procedures[place].clone() else { return };
+        let (id, def, mut run) = (ProcedureId(to_u16(place)), self.def.clone(), (*before).clone());
+        loop {
+            let (image, commands) = (&self.image, &self.commands);
+            let view = View {
+                value: &|tag| image.sample(tag).good_value(),
+                outcome: &|id| commands.outcome_of(id).cloned(),
+                is_stop: &|tag, value| interlock::is_stop(&def, tag, value),
+                at,
+            };
+            let todo = run.next(def.procedure(id), &view);
+            if todo.is_empty() {
+                break;
+            }
+            self.carry_out(id, &mut run, todo, at, effects);
+        }
+        if run != *before {
+            self.procedures[place] = Some(Arc::new(run));
+        }
+    }
+
+    /// The station stops: the procedure at work ends where it is.
+    pub(super) fn stop_procedures(&mut self, effects: &mut Effects) {
+        let at = self.at;
+        let Some(place) = self.procedure_at_work() else { return };
+        let Some(mut run) = self.procedures[place].as_deref().cloned() else { return };
+        let todo = run.on_stop(at);
+        self.carry_out(ProcedureId(to_u16(place)), &mut run, todo, at, effects);
+        self.procedures[place] = Some(Arc::new(run));
+    }
+
+    fn procedure_at_work(&self) -> Option<usize> {
+        self.procedures.iter().position(|run| run.as_ref().is_some_and(|run| run.at_work()))
+    }
+
+    /// Shows the procedure that the station before this one left at work: `latest` is the last record of a start or an end.
+    /// It does not go on. Where its end is not on record, that is returned.
+    pub fn restore_procedures(&mut self, latest: Option<&ActionRecord>) -> Vec<Record> {
+        let Some(latest) = latest else { return Vec::new() };
+        let is_started = &*latest.action == procedure::START;
+        if !is_started && !latest.outcome.starts_with(procedure::INTERRUPTED) {
+            return Vec::new();
+        }
+        let place = self.def.procedures.iter().position(|def| *def.name == *latest.target);
+        if let Some(shown) = place.map(|place| &mut self.procedures[place]).filter(|shown| shown.is_none()) {
+            let run = ProcedureRun::interrupted(latest.by.clone(), latest.from.clone(), latest.at, self.at);
+            *shown = Some(Arc::new(run));
+        }
+        if !is_started {
+            return Vec::new();
+        }
+        let outcome = format!("{}: the station stopped", procedure::INTERRUPTED);
+        self.faults.set(StationFault::Procedure, occurred(&latest.target, &outcome));
+        let (at, action, outcome) = (self.at, procedure::END.into(), outcome.into());
+        vec![Record::Action(ActionRecord { at, action, outcome, chain_hash: None, ..latest.clone() })]
+    }
+
+    /// Does what a procedure instructs, and what follows from that.
+    fn carry_out(
+        &mut self,
+        id: ProcedureId,
+        run: &mut ProcedureRun,
+        todo: Vec<Instruction>,
+        at: Timestamp,
+        effects: &mut Effects,
+    ) {
+        let mut todo = VecDeque::from(todo);
+        while let Some(instruction) = todo.pop_front() {
+            match instruction {
+                Instruction::Write { tag, value, safe } => {
+                    let command = self.write_for(id, run, (tag, value), at, effects);
+                    run.sent(safe, command);
+                }
+                Instruction::Begin(controller, label) => {
+                    let tracker = self.tracker_of(controller).map(|place| &mut self.runs[place]);
+                    if tracker.is_some_and(|tracker| tracker.begin_measurement(&label)) {
+                        effects.records.extend(self.follow_runs(&[]));
+                    } else {
+                        todo.extend(run.not_measured(self.def.procedure(id), at));
+                    }
+                }
+                Instruction::End(controller) => match self.end_measurement(controller, at, RunState::Ended) {
+                    Some(record) => effects.records.push(record),
+                    None => todo.extend(run.not_measured(self.def.procedure(id), at)),
+                },
+                Instruction::Interrupt(controller) => {
+                    effects.records.extend(self.end_measurement(controller, at, RunState::Interrupted));
+                }
+                Instruction::Record => {
+                    let def = self.def.procedure(id);
+                    let outcome = run.recorded(def.steps.len());
+                    if run.is_fault() {
+                        self.faults.set(StationFault::Procedure, occurred(&def.name, &outcome));
+                    }
+                    let action = ActionRecord::new(at, run.actor().clone(), procedure::END, def.name.clone(), outcome);
+                    effects.records.push(Record::Action(action));
+                }
+            }
+        }
+    }
+
+    /// Gives a write of a procedure to the bus, or records that it is refused.
+    fn write_for(
+        &mut self,
+        id: ProcedureId,
+        run: &ProcedureRun,
+        (tag, value): (TagId, f64),
+        at: Timestamp,
+        effects: &mut Effects,
+    ) -> CommandId {
+        self.last_number = self.last_number.wrapping_add(1);
+        let command = CommandId { terminal: PLANT, number: self.last_number };
+        let kind = CommandKind::Write { tag, value };
+        // It was confirmed with the procedure, whatever the value is that it replaces.
+        let expected_value = self.image.sample(tag).value;
+        let note = Some(format!("procedure {}", self.def.procedure(id).name).into());
+        let request = Command { expected_value, note, ..Command::new(self.run, command, kind) };
+        let status = CommandStatus { from: run.from.clone(), ..CommandStatus::new(request, run.actor().clone(), at) };
+        effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
+        command
+    }
+
+    fn end_measurement(&mut self, controller: DeviceId, at: Timestamp, state: RunState) -> Option<Record> {
+        let place = self.tracker_of(controller)?;
+        let run = self.runs[place].end_measurement(at, state)?;
+        Some(Record::Run(Box::new(run)))
+    }
+
+    /// The place of the runs of a controller.
+    fn tracker_of(&self, controller: DeviceId) -> Option<usize> {
+        self.def.runs.iter().position(|def| def.controller == controller)
+    }
+}
+
+/// The procedure has failed: an alarm that waits for its acknowledgement.
+fn occurred(name: &str, outcome: &str) -> FaultState {
+    FaultState::Occurred(format!("{name}: {outcome}").into())
+}
