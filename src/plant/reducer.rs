@@ -8,13 +8,14 @@ mod procedures;
 mod alarm_metrics;
 mod restore;
 mod service;
+mod shown;
 mod station;
 #[cfg(test)]
 mod tests;
 
 use std::sync::Arc;
 
-use jiff::{SignedDuration, Timestamp};
+use jiff::Timestamp;
 
 use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_note},
@@ -34,7 +35,7 @@ use super::{
     program::ProgramWatch,
     record::{ActionRecord, Record},
     restore::Restore,
-    snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot},
+    snapshot::{DeviceState, DeviceStatus, HistoryStatus, LineStatus},
     station::StationFaults,
     traffic::Exchange,
     tuning::TuningTracker,
@@ -319,40 +320,6 @@ impl Plant {
     /// Takes values as they are, of another time.
     pub(super) fn set_samples(&mut self, samples: &[super::sample::Sample]) {
         self.image.set_all(samples);
-    }
-
-    /// The plant as of its last event, command or tick.
-    pub fn snapshot(&self) -> Snapshot {
-        let lists = self.alarm_manager.lists();
-        Snapshot {
-            at: self.at,
-            run: self.run,
-            stepped: SignedDuration::ZERO,
-            def: self.def.clone(),
-            samples: self.image.samples.clone(),
-            texts: self.image.texts.clone(),
-            decimals: self.def.tags.iter().map(|tag| self.image.shown_decimals(tag)).collect(),
-            source_frames: self.source_frames.clone(),
-            lines: self.lines.clone(),
-            devices: self.diagnosed(),
-            alarms: lists.active.clone(),
-            suppressed: lists.suppressed.clone(),
-            sound: lists.sound,
-            alarm_metrics: self.alarm_metrics.clone(),
-            commands: self.commands.shown(),
-            actuators: self.actuators.clone(),
-            history: self.history.clone(),
-            station: self.faults.details.clone(),
-            sets: self.sets.clone(),
-            restores: self.restores.clone(),
-            tunings: self.tunings.iter().map(|tracker| tracker.tuning.clone()).collect(),
-            programs: self.programs.iter().map(ProgramWatch::elapsed).collect(),
-            runs: self.runs.iter().map(RunTracker::shown).collect(),
-            procedures: self.procedures.clone(),
-            north: self.north.clone(),
-            load: self.load,
-            speed: self.speed,
-        }
     }
 
     fn line_of(&self, tag: TagId) -> LineId {
