@@ -122,7 +122,7 @@ fn one_unit_that_talks_all_the_time_is_not_every_unit() {
     };
     for bytes in [vec![0x55; 64], with_crc(&[99, 3, 2, 0, 7])] {
         let address = chatter(bytes);
-        let (code, said) = run(&["scan", &address, "--mode", "rtu-over-tcp", "--units", "1-20", "--timeout", "20"]);
+        let (code, said) = run(&["scan", &address, "--mode", "rtu-over-tcp", "--units", "1-20", "--timeout", "100"]);
         assert!(code == Some(1) && said.contains("no unit was found"), "{code:?} {said}");
         assert!(said.contains("20 addresses: something else talks on this line"), "{said}");
     }
