@@ -83,3 +83,60 @@ pub fn main(args: Args) -> Result<(), CliError> {
 fn id_of(place: usize) -> ProcedureId {
     ProcedureId(to_u16(place))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use jiff::Timestamp;
+
+    use super::*;
+    use crate::{
+        bus::io::clock::Clock,
+        plant::command::{Command, CommandId, CommandStatus, Refusal},
+        profile::{self, Search},
+        sim::{
+            io::{SimulatorHandle, in_memory},
+            simulator::Simulator,
+        },
+        station::io as station,
+    };
+
+    /// Station, line and simulated tank in virtual time: the tank is drained, cools, and holds five litres, as the plant file has it.
+    #[tokio::test(start_paused = true)]
+    async fn the_shipped_procedure_fills_five_litres() {
+        let def = profile::load(Path::new("tank"), &Search::shipped()).expect("a shipped plant");
+        let time = Clock::starting_at(Timestamp::from_second(1_700_000_000).expect("a valid instant"), 1.0);
+        let simulator = SimulatorHandle::spawn_for(&def, Simulator::new(&def).expect("it has one"), time);
+        let station = station::start_transient(def.clone(), time, in_memory(&def, &simulator), Box::new(|_| {}));
+        let mut session = station.session("test");
+        let [level, pv, heater] =
+            ["PLC-1.LT-1", "TIC-1.PV", "PLC-1.MAN.HEATER"].map(|name| def.tag_named(name).expect("a tag of the tank"));
+        let read = |snapshot: &Snapshot| [level, pv, heater].iter().all(|tag| snapshot.sample(*tag).quality.is_good());
+        let seen = session.snapshots.wait_for(|snapshot| read(snapshot)).await.expect("it runs").clone();
+        let fill = def.procedures.iter().position(|def| &*def.name == "fill-5l").expect("it is shipped");
+        let start = |number, place: usize| {
+            let id = CommandId { terminal: session.terminal, number };
+            let command = Command::on(&seen, id, CommandKind::StartProcedure(id_of(place)));
+            CommandStatus::new(command, "anna", time.now())
+        };
+        station.commands.send(start(1, fill)).await.expect("it runs");
+        let ended = |snapshot: &Snapshot| snapshot.procedures[fill].as_ref().is_some_and(|run| !run.at_work());
+        let last = session.snapshots.wait_for(|snapshot| ended(snapshot)).await.expect("it runs").clone();
+        let run = last.procedures[fill].as_deref().expect("it was started");
+        assert_eq!(run.end(), Some(&ProcedureEnd::Done), "{:?}", procedures::progress(&last, id_of(fill)));
+        let [level, pv, heater] = [level, pv, heater].map(|tag| last.sample(tag).good_value().expect("it is read"));
+        assert!((10.0..10.3).contains(&level) && pv < 27.6 && heater == 0.0, "{level} cm, {pv} °C, heater {heater}");
+        // Without a history nothing could be compared afterwards: what measures is refused before its first write.
+        station.commands.send(start(2, fill + 1)).await.expect("it runs");
+        let id = CommandId { terminal: session.terminal, number: 2 };
+        let outcome = |snapshot: &Snapshot| {
+            let status = snapshot.commands.iter().find(|status| status.command.id == id);
+            status.map(|status| status.outcome.clone())
+        };
+        let last = session.snapshots.wait_for(|snapshot| outcome(snapshot).is_some()).await.expect("it runs").clone();
+        assert_eq!(outcome(&last), Some(Outcome::Refused(Refusal::NotMeasurable)));
+        drop(session);
+        station.stop().await;
+    }
+}

@@ -7,7 +7,7 @@ use crate::{
     history::Series,
     plant::{
         batch::Batch,
-        control_run::{ControlRun, RunDef},
+        control_run::{ControlRun, RunCause, RunDef},
         def::BatchDef,
         number::to_usize,
     },
@@ -79,7 +79,12 @@ impl Overlay {
     pub fn of_runs(rule: &RunDef, runs: impl Iterator<Item = (ControlRun, [String; 5])>) -> Option<Overlay> {
         let laid = |(run, figures): (ControlRun, _)| {
             let to = (!run.is_running()).then_some(run.until);
-            Laid { figures: Some(figures), ..Laid::new(run.label(), run.from, to) }
+            // What a procedure has measured has its name.
+            let label = match run.cause {
+                RunCause::Procedure => format!("{} {}", run.detail, run.number),
+                RunCause::Setpoint | RunCause::Program | RunCause::Batch => run.label(),
+            };
+            Laid { figures: Some(figures), ..Laid::new(label, run.from, to) }
         };
         Overlay::new((Tab::Controllers, Kind::Runs), runs.map(laid), (rule.tags.clone(), 0))
     }

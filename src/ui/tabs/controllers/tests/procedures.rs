@@ -142,6 +142,8 @@ fn the_latest_runs_of_the_procedures_lie_over_each_other() {
     answer(&mut model, &effects);
     let effects = type_keys(&mut model, "↓o");
     assert_eq!(answer(&mut model, &effects), [measured()[2].from, measured()[1].from], "one of each, the latest");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("PI 15") && shown.contains("PD 16"), "{shown}");
     type_keys(&mut model, "⎋");
     assert!(screen(&mut model, 80, 24).contains("Procedures"));
 }
