@@ -176,3 +176,11 @@ fn a_line_is_disconnected_from_its_page_and_from_the_mimic() {
         }
     }
 }
+
+#[test]
+fn the_only_field_of_a_test_is_typed() {
+    let clear = "\u{8}".repeat(3);
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Ti{clear}17"));
+    let expect = CommandKind::Test(L1, Diagnostic::Identify { unit: 17 });
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&expect));
+}
