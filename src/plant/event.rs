@@ -11,6 +11,7 @@ use super::{
     id::{DeviceId, LineId, TagId, WriteId},
     line_report::LineReport,
     north_def::NorthStatus,
+    port_signals::PortSignals,
     process_load::ProcessLoad,
     station::{FaultState, StationFault},
     traffic::Exchange,
@@ -352,6 +353,8 @@ pub struct LineCounters {
     pub frames: u64,
     /// What the serial port itself has counted, where it does.
     pub uart: Option<UartCounters>,
+    /// The signals of the serial port, where it has any.
+    pub signals: Option<PortSignals>,
     /// The adapter gives back what it sends (its receiver stays on while it sends).
     pub echoes: bool,
     /// Times the port or connection was opened.

@@ -33,6 +33,7 @@ pub(crate) mod store_policy;
 pub(crate) mod scale;
 pub mod parameter_set;
 pub(crate) mod admission;
+pub mod port_signals;
 pub mod event;
 pub mod request_stats;
 pub mod device_time;

@@ -135,7 +135,8 @@ fn mbpoll_and_pymodbus_are_heard_over_a_serial_tap() {
     let args = ["listen", port, "--profile", "fuji_pxr", "--pcap", capture.to_str().unwrap()];
     let mut listen = Process::start(sightglass().args(args));
     listen.wait_for("listening on RTU");
-    assert_eq!(access(listen.child.id(), &tap.ends[0]), [0], "it is opened for reading only");
+    let access = access(listen.child.id(), &tap.ends[0]);
+    assert!(!access.is_empty() && access.iter().all(|mode| *mode == 0), "it is opened for reading only: {access:?}");
     let place = master.ends[0].to_str().unwrap();
     let mut mbpoll =
         Master { place: ["-m", "rtu", "-b", "9600", "-P", "none"].map(str::to_owned).into(), read: vec![] };

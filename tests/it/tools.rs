@@ -204,6 +204,7 @@ fn a_plug_returns_every_byte() {
     let (code, said) = run(&["loopback", port.to_str().unwrap(), "--plug"]);
     let counted = "320 bytes sent, 320 received: 0 wrong, 0 missing, 0 more than sent; 0.0 % faults";
     assert!(code == Some(0) && said.contains(counted) && said.contains("local echo"), "{code:?} {said}");
+    assert!(said.contains(" bytes a second"), "{said}");
     // In seven bits too.
     let (code, said) = run(&["loopback", port.to_str().unwrap(), "--plug", "--mode", "ascii", "--count", "6"]);
     assert!(code == Some(0) && said.contains("192 received: 0 wrong"), "{code:?} {said}");

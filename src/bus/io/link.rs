@@ -30,7 +30,8 @@ pub use self::transactions::Ended;
 use self::{receive::Received, transactions::Transactions};
 use super::{
     clock::Clock,
-    transport::{CountUart, Opened},
+    transport::Opened,
+    uart::PortWatch,
     wire::{LineMemory, Wire},
 };
 use crate::{
@@ -76,8 +77,8 @@ pub struct Link {
     turnaround: Duration,
     /// Units that are not to be asked before a moment.
     gaps: Vec<(u8, Instant)>,
-    /// What the driver of the port counts.
-    uart: Option<CountUart>,
+    /// What the driver of the port counts and sees.
+    watch: Option<PortWatch>,
     /// The adapter gives back what it sends.
     echoes: bool,
     /// Exchanges in a row to which nothing came back.
@@ -93,7 +94,7 @@ pub struct Link {
 impl Link {
     /// A link on a freshly opened port; `memory` goes on from an earlier opening.
     pub fn new(opened: Opened, line: &LineDef, clock: Clock, memory: LineMemory) -> Link {
-        let uart = opened.uart;
+        let watch = opened.watch;
         let wire = Wire::new(opened.stream, opened.pause, line, clock, memory);
         Link {
             transactions: Transactions::new(),
@@ -103,7 +104,7 @@ impl Link {
             timeout: line.timeout,
             frame_timeout: wire.frame_timeout,
             turnaround: clock.real_span(line.turnaround),
-            uart,
+            watch,
             echoes: false,
             unanswered: 0,
             last: None,
@@ -285,9 +286,10 @@ impl Link {
         }
     }
 
-    /// Asks the driver of the port what it has counted.
-    pub fn count_uart(&mut self) {
-        self.wire.counters.uart = self.uart.as_ref().and_then(|uart| uart());
+    /// Asks the driver of the port what it has counted, and how its signals stand.
+    pub fn look_at_port(&mut self) {
+        self.wire.counters.uart = self.watch.as_ref().and_then(PortWatch::counters);
+        self.wire.counters.signals = self.watch.as_ref().and_then(PortWatch::signals);
         self.wire.counters.echoes = self.echoes;
     }
 

@@ -1,19 +1,19 @@
 //! The signals of a serial port beside its data: what the adapter sets, and what it sees.
 
-use std::{fmt, io};
+use std::io;
 
 use tokio_serial::{SerialPort, SerialStream};
 
 use super::{
-    transport::{CountUart, serial_stream},
-    uart,
+    transport::serial_stream,
+    uart::{self, PortWatch},
 };
-use crate::plant::{event::UartCounters, line::Serial};
+use crate::plant::{event::UartCounters, line::Serial, port_signals::PortSignals};
 
 /// A port whose signals are set and read.
 pub struct SignalPort {
     port: SerialStream,
-    uart: Option<CountUart>,
+    watch: Option<PortWatch>,
 }
 
 /// Which signal is set.
@@ -27,27 +27,17 @@ pub enum Signal {
     Break,
 }
 
-/// All signals: outputs, then inputs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Signals {
-    bits: u32,
-}
-
-/// Name and bit of each (linux/termios.h).
-const NAMES: [(&str, u32); 6] =
-    [("RTS", 0x004), ("DTR", 0x002), ("CTS", 0x020), ("DSR", 0x100), ("DCD", 0x040), ("RI", 0x080)];
-
 impl SignalPort {
     /// Opens the port; the system raises RTS and DTR with that. The error is in words for an operator.
     pub fn open(path: &str, serial: Serial) -> Result<SignalPort, String> {
         let port = serial_stream(path, serial)?;
-        let uart = uart::counter(&port);
-        Ok(SignalPort { port, uart })
+        let watch = PortWatch::new(&port);
+        Ok(SignalPort { port, watch })
     }
 
     /// How the signals stand; `None` for a port that has none: a pseudo-terminal, or a driver without them.
-    pub fn read(&self) -> Option<Signals> {
-        uart::signals(&self.port).map(|bits| Signals { bits })
+    pub fn read(&self) -> Option<PortSignals> {
+        self.watch.as_ref()?.signals()
     }
 
     /// Sets a signal.
@@ -62,30 +52,13 @@ impl SignalPort {
 
     /// What the driver has counted since the port was opened; `None` where it does not count.
     pub fn uart(&self) -> Option<UartCounters> {
-        self.uart.as_ref().and_then(|uart| uart())
-    }
-}
-
-/// `RTS on  DTR on   CTS off  DSR off  DCD off  RI off`.
-impl fmt::Display for Signals {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let state = |(name, bit): (&str, u32)| format!("{name} {}", if self.bits & bit == 0 { "off" } else { "on" });
-        let words = NAMES.map(state);
-        write!(f, "{}   {}", words[..2].join("  "), words[2..].join("  "))
+        self.watch.as_ref()?.counters()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn each_signal_has_its_bit() {
-        let shown = |bits| Signals { bits }.to_string();
-        assert_eq!(shown(0x006), "RTS on  DTR on   CTS off  DSR off  DCD off  RI off");
-        assert_eq!(shown(0x020), "RTS off  DTR off   CTS on  DSR off  DCD off  RI off");
-        assert_eq!(shown(0x1C0), "RTS off  DTR off   CTS off  DSR on  DCD on  RI on");
-    }
 
     #[tokio::test]
     async fn a_pseudo_terminal_has_no_signals_and_no_counters() {

@@ -14,8 +14,8 @@ use tokio::{io::AsyncRead, net::unix::pipe};
 
 use super::{
     ports,
-    transport::{CountUart, connect},
-    uart,
+    transport::connect,
+    uart::{self, PortWatch},
 };
 use crate::plant::{
     event::UartCounters,
@@ -26,7 +26,7 @@ use crate::plant::{
 pub struct Tap {
     /// They are read here; there is no way to write.
     pub bytes: Box<dyn AsyncRead + Send + Unpin>,
-    uart: Option<CountUart>,
+    watch: Option<PortWatch>,
 }
 
 impl Tap {
@@ -35,13 +35,13 @@ impl Tap {
     pub async fn open(transport: &Transport, rts: bool) -> Result<Tap, String> {
         match transport {
             Transport::Serial { port, serial, .. } => open_serial(port, *serial, rts),
-            Transport::Tcp { host, port, .. } => Ok(Tap { bytes: Box::new(connect(host, *port).await?), uart: None }),
+            Transport::Tcp { host, port, .. } => Ok(Tap { bytes: Box::new(connect(host, *port).await?), watch: None }),
         }
     }
 
     /// What the driver of a serial port has counted since then; `None` where it does not count.
     pub fn uart(&self) -> Option<UartCounters> {
-        self.uart.as_ref().and_then(|uart| uart())
+        self.watch.as_ref()?.counters()
     }
 }
 
@@ -69,9 +69,9 @@ fn open_serial(path: &str, serial: Serial, rts: bool) -> Result<Tap, String> {
         uart::lower_rts(&port);
     }
     set(&port, serial).map_err(|error| failed(error.into()))?;
-    let uart = uart::count(port.try_clone().map_err(failed)?.into());
+    let watch = Some(PortWatch::of(port.try_clone().map_err(failed)?.into()));
     let bytes = pipe::Receiver::from_file_unchecked(port).map_err(failed)?;
-    Ok(Tap { bytes: Box::new(bytes), uart })
+    Ok(Tap { bytes: Box::new(bytes), watch })
 }
 
 /// Raw bytes with these parameters; what came before is dropped, and no other program opens the port.

@@ -204,7 +204,7 @@ impl Task<'_> {
             let now = self.clock.now();
             if report_at <= now {
                 report_at = now + REPORT_EVERY;
-                link.count_uart();
+                link.look_at_port();
                 self.collect_stats(link);
                 self.publish_report(Some(schedule)).await?;
             }

@@ -9,11 +9,12 @@ use tokio::{
 };
 use tokio_serial::{SerialPortBuilderExt, SerialStream};
 
-use super::{pause::Pause, ports, uart};
-use crate::plant::{
-    def::{Parity, Rs485, Serial, Transport},
-    event::UartCounters,
+use super::{
+    pause::Pause,
+    ports,
+    uart::{self, PortWatch},
 };
+use crate::plant::def::{Parity, Rs485, Serial, Transport};
 
 /// A TCP connection must stand within this time.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
@@ -28,12 +29,9 @@ pub struct Opened {
     pub stream: Box<dyn Stream>,
     /// How silences are kept on it.
     pub pause: Pause,
-    /// What its driver has counted, if it counts.
-    pub uart: Option<CountUart>,
+    /// What its driver counts and sees, if it is a serial port.
+    pub watch: Option<PortWatch>,
 }
-
-/// Reads the error counters of a serial port.
-pub type CountUart = Box<dyn Fn() -> Option<UartCounters> + Send + Sync>;
 
 /// How a line is opened.
 #[derive(Debug)]
@@ -50,7 +48,7 @@ impl Connector {
         match self {
             Connector::Real(transport) => open(transport).await,
             Connector::Memory(streams) => match streams.try_recv() {
-                Ok(stream) => Ok(Opened { stream: Box::new(stream), pause: Pause::Coarse, uart: None }),
+                Ok(stream) => Ok(Opened { stream: Box::new(stream), pause: Pause::Coarse, watch: None }),
                 Err(_) => Err("no such port".into()),
             },
         }
@@ -88,8 +86,8 @@ fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, Strin
             format!("{path}: its driver does not switch the direction of RS-485 ({error}); use rs485 = \"off\"")
         })?;
     }
-    let count = uart::counter(&stream);
-    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: count })
+    let watch = PortWatch::new(&stream);
+    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), watch })
 }
 
 /// A serial port, taken exclusively: a second master on the line is refused by the system.
@@ -109,7 +107,7 @@ pub(super) fn serial_stream(path: &str, serial: Serial) -> Result<SerialStream, 
 
 async fn open_tcp(host: &str, port: u16) -> Result<Opened, String> {
     let stream = connect(host, port).await?;
-    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), uart: None })
+    Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), watch: None })
 }
 
 /// A TCP connection; the error is in words for an operator.

@@ -12,22 +12,31 @@ use std::{
 use rustix::ioctl::{Ioctl, IoctlOutput, Opcode};
 use tokio_serial::SerialStream;
 
-use super::transport::CountUart;
-use crate::plant::{def::Rs485, event::UartCounters};
+use crate::plant::{def::Rs485, event::UartCounters, port_signals::PortSignals};
 
-/// Reads the error counters of a port whenever it is called; `None` for a port whose driver does not count (a
-/// pseudo-terminal, many USB adapters).
-pub fn counter(port: &SerialStream) -> Option<CountUart> {
-    count(borrowed(port).try_clone_to_owned().ok()?)
+/// Looks at what the driver of an open port counts and sees, through a handle of its own, which is closed with this.
+#[derive(Debug)]
+pub struct PortWatch {
+    handle: OwnedFd,
+    /// As it had counted at the beginning; `None` for a driver that does not count.
+    first: Option<Counts>,
 }
 
-/// The same for a second handle of a port, which is closed with the counter.
-pub(super) fn count(handle: OwnedFd) -> Option<CountUart> {
-    // SAFETY: TIOCGICOUNT fills one `serial_icounter_struct`, which `Counts` is, field by field.
-    let read = move || unsafe { rustix::ioctl::ioctl(&handle, ReadCounts(Counts::default())) }.ok();
-    let first = read()?;
-    Some(Box::new(move || {
-        let now = read()?;
+impl PortWatch {
+    /// Of a port; `None` if it cannot be looked at.
+    pub fn new(port: &SerialStream) -> Option<PortWatch> {
+        Some(PortWatch::of(borrowed(port).try_clone_to_owned().ok()?))
+    }
+
+    /// Through a second handle of a port.
+    pub(super) fn of(handle: OwnedFd) -> PortWatch {
+        let first = counts(&handle);
+        PortWatch { handle, first }
+    }
+
+    /// Errors since the beginning; `None` for a port whose driver does not count (a pseudo-terminal, many USB adapters).
+    pub fn counters(&self) -> Option<UartCounters> {
+        let (first, now) = (self.first?, counts(&self.handle)?);
         let since = |now: i32, first: i32| now.wrapping_sub(first).unsigned_abs();
         Some(UartCounters {
             parity: since(now.parity, first.parity),
@@ -35,7 +44,19 @@ pub(super) fn count(handle: OwnedFd) -> Option<CountUart> {
             overrun: since(now.overrun, first.overrun) + since(now.buf_overrun, first.buf_overrun),
             breaks: since(now.brk, first.brk),
         })
-    }))
+    }
+
+    /// How the signals stand; `None` where the driver has none.
+    pub fn signals(&self) -> Option<PortSignals> {
+        // SAFETY: TIOCMGET fills one int.
+        let bits = unsafe { rustix::ioctl::ioctl(&self.handle, rustix::ioctl::Getter::<0x5415, u32>::new()) };
+        bits.ok().map(PortSignals)
+    }
+}
+
+fn counts(handle: &OwnedFd) -> Option<Counts> {
+    // SAFETY: TIOCGICOUNT fills one `serial_icounter_struct`, which `Counts` is, field by field.
+    unsafe { rustix::ioctl::ioctl(handle, ReadCounts(Counts::default())) }.ok()
 }
 
 /// Makes the driver switch the direction of an RS-485 transceiver by RTS, or leave it alone.
@@ -48,12 +69,6 @@ pub fn set_rs485(port: &SerialStream, mode: Rs485) -> io::Result<()> {
     let config = Rs485Config { flags, delays: [0; 2], padding: [0; 5] };
     // SAFETY: TIOCSRS485 reads and writes back one `serial_rs485`, which `Rs485Config` is, field by field.
     unsafe { rustix::ioctl::ioctl(borrowed(port), SetRs485(config)) }.map_err(io::Error::from)
-}
-
-/// The bits of the signals of a port; `None` where its driver has none.
-pub(super) fn signals(port: &SerialStream) -> Option<u32> {
-    // SAFETY: TIOCMGET fills one int.
-    unsafe { rustix::ioctl::ioctl(borrowed(port), rustix::ioctl::Getter::<0x5415, u32>::new()) }.ok()
 }
 
 /// Holds the data line low for a quarter of a second.
@@ -146,7 +161,8 @@ mod tests {
     #[tokio::test]
     async fn a_port_that_neither_counts_nor_switches_says_so() {
         let (port, _other) = SerialStream::pair().unwrap();
-        assert!(counter(&port).is_none());
+        let watch = PortWatch::new(&port).unwrap();
+        assert_eq!((watch.counters(), watch.signals()), (None, None));
         assert!(set_rs485(&port, Rs485::RtsHigh).is_err());
     }
 }

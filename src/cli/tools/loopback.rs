@@ -1,5 +1,7 @@
 //! `sightglass loopback`: does a unit, or a plug, send back what it is sent.
 
+use jiff::Timestamp;
+
 use super::{UnitArgs, exchange_lines, run};
 use crate::{
     bus::{diagnostics::PatternTally, frame::hex},
@@ -8,6 +10,7 @@ use crate::{
         diagnostics::{Diagnostic, Finding},
         event::Fault,
         line::Framing,
+        time::elapsed,
     },
 };
 
@@ -73,7 +76,10 @@ fn plug(args: &Args) -> Result<(), CliError> {
         | Finding::Object { .. }
         | Finding::Values { .. } => Vec::new(),
     })?;
-    match PatternTally::of_run(&run, bits).faults() {
+    let (tally, time) = (PatternTally::of_run(&run, bits), elapsed(run.started, Timestamp::now()).as_secs_f64());
+    let rate = tally.received as f64 / time.max(0.001);
+    say(&format!("{time:.1} s, {rate:.0} bytes a second with the pauses between the patterns"));
+    match tally.faults() {
         0 => Ok(()),
         faults => Err(CliError::Failed(format!("{faults} bytes did not come back as they were sent"))),
     }

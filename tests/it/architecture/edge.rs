@@ -116,6 +116,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("src/cli/tools/listen.rs", &["tasks", "clock", "process"]),
     ("src/cli/tools/listen/capture_file.rs", &["files"]),
     ("src/cli/tools/signals.rs", &["channels", "tasks", "files", "terminal", "clock", "process"]),
+    ("src/cli/tools/loopback.rs", &["clock"]),
     ("src/cli/tools/mod.rs", &["tasks", "files", "terminal", "clock", "process"]),
     ("src/cli/tools/network.rs", &["tasks", "process", "network"]),
     ("src/station/audit_queue.rs", &["channels", "clock"]),

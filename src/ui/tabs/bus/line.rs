@@ -162,6 +162,10 @@ fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) ->
         ];
         rows.extend(flow(t!("port"), dim, width, kinds.map(|(name, times)| count(name, u64::from(times)))));
     }
+    if let Some(signals) = counters.signals {
+        let state = |on| if on { t!("on") } else { t!("off") };
+        rows.extend(flow(t!("signals"), dim, width, signals.all().map(|(name, on)| value(cx, name, state(on)))));
+    }
     if counters.echoes {
         let words = t!("local echo: the adapter gives back what it sends (removed from answers)");
         rows.extend(flow(t!("port"), dim, width, [plain(words, cx.theme.normal())]));

@@ -154,7 +154,9 @@ impl Form {
                 _ => {}
             },
         }
-        if let (Tried::Request, 1, Some(function)) = (self.tried, self.at, FUNCTIONS.get(self.chosen(1))) {
+        if (self.tried, self.at) == (Tried::Request, 1)
+            && let Some(function) = FUNCTIONS.get(self.chosen(1))
+        {
             let own = functions::fields(*function, &self.fields[2..]);
             self.fields.splice(2.., own);
         }

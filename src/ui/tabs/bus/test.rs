@@ -153,14 +153,10 @@ impl Bench {
 /// long is followed at its end.
 fn begin(at: &LineView) -> usize {
     match at.status.test.as_ref().map(|run| &run.diagnostic) {
-        Some(Diagnostic::Loopback { .. } | Diagnostic::Scan(_) | Diagnostic::Sweep(_)) => usize::MAX,
-        Some(
-            Diagnostic::Send(_)
-            | Diagnostic::Pattern { .. }
-            | Diagnostic::Identify { .. }
-            | Diagnostic::Read { .. }
-            | Diagnostic::Write(_),
-        )
+        Some(Diagnostic::Loopback { .. } | Diagnostic::Pattern { .. } | Diagnostic::Scan(_) | Diagnostic::Sweep(_)) => {
+            usize::MAX
+        }
+        Some(Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_))
         | None => 0,
     }
 }

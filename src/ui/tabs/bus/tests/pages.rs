@@ -176,3 +176,40 @@ fn a_line_is_disconnected_from_its_page_and_from_the_mimic() {
         }
     }
 }
+
+#[test]
+fn the_only_field_of_a_test_is_typed() {
+    let clear = "\u{8}".repeat(3);
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Ti{clear}17"));
+    let expect = CommandKind::Test(L1, Diagnostic::Identify { unit: 17 });
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&expect));
+}
+
+#[test]
+fn a_plug_is_tested_after_a_question_and_its_faults_are_listed() {
+    let clear = "\u{8}".repeat(3);
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tp{clear}6⏎"));
+    assert!(screen(&mut model, 80, 24).contains("Sends bytes that are no Modbus"));
+    let effects = type_keys(&mut model, "y");
+    let diagnostic = Diagnostic::Pattern { bits: 8, count: 6 };
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, diagnostic.clone())));
+    let mut fixture = Fixture::traffic();
+    let came_back = |bytes: Vec<u8>| Finding::Bytes { bytes, response_time: None };
+    let conclusion = Finding::Conclusion("bytes are lost".to_owned());
+    let findings = vec![came_back(vec![0x55; 32]), came_back(vec![0xAA; 31]), conclusion];
+    fixture.line.test = Some(run(diagnostic, DiagnosticState::Done, 2, 2, findings));
+    let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 120, 40);
+    let pattern = "✗ pattern 2: 32 bytes sent, 31 received: 0 wrong, 1 missing, 0 more than sent";
+    assert!(shown.contains(pattern) && !shown.contains("pattern 1:") && shown.contains("bytes are lost"), "{shown}");
+}
+
+#[test]
+fn local_echo_and_signals_stand_on_the_page_of_the_line() {
+    let mut fixture = Fixture::traffic();
+    let mut report = fixture.line.report.as_deref().cloned().expect("the line has reported");
+    report.counters.echoes = true;
+    fixture.line.report = Some(Arc::new(report));
+    let shown = screen(&mut bus(&fixture, Theme::FULL, "l"), 120, 40);
+    assert!(shown.contains("local echo: the adapter gives back what it sends"), "{shown}");
+    assert!(shown.contains("RTS on") && shown.contains("CTS on") && shown.contains("DCD off"), "{shown}");
+}
