@@ -1,7 +1,9 @@
 //! The header: plant, lines, simulation, user and clock.
 
+use std::sync::Arc;
+
 use super::*;
-use crate::plant::time::elapsed;
+use crate::plant::{procedure::ProcedureRun, time::elapsed};
 use crate::{
     t,
     ui::{
@@ -67,6 +69,12 @@ pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool, lines: L
     if cx.snapshot.speed != 1.0 {
         parts.push((8, t!("speed ×{speed}", speed = cx.snapshot.speed), theme.strong()));
     }
+    let procedures = cx.def().procedures.iter().zip(&cx.snapshot.procedures);
+    let at_work = |run: &Option<Arc<ProcedureRun>>| run.as_ref().is_some_and(|run| run.at_work());
+    parts.extend(procedures.filter(|(_, run)| at_work(run)).map(|(def, _)| {
+        let words = t!("procedure {name}", name = fit(&def.name, 12));
+        (4, words, theme.strong())
+    }));
     let history = &cx.snapshot.history;
     if history.lost > 0 {
         parts.push((1, t!("{lost} records lost", lost = history.lost), theme.trouble()));
@@ -183,6 +191,20 @@ mod tests {
         check(&[2], 80, &["7 lines OK", "L3 DISCONNECTED"]);
         check(&[2, 3, 5], 80, &["8 lines, 3 failed"]);
         check(&[2, 3, 5], 60, &["8 lines, 3 failed"]);
+    }
+
+    #[test]
+    fn a_procedure_at_work_is_named() {
+        let mut fixture = Fixture::normal();
+        let at = crate::ui::fixture::now();
+        fixture.procedures[0] = Some(Arc::new(ProcedureRun::new("anna".into(), "tty1".into(), at)));
+        let name = fixture.def.procedures[0].name.clone();
+        for width in [80, 120] {
+            let snapshot = fixture.snapshot();
+            let mut model = Model::new(snapshot, crate::ui::theme::Theme::FULL, 1, crate::ui::fixture::session());
+            let shown = crate::ui::tests::screen(&mut model, width, 24);
+            assert!(shown.lines().next().unwrap_or_default().contains(&format!("procedure {name}")), "{shown}");
+        }
     }
 
     #[test]
