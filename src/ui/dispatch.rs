@@ -1,7 +1,7 @@
 //! What a key does: of a window, of the replay, of every tab, or of the shown tab.
 
 use super::*;
-use modal::{Next, TerminalSettings};
+use modal::{Next, Notice, TerminalSettings};
 use widgets::list::Motion;
 
 /// Choices of the palette that are remembered.
@@ -273,13 +273,14 @@ pub(super) fn fit_screen(model: &mut Model) {
 }
 
 /// A window that cannot be seen must not take keys, and none that gives commands opens where it may not be seen whole;
-/// the palette only leads on. What it held is dropped, nothing is done.
+/// the palette only leads on. What it held is dropped, nothing is done; and what is typed for it is no key of the tab.
 pub(super) fn close_unseen(model: &mut Model) {
     let small = model.small();
     let closes =
         |modal: &Modal| !modal.is_quit() && (small || !(modal.only_shows() || matches!(modal, Modal::Palette(_))));
     if Size::of(model.screen) <= Size::Compact && model.modal.take_if(|modal| closes(modal)).is_some() && !small {
-        model.note = Some(effects::needs_room().into());
+        let words = vec![effects::needs_room().to_owned()];
+        model.modal = Some(Modal::Notice(Notice::new(t!("too small"), words)));
     }
 }
 

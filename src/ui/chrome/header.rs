@@ -161,7 +161,10 @@ mod tests {
     use jiff::SignedDuration;
 
     use super::*;
-    use crate::ui::fixture::{Fixture, with_cx};
+    use crate::{
+        plant::procedure::ProcedureDef,
+        ui::fixture::{Fixture, with_cx},
+    };
 
     #[test]
     fn every_line_has_its_state_in_the_header() {
@@ -197,13 +200,15 @@ mod tests {
     fn a_procedure_at_work_is_named() {
         let mut fixture = Fixture::normal();
         let at = crate::ui::fixture::now();
-        fixture.procedures[0] = Some(Arc::new(ProcedureRun::new("anna".into(), "tty1".into(), at)));
-        let name = fixture.def.procedures[0].name.clone();
+        let (name, about) = ("fill".into(), String::new());
+        fixture.def.procedures =
+            vec![ProcedureDef { name, about, steps: Vec::new(), safe: Vec::new(), reference: None }];
+        fixture.procedures = vec![Some(Arc::new(ProcedureRun::new("anna".into(), "tty1".into(), at)))];
         for width in [80, 120] {
             let snapshot = fixture.snapshot();
             let mut model = Model::new(snapshot, crate::ui::theme::Theme::FULL, 1, crate::ui::fixture::session());
             let shown = crate::ui::tests::screen(&mut model, width, 24);
-            assert!(shown.lines().next().unwrap_or_default().contains(&format!("procedure {name}")), "{shown}");
+            assert!(shown.lines().next().unwrap_or_default().contains("procedure fill"), "{shown}");
         }
     }
 

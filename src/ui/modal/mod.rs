@@ -171,6 +171,7 @@ impl Modal {
     pub fn takes_text(&self) -> bool {
         match self {
             Modal::Confirm(confirm) => confirm.takes_text(),
+            Modal::Notice(notice) => notice.takes_text(),
             Modal::Choice(_) | Modal::TerminalSettings(_) => false,
             Modal::Palette(_)
             | Modal::Entry(_)
@@ -179,7 +180,6 @@ impl Modal {
             | Modal::Settings(_)
             | Modal::UserForm(_) => true,
             Modal::Help(_)
-            | Modal::Notice(_)
             | Modal::Guidance(_)
             | Modal::Why(_)
             | Modal::Faceplate(_)

@@ -68,6 +68,11 @@ impl Notice {
         Notice { title: title.into(), words, worry: true, scroll: Scroll::default() }
     }
 
+    /// What is typed for the window in whose place it stands is dropped: it is no key of a tab.
+    pub(super) fn takes_text(&self) -> bool {
+        self.worry
+    }
+
     /// A list without a worry.
     pub fn list(title: impl Into<String>, words: Vec<String>) -> Notice {
         Notice { title: title.into(), words, worry: false, scroll: Scroll::default() }
@@ -79,7 +84,8 @@ impl Notice {
             self.scroll.on(motion, rows, usize::from(cx.area.height.saturating_sub(4)));
         }
         match event.code {
-            KeyCode::Enter | KeyCode::Char('q') => Next::Close,
+            KeyCode::Enter => Next::Close,
+            KeyCode::Char('q') if !self.worry => Next::Close,
             _ => Next::Stay(Modal::Notice(self)),
         }
     }

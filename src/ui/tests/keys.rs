@@ -41,7 +41,9 @@ fn an_unreachable_device_is_named_before_anything_is_typed() {
         assert!(matches!(model.modal, Some(Modal::Notice(_))), "{keys}: {:?}", model.modal);
         let shown = screen(&mut model, 80, 24);
         assert!(shown.contains(expect), "{expect} is missing:\n{shown}");
+        let tab = model.tabs.shown;
         assert_eq!(sent_kind(&type_keys(&mut model, "70⏎")), None);
+        assert_eq!((model.tabs.shown, &model.modal), (tab, &None), "a typed number leads nowhere");
     };
     let mut silent = Fixture::normal();
     silent.devices[0].state = DeviceState::Down { since: fixture::now() };

@@ -190,11 +190,13 @@ fn a_small_screen_lists_values_and_alarms() {
         let has = |words: [&str; 3]| seen.lines().any(|line| words.iter().all(|word| line.contains(word)));
         assert!(has(["TIC-1.PV", "72.4 °C", "‹2›!"]) && has(["TIC-1.MV", "100.0 %", ""]), "{seen}");
         assert_eq!(type_keys(&mut model, "r"), []);
-        assert_eq!((&model.modal, model.note.is_some()), (&None, true), "nothing is written here");
-        type_keys(&mut model, "3");
+        assert!(matches!(model.modal, Some(Modal::Notice(_))), "nothing is written here");
+        type_keys(&mut model, "⎋3");
         assert!(screen(&mut model, width, height).lines().skip(1).any(|line| line.contains("TIC-1.PV")));
         type_keys(&mut model, "t");
         assert_eq!(model.tabs.shown, Tab::Alarms, "no key leads to a tab without room");
+        assert_eq!(type_keys(&mut model, "z30 min, a quiet pump⏎"), [], "what is typed for a window is no key");
+        assert_eq!((model.tabs.shown, &model.modal), (Tab::Alarms, &None));
         assert_eq!(sent_kind(&type_keys(&mut model, "a")), Some(&fixture.alarms[0].acknowledge()));
     }
 }

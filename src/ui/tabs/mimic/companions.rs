@@ -17,7 +17,7 @@ use crate::{
         def::Pen,
         record::{ActionRecord, AlarmRecord},
     },
-    report::ShiftReport,
+    report::{Period, ShiftReport},
     ui::{layout::Size, widgets::chart},
 };
 
@@ -102,7 +102,8 @@ impl Companions {
             let query = Query::Actions { from, to, limit };
             actions.extend(self.actions.ask(cx, (Tab::Mimic, number), every, timeout, query));
             if let Some(shift) = period::at(cx.def(), cx.now) {
-                let query = Query::Report { period: shift };
+                // What the shift has counted after a past moment belongs to a later one.
+                let query = Query::Report { period: Period { to: shift.to.min(cx.now), ..shift } };
                 actions.extend(self.shift.ask(cx, (Tab::Mimic, number), real(cx, SHIFT_EVERY_S), timeout, query));
             }
         }
@@ -201,6 +202,7 @@ mod tests {
     use super::*;
     use crate::{
         plant::{def::Priority, record::AlarmEvent},
+        report::testing::shift_report,
         ui::{
             Effect, Msg, QueryId,
             fixture::{Fixture, now},
@@ -258,14 +260,25 @@ mod tests {
                     Answer::Journal(vec![AlarmRecord::new(at, "TIC-1.PV", "temperature high", Priority::High, event)])
                 }
                 Query::Actions { .. } => Answer::Actions(Vec::new()),
+                Query::Report { period } => {
+                    assert_eq!(period.to, now(), "what is shown is not counted any further");
+                    Answer::Report(Box::new(shift_report()))
+                }
                 _ => Answer::Series(Vec::new()),
             };
             update(&mut model, Msg::Answer(id, Ok(answer)));
         }
         let shown = screen(&mut model, 120, 40);
-        for words in
-            ["needs action", "00:41  TIC-1.PV", "not normal", "last events", "14:01:50  ‹2›! TIC-1.PV", "last hour"]
-        {
+        for words in [
+            "needs action",
+            "00:41  TIC-1.PV",
+            "not normal",
+            "this shift",
+            "PM-1.E +12.50 kWh",
+            "last events",
+            "14:01:50  ‹2›! TIC-1.PV",
+            "last hour",
+        ] {
             assert!(shown.contains(words), "{words}: {shown}");
         }
     }
