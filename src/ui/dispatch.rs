@@ -280,7 +280,7 @@ pub(super) fn close_unseen(model: &mut Model) {
         |modal: &Modal| !modal.is_quit() && (small || !(modal.only_shows() || matches!(modal, Modal::Palette(_))));
     if Size::of(model.screen) <= Size::Compact && model.modal.take_if(|modal| closes(modal)).is_some() && !small {
         let words = vec![effects::needs_room().to_owned()];
-        model.modal = Some(Modal::Notice(Notice::new(t!("too small"), words)));
+        model.modal = Some(Modal::Notice(Notice::for_form(t!("too small"), words)));
     }
 }
 

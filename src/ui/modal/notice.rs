@@ -23,6 +23,8 @@ pub struct Notice {
     words: Vec<String>,
     /// The first line is why it is there.
     worry: bool,
+    /// It stands in the place of a window into which something is typed.
+    for_form: bool,
     scroll: Scroll,
 }
 
@@ -33,7 +35,7 @@ impl Notice {
         let why = Notice::why_unreachable(cx, device)?;
         let words =
             vec![t!("{name} is not responding", name = def.name), why, t!("Writing is not possible now.").to_owned()];
-        Some(Notice::new(def.name.clone(), words))
+        Some(Notice::for_form(def.name.clone(), words))
     }
 
     /// The same as one sentence.
@@ -58,24 +60,29 @@ impl Notice {
     /// Opens a form that ends in this command, or says why the present user may not give it, before anything is filled in.
     pub fn or(cx: &ViewContext, title: &str, kind: &CommandKind, window: Modal) -> UiAction {
         UiAction::Open(match rights::missing(cx, kind) {
-            Some(why) => Modal::Notice(Notice::new(title, vec![why])),
+            Some(why) => Modal::Notice(Notice::for_form(title, vec![why])),
             None => window,
         })
     }
 
     /// Words to be read, the first line as the worry.
     pub fn new(title: impl Into<String>, words: Vec<String>) -> Notice {
-        Notice { title: title.into(), words, worry: true, scroll: Scroll::default() }
+        Notice { title: title.into(), words, worry: true, for_form: false, scroll: Scroll::default() }
+    }
+
+    /// The same in the place of a window into which something would be typed.
+    pub fn for_form(title: impl Into<String>, words: Vec<String>) -> Notice {
+        Notice { for_form: true, ..Notice::new(title, words) }
     }
 
     /// What is typed for the window in whose place it stands is dropped: it is no key of a tab.
     pub(super) fn takes_text(&self) -> bool {
-        self.worry
+        self.for_form
     }
 
     /// A list without a worry.
     pub fn list(title: impl Into<String>, words: Vec<String>) -> Notice {
-        Notice { title: title.into(), words, worry: false, scroll: Scroll::default() }
+        Notice { title: title.into(), words, worry: false, for_form: false, scroll: Scroll::default() }
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
@@ -85,7 +92,7 @@ impl Notice {
         }
         match event.code {
             KeyCode::Enter => Next::Close,
-            KeyCode::Char('q') if !self.worry => Next::Close,
+            KeyCode::Char('q') if !self.for_form => Next::Close,
             _ => Next::Stay(Modal::Notice(self)),
         }
     }
