@@ -70,7 +70,7 @@ impl Effects {
     }
 }
 
-/// The state of the plant. The plant task owns it; everything else sees [`Snapshot`]s.
+/// The state of the plant. The plant task owns it; everything else sees [`Snapshot`](super::snapshot::Snapshot)s.
 #[derive(Debug, Clone)]
 pub struct Plant {
     def: Arc<PlantDef>,
