@@ -86,41 +86,98 @@ fn id_of(place: usize) -> ProcedureId {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
+    use std::{
+        path::Path,
+        sync::{Arc, Mutex},
+    };
 
     use jiff::Timestamp;
 
     use super::*;
     use crate::{
         bus::io::clock::Clock,
-        plant::command::{Command, CommandId, CommandStatus, Refusal},
+        plant::{
+            PlantDef,
+            command::{Command, CommandId, CommandStatus, Refusal},
+            procedure,
+            record::Record,
+        },
         profile::{self, Search},
         sim::{
             io::{SimulatorHandle, in_memory},
             simulator::Simulator,
         },
-        station::io as station,
+        station::{
+            Session,
+            io::{self as station, Station},
+        },
     };
+
+    /// Station, line and simulated tank in virtual time, with the end of each procedure as it is recorded.
+    fn tank() -> (Arc<PlantDef>, Clock, Station, Arc<Mutex<Vec<String>>>) {
+        let def = profile::load(Path::new("tank"), &Search::shipped()).expect("a shipped plant");
+        let time = Clock::starting_at(Timestamp::from_second(1_700_000_000).expect("a valid instant"), 1.0);
+        let simulator = SimulatorHandle::spawn_for(&def, Simulator::new(&def).expect("it has one"), time);
+        let ends = Arc::new(Mutex::new(Vec::new()));
+        let seen = ends.clone();
+        let observer = move |records: &[Record]| {
+            let ended = records.iter().filter_map(|record| match record {
+                Record::Action(action) if &*action.action == procedure::END => Some(action.outcome.to_string()),
+                _ => None,
+            });
+            seen.lock().expect("no test fails here").extend(ended);
+        };
+        let station = station::start_transient(def.clone(), time, in_memory(&def, &simulator), Box::new(observer));
+        (def, time, station, ends)
+    }
+
+    fn place_of(def: &PlantDef, name: &str) -> usize {
+        def.procedures.iter().position(|def| &*def.name == name).expect("it is shipped")
+    }
+
+    /// A command to start a procedure, given once everything was read that it needs.
+    async fn start(session: &mut Session, time: Clock, number: u32, place: usize) -> CommandStatus {
+        let read = |snapshot: &Snapshot| {
+            let tags = ["PLC-1.LT-1", "TIC-1.PV", "PLC-1.MAN.HEATER"].map(|name| snapshot.def.tag_named(name));
+            tags.iter().flatten().all(|tag| snapshot.sample(*tag).quality.is_good())
+        };
+        let seen = session.snapshots.wait_for(|snapshot| read(snapshot)).await.expect("it runs").clone();
+        let id = CommandId { terminal: session.terminal, number };
+        let command = Command::on(&seen, id, CommandKind::StartProcedure(id_of(place)));
+        CommandStatus::new(command, "anna", time.now())
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_station_that_stops_leaves_the_safe_state() {
+        let (def, time, station, ends) = tank();
+        let mut session = station.session("test");
+        let fill = place_of(&def, "fill-5l");
+        let status = start(&mut session, time, 1, fill).await;
+        station.commands.send(status).await.expect("it runs");
+        let opened = def.tag_named("PLC-1.MAN.SV-1").expect("a tag of the tank");
+        let is_open = |snapshot: &Snapshot| snapshot.sample(opened).good_value() == Some(1.0);
+        session.snapshots.wait_for(|snapshot| is_open(snapshot)).await.expect("the tank is drained");
+        station.stop().await;
+        let last = session.snapshots.borrow().clone();
+        assert_eq!(last.sample(opened).good_value(), Some(0.0), "the valve is closed");
+        let ends = ends.lock().expect("no test fails here").clone();
+        assert_eq!(ends.len(), 1, "{ends:?}");
+        assert!(
+            ends[0].starts_with("aborted by station, step ") && ends[0].ends_with("; safe state written"),
+            "{ends:?}"
+        );
+    }
 
     /// Station, line and simulated tank in virtual time: the tank is drained, cools, and holds five litres, as the plant file has it.
     #[tokio::test(start_paused = true)]
     async fn the_shipped_procedure_fills_five_litres() {
-        let def = profile::load(Path::new("tank"), &Search::shipped()).expect("a shipped plant");
-        let time = Clock::starting_at(Timestamp::from_second(1_700_000_000).expect("a valid instant"), 1.0);
-        let simulator = SimulatorHandle::spawn_for(&def, Simulator::new(&def).expect("it has one"), time);
-        let station = station::start_transient(def.clone(), time, in_memory(&def, &simulator), Box::new(|_| {}));
+        let (def, time, station, _) = tank();
         let mut session = station.session("test");
         let [level, pv, heater] =
             ["PLC-1.LT-1", "TIC-1.PV", "PLC-1.MAN.HEATER"].map(|name| def.tag_named(name).expect("a tag of the tank"));
-        let read = |snapshot: &Snapshot| [level, pv, heater].iter().all(|tag| snapshot.sample(*tag).quality.is_good());
-        let seen = session.snapshots.wait_for(|snapshot| read(snapshot)).await.expect("it runs").clone();
-        let fill = def.procedures.iter().position(|def| &*def.name == "fill-5l").expect("it is shipped");
-        let start = |number, place: usize| {
-            let id = CommandId { terminal: session.terminal, number };
-            let command = Command::on(&seen, id, CommandKind::StartProcedure(id_of(place)));
-            CommandStatus::new(command, "anna", time.now())
-        };
-        station.commands.send(start(1, fill)).await.expect("it runs");
+        let fill = place_of(&def, "fill-5l");
+        let status = start(&mut session, time, 1, fill).await;
+        station.commands.send(status).await.expect("it runs");
         let ended = |snapshot: &Snapshot| snapshot.procedures[fill].as_ref().is_some_and(|run| !run.at_work());
         let last = session.snapshots.wait_for(|snapshot| ended(snapshot)).await.expect("it runs").clone();
         let run = last.procedures[fill].as_deref().expect("it was started");
@@ -128,7 +185,8 @@ mod tests {
         let [level, pv, heater] = [level, pv, heater].map(|tag| last.sample(tag).good_value().expect("it is read"));
         assert!((10.0..10.3).contains(&level) && pv < 27.6 && heater == 0.0, "{level} cm, {pv} °C, heater {heater}");
         // Without a history nothing could be compared afterwards: what measures is refused before its first write.
-        station.commands.send(start(2, fill + 1)).await.expect("it runs");
+        let status = start(&mut session, time, 2, fill + 1).await;
+        station.commands.send(status).await.expect("it runs");
         let id = CommandId { terminal: session.terminal, number: 2 };
         let outcome = |snapshot: &Snapshot| {
             let status = snapshot.commands.iter().find(|status| status.command.id == id);

@@ -9,7 +9,8 @@
 //!                 └──> safe state: each of its writes once, whatever becomes of the others ──> failed or aborted
 //! ```
 //!
-//! A station that stops in the middle goes on with nothing: its successor shows the procedure as interrupted.
+//! A station that is stopped aborts its procedure first. One that is killed goes on with nothing: its successor shows the
+//! procedure as interrupted.
 
 mod run;
 
@@ -169,7 +170,7 @@ pub enum ProcedureEnd {
     Failed(StepFailure),
     /// By this operator.
     Aborted(Arc<str>),
-    /// The station stopped: no safe state was written.
+    /// The station ended before its safe state was written.
     Interrupted,
 }
 

@@ -5,7 +5,7 @@ mod process_load;
 pub(crate) mod report_files;
 pub mod reports;
 
-use std::{path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
     sync::{mpsc, watch},
@@ -25,11 +25,11 @@ use crate::{
     north::io::task::{self as north, NorthTask},
     plant::{
         Plant, PlantDef,
-        command::{BusRequest, CommandStatus},
+        command::{BusRequest, Command, CommandId, CommandKind, CommandStatus},
         event::Event,
         record::ChainHash,
         snapshot::HistoryStatus,
-        station::{FaultState, StationFault},
+        station::{FaultState, STATION, StationFault},
     },
     profile::PlantFile,
 };
@@ -52,6 +52,8 @@ const REQUESTS: usize = 16 + KEPT_FOR_STOPS;
 const COMMANDS_MAX: usize = 64;
 /// Live reads waiting for one line; a full queue refuses the query.
 const LIVE_MAX: usize = 16;
+/// At the end the safe state of a procedure is waited for so long: a write that gets no answer takes some timeouts.
+const SAFE_STATE_MAX: Duration = Duration::from_secs(10);
 /// What a station is started with.
 #[derive(Debug)]
 pub struct Options {
@@ -298,8 +300,29 @@ impl Station {
         self.acceptor.attach(Peer { from: "this process".into(), unix_user: Some(user.into()), in_process: true })
     }
 
-    /// Stops downstream and waits until the last record is on disk. Gives the last entry of the audit log.
+    /// Aborts the procedure at work while there are lines that its safe state is written over. Where that takes too long, it
+    /// ends as interrupted.
+    async fn abort_procedure(&self) {
+        let mut snapshots = self.acceptor.snapshots.clone();
+        let snapshot = snapshots.borrow().clone();
+        let Some((procedure, _)) = snapshot.procedure_at_work() else { return };
+        // Commands of the plant itself count from 1.
+        let id = CommandId { terminal: 0, number: 0 };
+        let command = Command::on(&snapshot, id, CommandKind::AbortProcedure(procedure));
+        let aborted = async {
+            // A plant that has ended has ended its procedure.
+            let _ = self.commands.send(CommandStatus::new(command, STATION, snapshot.at)).await;
+            let _ = snapshots.wait_for(|snapshot| snapshot.procedure_at_work().is_none()).await;
+        };
+        if tokio::time::timeout(SAFE_STATE_MAX, aborted).await.is_err() {
+            tracing::warn!("the safe state of the procedure at work was not written in time");
+        }
+    }
+
+    /// Writes the safe state of a procedure at work, stops downstream and waits until the last record is on disk. Gives the last
+    /// entry of the audit log.
     pub async fn stop(self) -> Option<ChainHash> {
+        self.abort_procedure().await;
         let Station { acceptor, commands, lifecycle, history, audit_writer, open: _, stop, tasks } = self;
         // The links may have ended already.
         let _ = stop.send(true);

@@ -23,6 +23,7 @@
 //! | line: cable, port | its values become bad, the port is opened again with backoff; a line alarm | answers come |
 //! | line: too much to do | process values are stretched alike, alarm inputs keep their period; the header says so | demand falls |
 //! | folder of reports: full, missing; command after a report fails | the report is tried again after 5 s to 10 min, the command five times | it works again |
+//! | the station is stopped, or killed, while a procedure is at work | stopped: its safe state is written first, within 10 s; killed: an alarm, and the procedure is shown as interrupted | an abort writes the safe state |
 //! | a line's task panics | started again after 1, 2, 5 s; the other lines do not notice | acknowledged |
 
 pub mod session;
