@@ -102,19 +102,21 @@ impl Session<'_> {
     async fn listen(&mut self, mut tap: Tap, clock: Clock) -> Result<(), CliError> {
         let end = self.args.time.map(|time| tokio::time::Instant::now() + time);
         let mut buffer = [0; 4096];
+        let stopped = tokio::signal::ctrl_c();
+        tokio::pin!(stopped);
         let result = loop {
             let silence = self.listener.silent_at().map(|at| elapsed(clock.utc(), at));
             let heard = tokio::select! {
-                // What has come is heard before a silence is.
+                // The end comes also where bytes never end; what has come is heard before a silence is.
                 biased;
+                _ = &mut stopped => break Ok(()),
+                () = tokio::time::sleep_until(end.unwrap_or_else(tokio::time::Instant::now)), if end.is_some() => break Ok(()),
                 read = tap.bytes.read(&mut buffer) => match read {
                     Ok(count @ 1..) => self.listener.hear(clock.utc(), &buffer[..count]),
                     Ok(0) => break Err(CliError::Failed("the port was closed by the other side".to_owned())),
                     Err(error) => break Err(CliError::Failed(format!("the port is gone: {error}"))),
                 },
                 () = tokio::time::sleep(silence.unwrap_or_default()), if silence.is_some() => self.listener.rest(clock.utc()),
-                () = tokio::time::sleep_until(end.unwrap_or_else(tokio::time::Instant::now)), if end.is_some() => break Ok(()),
-                _ = tokio::signal::ctrl_c() => break Ok(()),
             };
             heard.iter().for_each(|heard| self.on_heard(heard));
         };

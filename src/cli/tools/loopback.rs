@@ -35,9 +35,19 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let (line, unit) = args.of.line_and_unit()?;
     say(&format!("loopback 08/00 to unit {} on {}", unit, line.transport));
     let diagnostic = Diagnostic::Loopback { unit, data: 0xA537, count: args.count };
-    let run = run(&line, diagnostic, |finding| match finding {
-        Finding::Exchange(exchange) if args.of.verbose => exchange_lines(exchange),
-        Finding::Failed { what, fault } if !args.of.verbose => vec![format!("{what}: {fault}")],
+    let run = run(&line, diagnostic, |finding| lines(finding, args.of.verbose))?;
+    let refused = |fault: &Fault| matches!(fault, Fault::Exception(_));
+    let lost = |finding: &&Finding| matches!(finding, Finding::Failed { fault, .. } if !refused(fault));
+    let lost = run.findings.iter().filter(lost).count();
+    if lost == 0 { Ok(()) } else { Err(CliError::Failed(format!("{lost} of {} did not come back", args.count))) }
+}
+
+/// What is printed of a finding.
+fn lines(finding: &Finding, verbose: bool) -> Vec<String> {
+    match finding {
+        Finding::Exchange(exchange) if verbose => exchange_lines(exchange),
+        Finding::Bytes { bytes, .. } if verbose => vec![format!("RX {}", hex(bytes))],
+        Finding::Failed { what, fault } if !verbose => vec![format!("{what}: {fault}")],
         Finding::Conclusion(words) => vec![words.clone()],
         Finding::Exchange(_)
         | Finding::Written(_)
@@ -47,11 +57,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         | Finding::Unit { .. }
         | Finding::Object { .. }
         | Finding::Values { .. } => Vec::new(),
-    })?;
-    let refused = |fault: &Fault| matches!(fault, Fault::Exception(_));
-    let lost = |finding: &&Finding| matches!(finding, Finding::Failed { fault, .. } if !refused(fault));
-    let lost = run.findings.iter().filter(lost).count();
-    if lost == 0 { Ok(()) } else { Err(CliError::Failed(format!("{lost} of {} did not come back", args.count))) }
+    }
 }
 
 /// Patterns, each compared with what comes back.
@@ -64,18 +70,7 @@ fn plug(args: &Args) -> Result<(), CliError> {
     let diagnostic = Diagnostic::Pattern { bits, count: args.count };
     diagnostic.check().map_err(CliError::Usage)?;
     say(&format!("{diagnostic} on {}", line.transport));
-    let run = run(&line, diagnostic, |finding| match finding {
-        Finding::Bytes { bytes, .. } if args.of.verbose => vec![format!("RX {}", hex(bytes))],
-        Finding::Conclusion(words) => vec![words.clone()],
-        Finding::Exchange(_)
-        | Finding::Written(_)
-        | Finding::Swept(_)
-        | Finding::Failed { .. }
-        | Finding::Bytes { .. }
-        | Finding::Unit { .. }
-        | Finding::Object { .. }
-        | Finding::Values { .. } => Vec::new(),
-    })?;
+    let run = run(&line, diagnostic, |finding| lines(finding, args.of.verbose))?;
     let (tally, time) = (PatternTally::of_run(&run, bits), elapsed(run.started, Timestamp::now()).as_secs_f64());
     let rate = tally.received as f64 / time.max(0.001);
     say(&format!("{time:.1} s, {rate:.0} bytes a second with the pauses between the patterns"));

@@ -60,7 +60,16 @@ pub fn main(args: Args) -> Result<(), CliError> {
 }
 
 fn set(port: &mut SignalPort, signal: Signal, on: bool) -> Result<(), CliError> {
-    port.set(signal, on).map_err(CliError::io(format!("cannot set {signal:?}")))
+    port.set(signal, on).map_err(CliError::io(format!("cannot set {}", name(signal))))
+}
+
+/// As it is typed.
+fn name(signal: Signal) -> &'static str {
+    match signal {
+        Signal::Rts => "rts",
+        Signal::Dtr => "dtr",
+        Signal::Break => "break",
+    }
 }
 
 /// Prints what has changed.
@@ -68,8 +77,10 @@ async fn watch(port: &mut SignalPort, time: Option<Duration>) -> Result<(), CliE
     let end = time.map(|time| tokio::time::Instant::now() + time);
     let mut typed = commands();
     let mut shown = String::new();
+    let stopped = tokio::signal::ctrl_c();
+    tokio::pin!(stopped);
     loop {
-        let words = state(port);
+        let words = state(port)?;
         if words != shown {
             say(&words);
             shown = words;
@@ -78,7 +89,7 @@ async fn watch(port: &mut SignalPort, time: Option<Duration>) -> Result<(), CliE
             return Ok(());
         }
         tokio::select! {
-            _ = tokio::signal::ctrl_c() => return Ok(()),
+            _ = &mut stopped => return Ok(()),
             Some(line) = typed.recv() => match command(&line) {
                 Some((signal, on)) => set(port, signal, on)?,
                 None => say("expected rts on, rts off, dtr on, dtr off or break"),
@@ -89,12 +100,12 @@ async fn watch(port: &mut SignalPort, time: Option<Duration>) -> Result<(), CliE
 }
 
 /// The signals, and the breaks that were received.
-fn state(port: &SignalPort) -> String {
-    let signals = port.read().map_or_else(|| "the port is gone".to_owned(), |signals| signals.to_string());
-    match port.uart() {
+fn state(port: &SignalPort) -> Result<String, CliError> {
+    let signals = port.read().ok_or_else(|| CliError::Failed("the port is gone".to_owned()))?;
+    Ok(match port.uart() {
         Some(uart) => format!("{signals}   {} breaks received", uart.breaks),
-        None => signals,
-    }
+        None => signals.to_string(),
+    })
 }
 
 /// What a typed line sets.
