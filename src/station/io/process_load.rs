@@ -25,7 +25,7 @@ pub(crate) async fn run(clock: Clock, events: mpsc::Sender<Event>, mut stopped: 
             let (reading, now) = (Reading::take(), Instant::now());
             let seconds = now.duration_since(at).as_secs_f64();
             let load = match (&last, &reading) {
-                (Ok(last), Ok(reading)) => Some(reading.since(last, seconds)),
+                (Ok(last), Ok(reading)) => reading.since(last, seconds),
                 (Err(error), _) | (_, Err(error)) => {
                     tracing::debug!(%error, "the load of the program cannot be read");
                     None
@@ -75,17 +75,17 @@ impl Reading {
         })
     }
 
-    /// The load of so many seconds since the last reading.
-    fn since(&self, last: &Reading, seconds: f64) -> ProcessLoad {
+    /// The load of so many seconds since the last reading; `None` if the kernel has counted nothing.
+    fn since(&self, last: &Reading, seconds: f64) -> Option<ProcessLoad> {
         let waits =
             self.waits.iter().map(|(thread, waits)| waits - last.waits.get(thread).copied().unwrap_or(0).min(*waits));
         let (idle, all) = (self.idle.0 - last.idle.0, self.idle.1 - last.idle.1);
-        ProcessLoad {
+        (0.0 < all).then(|| ProcessLoad {
             cpu: to_f32((self.cpu - last.cpu) / seconds),
             wake_ups: to_f32(waits.sum::<u64>() as f64 / seconds),
-            idle: if all <= 0.0 { 1.0 } else { to_f32(idle / all) },
+            idle: to_f32(idle / all),
             memory: self.memory,
-        }
+        })
     }
 }
 
@@ -101,7 +101,8 @@ mod tests {
         // Thread 2 has ended, thread 3 is new, and the number of thread 1 was given to another.
         let second = reading(2.5, &[(1, 90), (3, 60)], (118.0, 220.0));
         let load = second.since(&first, 10.0);
-        assert_eq!(load, ProcessLoad { cpu: 0.15, wake_ups: 6.0, idle: 0.9, memory: 7 });
+        assert_eq!(load, Some(ProcessLoad { cpu: 0.15, wake_ups: 6.0, idle: 0.9, memory: 7 }));
+        assert_eq!(second.since(&second, 10.0), None);
     }
 
     #[test]
