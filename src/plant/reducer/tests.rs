@@ -50,6 +50,21 @@ fn command(number: u32, kind: CommandKind) -> CommandStatus {
     CommandStatus::new(Command::new(1, CommandId { terminal: 1, number }, kind), "anna", at(0))
 }
 
+/// Each operator action on record: who, what, which and its outcome.
+pub(super) fn actions(effects: &Effects) -> Vec<String> {
+    let action = |record: &Record| match record {
+        Record::Action(action) => Some(format!("{} {} {} {}", action.by, action.action, action.target, action.outcome)),
+        Record::Sample(..)
+        | Record::Alarm(_)
+        | Record::Line(_)
+        | Record::Batch(_)
+        | Record::Run(_)
+        | Record::Report(_)
+        | Record::ClockSet => None,
+    };
+    effects.records.iter().filter_map(action).collect()
+}
+
 /// A write by an operator who sees the plant's present values.
 fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> CommandStatus {
     let kind = CommandKind::Write { tag, value };

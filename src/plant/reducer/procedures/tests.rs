@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::*;
+use super::{super::tests::actions, *};
 use crate::plant::{
     command::BusRequest,
     control_run::{DURATION_MAX, Figure, RunCause, RunDef},
@@ -113,20 +113,6 @@ fn end(plant: &mut Plant, effects: &Effects, second: i64, result: fn(f64) -> Wri
     effects.bus.extend(more.bus);
     effects.records.extend(more.records);
     effects
-}
-
-fn actions(effects: &Effects) -> Vec<String> {
-    let action = |record: &Record| match record {
-        Record::Action(action) => Some(format!("{} {} {} {}", action.by, action.action, action.target, action.outcome)),
-        Record::Sample(..)
-        | Record::Alarm(_)
-        | Record::Line(_)
-        | Record::Batch(_)
-        | Record::Run(_)
-        | Record::Report(_)
-        | Record::ClockSet => None,
-    };
-    effects.records.iter().filter_map(action).collect()
 }
 
 /// Until it waits for PV.

@@ -1,6 +1,6 @@
 //! Restores as an operator sees them: in order, stopped by the first failure, and never over another's head.
 
-use super::*;
+use super::{super::tests::actions, *};
 use crate::plant::{
     command::BusRequest,
     def::{DeviceId, PlantDef},
@@ -118,20 +118,6 @@ fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> 
         });
     }
     plant.on_event(Event::Wrote { at: at(2), id, result: result(raw) })
-}
-
-fn actions(effects: &Effects) -> Vec<String> {
-    let action = |record: &Record| match record {
-        Record::Action(action) => Some(format!("{} {} {} {}", action.by, action.action, action.target, action.outcome)),
-        Record::Sample(..)
-        | Record::Alarm(_)
-        | Record::Line(_)
-        | Record::Batch(_)
-        | Record::Run(_)
-        | Record::Report(_)
-        | Record::ClockSet => None,
-    };
-    effects.records.iter().filter_map(action).collect()
 }
 
 #[test]

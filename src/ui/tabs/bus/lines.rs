@@ -16,7 +16,7 @@ const ROWS_MAX: usize = 8;
 /// plant file.
 pub fn order(cx: &ViewContext) -> Vec<LineId> {
     let mut lines: Vec<&LineDef> = cx.def().lines.iter().collect();
-    lines.sort_by_key(|line| (is_well(cx, line), down(cx, line.id) == 0));
+    lines.sort_by_cached_key(|line| (is_well(cx, line), down(cx, line.id) == 0));
     lines.into_iter().map(|line| line.id).collect()
 }
 
