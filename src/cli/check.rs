@@ -158,7 +158,7 @@ mod tests {
         def.tags.iter_mut().for_each(|tag| tag.poll = Poll::Every(std::time::Duration::from_millis(80)));
         let text = describe(&def, LineId(0)).join("\n");
         for part in [
-            "overloaded: the polls need",
+            "at worst the polls need",
             "then: polls of alarm inputs keep their period",
             "process values are read every",
         ] {

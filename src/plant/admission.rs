@@ -144,7 +144,7 @@ impl fmt::Display for Schedulability {
             Schedulability::Fits => f.write_str(t!("every poll meets its period")),
             Schedulability::TooMuch { utilisation } => {
                 let share = format!("{:.1}", utilisation * 100.0);
-                f.write_str(&t!("overloaded: the polls need {share} % of the line's time", share))
+                f.write_str(&t!("at worst the polls need {share} % of the line's time", share))
             }
             Schedulability::Blocked(overload) => overload.fmt(f),
         }

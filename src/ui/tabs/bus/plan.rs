@@ -173,7 +173,11 @@ fn summary(report: &LineReport) -> (String, bool) {
     };
     match &admission.schedulability {
         Schedulability::Fits => (t!("{words}: all periods are kept{refused}", words, refused), false),
-        Schedulability::TooMuch { .. } => (t!("! {words}: OVERLOADED, polls skipped{refused}", words, refused), true),
+        // The worst case is more than the line has; whether it comes to that, the schedule says.
+        Schedulability::TooMuch { .. } => match report.strain {
+            Some(_) => (t!("! {words}: OVERLOADED, polls skipped{refused}", words, refused), true),
+            None => (t!("! {words}: more than the line has{refused}", words, refused), true),
+        },
         Schedulability::Blocked(overload) => {
             let blocker = &overload.blocker.name;
             (t!("! {words}: some are delayed by {blocker}{refused}", words, blocker, refused), true)
@@ -259,4 +263,21 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
         lines.push(t!("! {fault}; {failed} of the last {of} failed", fault, failed, of));
     }
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ui::fixture::Fixture;
+
+    #[test]
+    fn only_what_is_skipped_is_said_to_be() {
+        let mut report = LineReport::new(Fixture::normal().def.lines[0].clone());
+        report.admission.schedulability = Schedulability::TooMuch { utilisation: 1.97 };
+        let (words, over) = summary(&report);
+        assert!(over && words.contains("more than the line has") && !words.contains("skipped"), "{words}");
+        report.strain = Some("line overloaded: identification polls skipped".to_owned());
+        let (words, over) = summary(&report);
+        assert!(over && words.contains("OVERLOADED, polls skipped"), "{words}");
+    }
 }
