@@ -18,6 +18,7 @@ mod help;
 mod history;
 mod decode;
 mod init;
+mod list;
 mod log;
 mod menu;
 mod mimic;

@@ -1,21 +1,14 @@
 //! `sightglass runs`: the control runs of a period with their figures.
 
-use std::path::PathBuf;
-
-use jiff::SignedDuration;
-
 use crate::{
     history::{Answer, Query},
-    report::control_runs,
+    report::{Period, control_runs},
 };
 
 use super::{
-    CliError, in_runtime, say,
-    source::{CsvArgs, HistoryArgs, unexpected},
+    CliError,
+    list::{ListArgs, Rows},
 };
-
-/// What is shown where no period is asked for.
-const SPAN: SignedDuration = SignedDuration::from_hours(7 * 24);
 
 const DEFINITIONS: &str = "\
 Without --shift and --from: the last 7 days.
@@ -36,26 +29,18 @@ Only good values count: what happened in a gap of more than ten seconds is unkno
 #[command(after_help = DEFINITIONS)]
 pub struct Args {
     #[command(flatten)]
-    history: HistoryArgs,
+    list: ListArgs,
     /// Only the runs of this controller
     #[arg(long, value_name = "DEVICE")]
     controller: Option<String>,
     /// The latest so many
     #[arg(long, value_name = "NUMBER", default_value_t = 100)]
     limit: usize,
-    /// Print JSON instead of lines
-    #[arg(long)]
-    json: bool,
-    /// Write CSV to this file instead, `-` for standard output: a row for each run
-    #[arg(long, value_name = "FILE", conflicts_with = "json")]
-    out: Option<PathBuf>,
-    #[command(flatten)]
-    csv: CsvArgs,
 }
 
 /// Prints or writes the runs.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let def = args.history.load()?;
+    let def = args.list.load()?;
     if def.runs.is_empty() {
         return Err(CliError::Usage(format!("{} has no controller with SV and PV", def.title)));
     }
@@ -65,21 +50,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
             return Err(CliError::Usage(format!("no controller `{name}`: expected one of {}", known.join(", "))));
         }
     }
-    if let Some(out) = &args.out {
-        args.history.refuse_own_file(&def, out)?;
-    }
-    in_runtime(async {
-        let (source, period) = args.history.open_latest(&def, SPAN).await?;
-        let query =
-            Query::ControlRuns { controller: args.controller, from: period.from, to: period.to, limit: args.limit };
-        let Answer::ControlRuns(runs) = source.query(query).await? else { return Err(unexpected()) };
-        match &args.out {
-            Some(out) => source.export(out, &control_runs::csv(&runs, &def, args.csv.dialect(&def))).await?,
-            None if args.json => {
-                say(&serde_json::to_string_pretty(&runs).expect("its keys are words and its numbers are finite"));
-            }
-            None => say(&control_runs::text(&runs, &def)),
-        }
-        Ok(())
-    })
+    let (controller, limit) = (args.controller, args.limit);
+    let of = |answer| if let Answer::ControlRuns(runs) = answer { Some(runs) } else { None };
+    let query = |period: Period| Query::ControlRuns { controller, from: period.from, to: period.to, limit };
+    args.list.write(&def, query, &Rows { of, csv: control_runs::csv, text: control_runs::text })
 }
