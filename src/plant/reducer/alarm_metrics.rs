@@ -51,7 +51,7 @@ impl Plant {
 mod tests {
     use std::time::Duration;
 
-    use super::*;
+    use super::{super::tests::alarm_events, *};
     use crate::plant::{
         event::Event,
         fixture::{self, DP, FAULT, PV, TIC},
@@ -66,17 +66,7 @@ mod tests {
         let values = vec![(DP, 0.0), (FAULT, 0.0), (PV, value)];
         let (device, texts, response_time) = (TIC, Vec::new(), Duration::from_millis(12));
         let event = Event::Read { at: at(second), device, values, texts, response_time, exchange: None };
-        let events = plant.on_event(event).records.into_iter().filter_map(|record| match record {
-            Record::Alarm(event) => Some(event),
-            Record::Sample(..)
-            | Record::Action(_)
-            | Record::Line(_)
-            | Record::Batch(_)
-            | Record::Run(_)
-            | Record::Report(_)
-            | Record::ClockSet => None,
-        });
-        events.collect()
+        alarm_events(plant.on_event(event))
     }
 
     #[test]

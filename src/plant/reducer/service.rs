@@ -85,7 +85,7 @@ mod tests {
 
     use jiff::Timestamp;
 
-    use super::*;
+    use super::{super::tests::recorded, *};
     use crate::plant::{
         command::Command,
         def::{Serial, Transport},
@@ -93,7 +93,7 @@ mod tests {
         event::Event,
         fixture,
         line_report::LineReport,
-        record::Record,
+        record::ActionRecord,
     };
 
     const L1: LineId = LineId(0);
@@ -136,22 +136,11 @@ mod tests {
     }
 
     fn actions(effects: &Effects) -> Vec<(String, String, String, String)> {
-        let action = |record: &Record| match record {
-            Record::Action(action) => Some((
-                action.by.to_string(),
-                action.action.to_string(),
-                action.new.as_deref().unwrap_or("").to_owned(),
-                action.outcome.to_string(),
-            )),
-            Record::Sample(..)
-            | Record::Alarm(_)
-            | Record::Line(_)
-            | Record::Batch(_)
-            | Record::Run(_)
-            | Record::Report(_)
-            | Record::ClockSet => None,
+        let words = |action: &ActionRecord| {
+            let new = action.new.as_deref().unwrap_or("").to_owned();
+            (action.by.to_string(), action.action.to_string(), new, action.outcome.to_string())
         };
-        effects.records.iter().filter_map(action).collect()
+        recorded(effects).map(words).collect()
     }
 
     #[test]

@@ -37,7 +37,7 @@ mod tests {
 
     use jiff::Timestamp;
 
-    use super::*;
+    use super::{super::tests::alarm_events, *};
     use crate::plant::{
         alarm::AlarmState,
         def::AlarmId,
@@ -59,17 +59,7 @@ mod tests {
     }
 
     fn tick(plant: &mut Plant, second: i64) -> Vec<AlarmRecord> {
-        let events = plant.on_tick(at(second)).records.into_iter().filter_map(|record| match record {
-            Record::Alarm(event) => Some(event),
-            Record::Sample(..)
-            | Record::Action(_)
-            | Record::Line(_)
-            | Record::Batch(_)
-            | Record::Run(_)
-            | Record::Report(_)
-            | Record::ClockSet => None,
-        });
-        events.collect()
+        alarm_events(plant.on_tick(at(second)))
     }
 
     #[test]

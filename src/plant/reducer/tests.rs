@@ -14,7 +14,7 @@ use crate::plant::{
     fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
     interlock::{InterlockCondition, InterlockDef},
     line_report::LineReport,
-    record::AlarmEvent,
+    record::{ActionRecord, AlarmEvent, AlarmRecord},
     sample::{Cause, Quality},
 };
 
@@ -50,19 +50,21 @@ fn command(number: u32, kind: CommandKind) -> CommandStatus {
     CommandStatus::new(Command::new(1, CommandId { terminal: 1, number }, kind), "anna", at(0))
 }
 
-/// Each operator action on record: who, what, which and its outcome.
+/// Each operator action on record.
+pub(super) fn recorded(effects: &Effects) -> impl Iterator<Item = &ActionRecord> {
+    effects.records.iter().filter_map(|record| if let Record::Action(action) = record { Some(action) } else { None })
+}
+
+/// The same as words: who, what, which and its outcome.
 pub(super) fn actions(effects: &Effects) -> Vec<String> {
-    let action = |record: &Record| match record {
-        Record::Action(action) => Some(format!("{} {} {} {}", action.by, action.action, action.target, action.outcome)),
-        Record::Sample(..)
-        | Record::Alarm(_)
-        | Record::Line(_)
-        | Record::Batch(_)
-        | Record::Run(_)
-        | Record::Report(_)
-        | Record::ClockSet => None,
-    };
-    effects.records.iter().filter_map(action).collect()
+    let words = |action: &ActionRecord| format!("{} {} {} {}", action.by, action.action, action.target, action.outcome);
+    recorded(effects).map(words).collect()
+}
+
+/// Each alarm event on record.
+pub(super) fn alarm_events(effects: Effects) -> Vec<AlarmRecord> {
+    let alarm = |record| if let Record::Alarm(event) = record { Some(event) } else { None };
+    effects.records.into_iter().filter_map(alarm).collect()
 }
 
 /// A write by an operator who sees the plant's present values.
