@@ -145,7 +145,7 @@ pub fn file<R>(make: impl FnOnce() -> R) -> R {
 
 /// A text as it is searched: without break points, and SARA AM always as one character.
 pub fn searchable(text: &str) -> String {
-    text.replace('\u{200b}', "").replace("\u{e4d}\u{e32}", "\u{e33}")
+    if text.is_ascii() { text.to_owned() } else { text.replace('\u{200b}', "").replace("\u{e4d}\u{e32}", "\u{e33}") }
 }
 
 /// The pattern with its `{name}`s replaced by the values.

@@ -87,19 +87,30 @@ struct Row {
     kind: &'static str,
     name: String,
     text: String,
-    /// All of its words, to be searched.
+    /// Name, text and kind, to be searched.
     words: String,
+    /// Bytes of the words that are the name, and the place of those that are the text.
+    parts: (usize, std::ops::Range<usize>),
 }
 
 impl Row {
     fn new(target: Target, kind: &'static str, name: &str, text: &str) -> Row {
-        Row {
-            target,
-            kind,
-            name: name.to_owned(),
-            text: text.to_owned(),
-            words: searchable(&format!("{name} {text} {kind}")),
-        }
+        let mut words = searchable(name);
+        let end = words.len();
+        words.push(' ');
+        words.push_str(&searchable(text));
+        let parts = (end, end + 1..words.len());
+        words.push(' ');
+        words.push_str(&searchable(kind));
+        Row { target, kind, name: name.to_owned(), text: text.to_owned(), words, parts }
+    }
+
+    fn name_words(&self) -> &str {
+        self.words.get(..self.parts.0).unwrap_or_default()
+    }
+
+    fn text_words(&self) -> &str {
+        self.words.get(self.parts.1.clone()).unwrap_or_default()
     }
 }
 
@@ -156,6 +167,10 @@ impl Palette {
         let text = searchable(&self.line.text());
         self.selected = 0;
         self.instant = instant(cx, &text);
+        if text.is_empty() {
+            self.found = (0..self.rows.len().min(FOUND_MAX)).collect();
+            return;
+        }
         let pattern = Pattern::parse(&text, CaseMatching::Ignore, Normalization::Smart);
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
@@ -165,14 +180,13 @@ impl Palette {
             // What is called so stands before what only mentions it, above all as a whole word at the end of its name.
             let is_last =
                 |name: &str| name.rsplit(['.', '-', ' ']).next().is_some_and(|part| part.eq_ignore_ascii_case(&text));
-            let exact = is_last(&row.name) || searchable(&row.text).eq_ignore_ascii_case(&text);
-            Some(all + fits(&searchable(&row.name)).unwrap_or(0) + if exact && !text.is_empty() { EXACT } else { 0 })
+            let exact = is_last(&row.name) || row.text_words().eq_ignore_ascii_case(&text);
+            Some(all + fits(row.name_words()).unwrap_or(0) + if exact { EXACT } else { 0 })
         };
         // Of those that fit alike a tag stands before its curve and its alarms.
-        let rank = |row: &Row| if text.is_empty() { 0 } else { row.target.rank() };
         let rows = self.rows.iter().enumerate();
         let mut found: Vec<(Reverse<u32>, u8, usize)> =
-            rows.filter_map(|(place, row)| Some((Reverse(score(row)?), rank(row), place))).collect();
+            rows.filter_map(|(place, row)| Some((Reverse(score(row)?), row.target.rank(), place))).collect();
         found.sort();
         self.found = found.into_iter().take(FOUND_MAX).map(|(.., place)| place).collect();
     }
