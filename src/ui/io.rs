@@ -4,6 +4,7 @@ mod append;
 mod files;
 mod preferences;
 mod screen;
+mod wire;
 #[cfg(test)]
 mod tests;
 

@@ -2,20 +2,22 @@
 
 use std::{
     cell::Cell as Flag,
-    io::{self, IsTerminal, Write},
+    io::{self, IsTerminal},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
 };
 
-use crossterm::{clipboard::CopyToClipboard, cursor, event, terminal};
-use ratatui::{
-    Frame, Terminal,
-    backend::{Backend, ClearType, CrosstermBackend, WindowSize},
-    buffer::Cell,
-    layout::{Position, Size},
+use crossterm::{
+    clipboard::CopyToClipboard,
+    cursor, event,
+    style::{Attribute, SetAttribute},
+    terminal,
 };
+use ratatui::{Frame, Terminal, backend::Backend};
+
+use super::wire::Wire;
 
 /// The terminal is in raw mode and shows our screen.
 static RAISED: AtomicBool = AtomicBool::new(false);
@@ -24,11 +26,6 @@ thread_local! {
     /// This thread is inside the terminal's own code: a panic now is the terminal's.
     static OWN: Flag<bool> = const { Flag::new(false) };
 }
-
-/// What a frame ends with, and the shorter words for the same.
-const TAIL: (&[u8], &[u8]) = (b"\x1b[39m\x1b[49m\x1b[59m\x1b[0m", b"\x1b[0m");
-/// Smaller frames cannot tear and are sent without the brackets of synchronized output.
-const TEAR_BYTES: usize = 96;
 
 /// A raised terminal. Dropping it restores what was there before.
 pub struct Screen {
@@ -138,6 +135,7 @@ fn restore() {
             io::stdout(),
             event::DisableMouseCapture,
             event::DisableBracketedPaste,
+            SetAttribute(Attribute::Reset),
             terminal::LeaveAlternateScreen,
             cursor::Show
         );
@@ -162,113 +160,4 @@ fn hook_panics() {
             before(info);
         }
     }));
-}
-
-/// A backend that gathers a frame's bytes, so that they travel in one write and an unchanged frame costs nothing.
-/// It asks the terminal nothing: an answer would arrive among the keys.
-struct Wire {
-    bytes: Vec<u8>,
-    size: Size,
-}
-
-impl Wire {
-    fn new() -> io::Result<Wire> {
-        let mut wire = Wire { bytes: Vec::new(), size: Size::default() };
-        wire.measure()?;
-        Ok(wire)
-    }
-
-    fn measure(&mut self) -> io::Result<()> {
-        let (width, height) = terminal::size()?;
-        self.size = Size::new(width, height);
-        Ok(())
-    }
-
-    fn send(&mut self) -> io::Result<()> {
-        if self.bytes.is_empty() {
-            return Ok(());
-        }
-        let frame = framed(&self.bytes);
-        self.bytes.clear();
-        let mut out = io::stdout().lock();
-        out.write_all(&frame)?;
-        out.flush()
-    }
-}
-
-/// The bytes of a frame as they are sent: in synchronized output unless it is tiny, with the shorter tail.
-fn framed(bytes: &[u8]) -> Vec<u8> {
-    let body = bytes.strip_suffix(TAIL.0).map_or_else(|| bytes.to_vec(), |body| [body, TAIL.1].concat());
-    if body.len() < TEAR_BYTES { body } else { [b"\x1b[?2026h".as_slice(), &body, b"\x1b[?2026l"].concat() }
-}
-
-impl Backend for Wire {
-    type Error = io::Error;
-
-    fn draw<'a, I>(&mut self, content: I) -> io::Result<()>
-    where
-        I: Iterator<Item = (u16, u16, &'a Cell)>,
-    {
-        let mut content = content.peekable();
-        if content.peek().is_none() {
-            return Ok(());
-        }
-        CrosstermBackend::new(&mut self.bytes).draw(content)
-    }
-    fn hide_cursor(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-    fn show_cursor(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-    fn get_cursor_position(&mut self) -> io::Result<Position> {
-        Ok(Position::ORIGIN)
-    }
-    fn set_cursor_position<P: Into<Position>>(&mut self, _position: P) -> io::Result<()> {
-        Ok(())
-    }
-    fn clear(&mut self) -> io::Result<()> {
-        CrosstermBackend::new(&mut self.bytes).clear()
-    }
-    fn clear_region(&mut self, region: ClearType) -> io::Result<()> {
-        CrosstermBackend::new(&mut self.bytes).clear_region(region)
-    }
-    fn size(&self) -> io::Result<Size> {
-        Ok(self.size)
-    }
-    fn window_size(&mut self) -> io::Result<WindowSize> {
-        Ok(WindowSize { columns_rows: self.size, pixels: Size::default() })
-    }
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_second_of_the_clock_costs_few_bytes() {
-        let mut wire = Wire { bytes: Vec::new(), size: Size::new(80, 24) };
-        let mut cell = Cell::default();
-        cell.set_char('7');
-        wire.draw([(77, 0, &cell)].into_iter()).expect("a vector takes every byte");
-        let frame = framed(&wire.bytes);
-        assert!(frame.len() < 20, "{} bytes", frame.len());
-        wire.bytes.clear();
-        wire.draw(std::iter::empty()).expect("a vector takes every byte");
-        assert!(wire.bytes.is_empty(), "an unchanged frame is not sent");
-    }
-
-    #[test]
-    fn without_colour_no_colour_byte_is_sent() {
-        let mut wire = Wire { bytes: Vec::new(), size: Size::new(80, 24) };
-        let mut cell = Cell::default();
-        cell.set_char('x').set_style(crate::ui::theme::Theme::PLAIN.focus());
-        wire.draw([(0, 0, &cell)].into_iter()).expect("a vector takes every byte");
-        let sent = String::from_utf8(framed(&wire.bytes)).expect("text");
-        assert!(sent.contains("\x1b[7m") && sent.contains("\x1b[1m"), "reverse and bold stay: {sent:?}");
-        assert!(!sent.contains("\x1b[3") && !sent.contains("\x1b[4"), "{sent:?}");
-    }
 }
