@@ -99,7 +99,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(code(KeyCode::Up), "", "select the pen above", Action::Move(Motion::Rows(-1))),
     Key::new(code(KeyCode::Down), "", "select the pen below", Action::Move(Motion::Rows(1))),
     Key::new(char('l'), "live", "back to the present", Action::Live),
-    Key::new(char('p'), "pause", "hold the picture, or back to the present", Action::Hold),
+    Key::new(char('p'), "pause", "pause, or back to the present", Action::Hold),
     Key::new(char('t'), "time", "go to a time: 03:12, 2026-11-20, or a period", Action::GoTo),
     Key::new(char('+'), "zoom", "shorter window", Action::Zoom(-1)),
     Key::new(char('='), "", "shorter window", Action::Zoom(-1)),

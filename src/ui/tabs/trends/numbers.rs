@@ -9,9 +9,13 @@ use crate::{
     ui::{layout::Size, theme::Glyphs},
 };
 
-/// Sizes of a letter, the largest first: columns, rows.
-const SIZES: [(PixelSize, (u16, u16)); 3] =
-    [(PixelSize::Full, (8, 8)), (PixelSize::HalfHeight, (8, 4)), (PixelSize::Quadrant, (4, 4))];
+/// The size of a letter: columns, rows.
+type Letters = (PixelSize, (u16, u16));
+
+/// The largest first.
+const SIZES: [Letters; 3] = [(PixelSize::Full, (8, 8)), (PixelSize::HalfHeight, (8, 4)), SMALL];
+/// Of units and setpoints.
+const SMALL: Letters = (PixelSize::Quadrant, (4, 4));
 /// Rows of a number beside its letters: name, setpoint and a blank.
 const AROUND: u16 = 3;
 
@@ -28,11 +32,16 @@ pub(super) fn draw_numbers(trends: &Trends, cx: &ViewContext, canvas: &mut Canva
     }
     let more = pens.len().saturating_sub(usize::from(rows) * columns);
     if more > 0 {
-        canvas.text_right(width.saturating_sub(1), 0, &t!("{more} more pens need more room", more), cx.theme.strong());
+        canvas.text_right(
+            width.saturating_sub(1),
+            0,
+            &t!("enlarge the screen for more pens: {more}", more),
+            cx.theme.strong(),
+        );
     }
 }
 
-/// One value: large only while it is good, so that a doubted one is not taken for it.
+/// One value with its setpoint: large only while it is good, so that a doubted one is not taken for it.
 fn number(cx: &ViewContext, canvas: &mut Canvas, tag: TagId) {
     let (theme, def) = (cx.theme, cx.def().tag(tag));
     let (quality, shown) = (cx.snapshot.sample(tag).quality, value::show(cx, tag));
@@ -45,26 +54,52 @@ fn number(cx: &ViewContext, canvas: &mut Canvas, tag: TagId) {
         canvas.text(end + 2, 0, &fit_words(&words, room), theme.alarm(of.priority, alarm.state, cx.flash()));
     }
     let (width, room) = (canvas.width(), canvas.height().saturating_sub(AROUND));
-    let letters = to_u16(shown.text.chars().count());
-    let fits = |(_, (columns, rows)): &&(PixelSize, (u16, u16))| {
-        letters.saturating_mul(*columns) + text::width(&shown.unit) + 3 <= width && *rows <= room
-    };
+    let (letters, unit) = (to_u16(shown.text.chars().count()), text::width(&shown.unit));
+    let fits = |(_, (columns, rows)): &&Letters| letters * *columns + unit + 3 <= width && *rows <= room;
     let size = SIZES.iter().find(fits).filter(|_| quality == Quality::Good && shown.text.is_ascii());
     let mut y = 1;
-    if let Some((size, (columns, rows))) = size {
-        let area = canvas.part(1, y, letters * columns, *rows).area();
-        let big = BigText::builder().pixel_size(*size).lines([shown.text.as_str().into()]).style(shown.style).build();
-        big.render(area, canvas.buffer());
-        if theme.glyphs == Glyphs::Ascii {
-            in_ascii(canvas, area);
-        }
+    if let Some(size) = size {
+        let (columns, rows) = size.1;
+        let end = 1 + letters * columns;
+        large(cx, canvas, (1, y), &shown.text, shown.style, size);
         y += rows;
-        canvas.text(2 + letters * columns, y - 1, &shown.unit, theme.strong());
+        let is_drawn = |letter: char| matches!(letter, ' '..='~' | '\u{a0}'..='\u{ff}');
+        if shown.unit.chars().all(is_drawn) && end + 1 + unit * SMALL.1.0 <= width {
+            large(cx, canvas, (end + 1, y - SMALL.1.1), &shown.unit, theme.strong(), &SMALL);
+        } else {
+            canvas.text(end + 1, y - 1, &shown.unit, theme.strong());
+        }
     } else {
         canvas.text(1, y + 1, &fit_words(&shown.whole(), width.saturating_sub(2)), shown.style);
         y += 2;
     }
-    canvas.text(1, y, &fit_words(&state(cx, tag), width.saturating_sub(2)), theme.normal());
+    let face = cx.def().devices.iter().filter_map(|device| device.faceplate.as_ref()).find(|face| face.pv == tag);
+    let mut state = quality.to_string();
+    if let Some(face) = face {
+        let sv = value::show(cx, face.sv_to_show());
+        let run = face.run.map(|run| value::show(cx, run).whole()).unwrap_or_default();
+        let set = t!("SV {value}", value = sv.text);
+        state = format!("{run}   {state}");
+        let is_good = cx.snapshot.sample(face.sv_to_show()).quality == Quality::Good;
+        let is_room = to_u16(set.len()) * SMALL.1.0 + 2 <= width && y + SMALL.1.1 + 2 <= canvas.height();
+        if is_good && set.is_ascii() && size.is_some() && is_room {
+            large(cx, canvas, (1, y + 1), &set, theme.normal(), &SMALL);
+            y += SMALL.1.1 + 1;
+        } else {
+            state = format!("{}   {state}", t!("SV {value}", value = sv.whole()));
+        }
+    }
+    canvas.text(1, y, &fit_words(&state, width.saturating_sub(2)), theme.normal());
+}
+
+/// A text in large letters, its upper left corner at a place.
+fn large(cx: &ViewContext, canvas: &mut Canvas, (x, y): (u16, u16), text: &str, style: Style, size: &Letters) {
+    let (columns, rows) = size.1;
+    let area = canvas.part(x, y, to_u16(text.chars().count()) * columns, rows).area();
+    BigText::builder().pixel_size(size.0).lines([text.into()]).style(style).build().render(area, canvas.buffer());
+    if cx.theme.glyphs == Glyphs::Ascii {
+        in_ascii(canvas, area);
+    }
 }
 
 /// The blocks of the letters as a sign of seven bits.
@@ -74,13 +109,4 @@ fn in_ascii(canvas: &mut Canvas, area: Rect) {
             cell.set_symbol("#");
         }
     }
-}
-
-/// `SV 70.0 °C   RUN`, of the controller that measures it; of another value its quality.
-fn state(cx: &ViewContext, tag: TagId) -> String {
-    let face = cx.def().devices.iter().filter_map(|device| device.faceplate.as_ref()).find(|face| face.pv == tag);
-    let Some(face) = face else { return cx.snapshot.sample(tag).quality.to_string() };
-    let set = t!("SV {value}", value = value::show(cx, face.sv_to_show()).whole());
-    let run = face.run.map(|run| value::show(cx, run).whole()).unwrap_or_default();
-    format!("{set}   {run}   {}", cx.snapshot.sample(tag).quality)
 }

@@ -78,7 +78,7 @@ fn large_numbers_are_good_numbers() {
         stand.press("B");
         let screen = stand.screen();
         assert!(blocks(&screen), "{width}x{height}:\n{screen}");
-        assert!(screen.contains("TIC-1.PV  process value") && screen.contains("SV 70.0 °C   RUN   good"), "{screen}");
+        assert!(screen.contains("TIC-1.PV  process value") && screen.contains("RUN   good"), "{screen}");
         let mut bad = Fixture::line_down();
         let tags: Vec<String> = bad.def.tags.iter().map(|tag| tag.name.clone()).collect();
         for name in tags {
