@@ -18,6 +18,7 @@ use crate::{
     access::SessionStatus,
     plant::{
         Snapshot,
+        alarm::AlarmState,
         def::{AlarmId, DeviceId, LineId, TagId},
         event::LineState,
         sample::{Cause, Quality},
@@ -117,9 +118,12 @@ fn facts(cx: &ViewContext) -> BTreeMap<Fact, (String, Option<Quality>)> {
         let state = device_label(status.state);
         (Fact::Device(device.id), t!("device {name}: {state}{why}", name = device.name, state, why))
     });
-    let fields = |line: String| line.split('\t').filter(|field| !field.is_empty()).collect::<Vec<_>>().join(", ");
-    let alarm = |line: String| t!("alarm: {line}", line = fields(line));
-    let alarms = snapshot.alarms.iter().map(|active| (Fact::Alarm(active.id), alarm(actions::line(cx, active))));
+    let alarm = |line: String| t!("alarm: {line}", line);
+    let alarms = snapshot.alarms.iter().map(|active| {
+        let fields = actions::fields(cx, active, alarm_label(active.state));
+        let fields: Vec<&str> = fields.iter().map(String::as_str).filter(|field| !field.is_empty()).collect();
+        (Fact::Alarm(active.id), alarm(fields.join(", ")))
+    });
     let suppressed = snapshot.suppressed.iter().map(|suppressed| {
         let state = translate(suppressed.state.word());
         let active = if suppressed.active { t!(" ACTIVE") } else { "" };
@@ -163,6 +167,20 @@ fn line_label(state: &LineState) -> String {
     }
 }
 
+/// The state of an alarm in full: the words of the lists are short, and are read out as letters.
+fn alarm_label(state: AlarmState) -> &'static str {
+    match state {
+        AlarmState::Unacknowledged => t!("active, not acknowledged"),
+        AlarmState::Acknowledged => t!("active, acknowledged"),
+        AlarmState::ReturnedToNormal => t!("returned to normal, not acknowledged"),
+        AlarmState::LatchedUnacknowledged => t!("returned to normal, latched, not acknowledged"),
+        AlarmState::LatchedAcknowledged => t!("returned to normal, latched, acknowledged"),
+        AlarmState::Normal | AlarmState::Shelved | AlarmState::SuppressedByDesign | AlarmState::OutOfService => {
+            translate(state.word())
+        }
+    }
+}
+
 fn device_label(state: DeviceState) -> &'static str {
     match state {
         DeviceState::Unknown => t!("not polled yet"),
@@ -191,7 +209,7 @@ mod tests {
             "station of Water tank",
             "line L1: connected",
             "device TIC-1: responding",
-            "TIC-1.PV, temperature high, UNACK",
+            "TIC-1.PV, temperature high, active, not acknowledged",
             "TIC-1.PV (process value): 72.4 °C, good",
         ] {
             let has = |line: &String| line.starts_with("2026-11-21T14:0") && line.contains(words);

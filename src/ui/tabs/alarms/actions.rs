@@ -177,19 +177,24 @@ fn name(cx: &ViewContext, alarm: AlarmId) -> String {
 
 /// Priority, subject, message, state, value and time of an alarm, separated by tabs.
 pub fn line(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
+    fields(cx, alarm, translate(alarm.state.word())).join("\t")
+}
+
+/// Priority, subject, message, state as the caller calls it, value and time of an alarm.
+pub fn fields(cx: &ViewContext, alarm: &ActiveAlarm, state: &str) -> [String; 6] {
     let def = cx.def().alarm(alarm.id);
     let value = match (def.subject, alarm.value) {
         (Subject::Tag(tag), Some(value)) => format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)),
         (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => String::new(),
     };
-    let words = [
-        translate(def.priority.word()),
-        &subject(cx, alarm.id),
-        translate(&def.message),
-        translate(alarm.state.word()),
-    ];
-    let at = text::stamp(alarm.raised_at, &cx.def().time_zone);
-    [words.join("\t"), value.trim_end().to_owned(), at].join("\t")
+    [
+        translate(def.priority.word()).to_owned(),
+        subject(cx, alarm.id),
+        translate(&def.message).to_owned(),
+        state.to_owned(),
+        value.trim_end().to_owned(),
+        text::stamp(alarm.raised_at, &cx.def().time_zone),
+    ]
 }
 
 /// Switches the bell off, or on for new alarms.
