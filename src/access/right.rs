@@ -72,8 +72,10 @@ pub fn of_command(kind: &CommandKind) -> Right {
 /// The right that a test of a line needs.
 fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
     match diagnostic {
-        // Raw bytes may be a write.
-        Diagnostic::Send(_) | Diagnostic::Write(_) | Diagnostic::Pattern { .. } => Right::Engineer,
+        // Raw bytes may be a write; with a signal the line is not polled, and a converter may lose its supply.
+        Diagnostic::Send(_) | Diagnostic::Write(_) | Diagnostic::Pattern { .. } | Diagnostic::Signal(_) => {
+            Right::Engineer
+        }
         // While other settings are tried the line is not polled.
         Diagnostic::Scan(scan) if !scan.serials.is_empty() => Right::Engineer,
         Diagnostic::Scan(_)
@@ -149,6 +151,7 @@ mod tests {
             diagnostics::Scan,
             fixture,
             parameter_set::{ParameterSet, PlannedChange},
+            port_signals::{OutputSignal, SignalTest},
             restore::RestoreRequest,
             tag::Table,
         },
@@ -227,6 +230,7 @@ mod tests {
         let scan =
             |serials| Diagnostic::Scan(Scan { first: 1, last: 9, serials, timeout: std::time::Duration::from_secs(1) });
         let serial = crate::plant::def::Serial::USUAL;
+        let signal = SignalTest { signal: OutputSignal::Rts, on: true, seconds: 1 };
         let technician = [
             CommandKind::Write { tag: TagId(1), value: 1.0 },
             CommandKind::Alarm(AlarmCommand::Acknowledge {
@@ -254,6 +258,7 @@ mod tests {
             CommandKind::SaveSettings(LineId(0)),
             CommandKind::Test(LineId(0), Diagnostic::Send(vec![1])),
             CommandKind::Test(LineId(0), scan(vec![serial])),
+            CommandKind::Test(LineId(0), Diagnostic::Signal(signal)),
         ];
         for (commands, role) in [(&technician[..], Role::Technician), (&supervisor[..], Role::Supervisor)] {
             for kind in commands {

@@ -126,7 +126,7 @@ pub fn admit(def: &PlantDef, line: LineId, blocks: &[Block]) -> Admission {
 
 /// What counts as the time of a device that has not answered yet.
 pub fn unseen(device: &DeviceDef) -> DeviceTime {
-    DeviceTime::new(device.response_time, SeenTime::default())
+    DeviceTime::new(&SeenTime::new(device.response_time))
 }
 
 /// The same with other settings of the line than those of the plant, and the times that its devices have taken.

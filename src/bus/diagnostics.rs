@@ -1,7 +1,9 @@
 //! Diagnostics of a line as pure step machines: which request is next, and what follows from its response.
 
+mod loopback;
 mod pattern;
 mod scan;
+mod signal;
 mod sweep;
 mod write;
 
@@ -17,6 +19,7 @@ use crate::plant::{
     event::Fault,
     live::AddressSpan,
     number::{to_u16, to_u32},
+    port_signals::{OutputSignal, PortSignals},
     tag::Table,
     traffic::Exchange,
 };
@@ -41,6 +44,10 @@ pub enum Ask {
     Message(Vec<u8>),
     /// A whole frame, good or bad.
     Raw(Vec<u8>),
+    /// Holds a signal, raised or lowered, until the next look at all of them.
+    Hold(OutputSignal, bool),
+    /// Puts what was held back as it was.
+    PutBack,
 }
 
 /// What a step has given.
@@ -50,6 +57,8 @@ pub enum StepResult {
     Answer(Result<Vec<u8>, Fault>, Arc<Exchange>),
     /// Every byte that came back, after raw bytes were sent.
     Bytes(Vec<u8>, Option<Duration>),
+    /// How the signals of the port stand, or why they cannot be set.
+    Signals(Result<PortSignals, String>),
 }
 
 /// A running diagnostic. Its steps are made one by one: a scan may have thousands.
@@ -102,9 +111,9 @@ impl Job {
         &self.run
     }
 
-    /// Does it need the line for itself, because it tries other serial parameters?
+    /// See [`Diagnostic::is_exclusive`].
     pub fn is_exclusive(&self) -> bool {
-        matches!(&self.run.diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty())
+        self.run.diagnostic.is_exclusive()
     }
 
     /// Does it ask so much that other requests must not wait for its end?
@@ -148,6 +157,8 @@ impl Job {
         let Some(step) = self.step.take() else { return };
         self.run.done += 1;
         match (&self.run.diagnostic, result) {
+            (_, StepResult::Signals(Ok(signals))) => self.on_signals(signals),
+            (_, StepResult::Signals(Err(why))) => self.run.state = DiagnosticState::Failed(why),
             (_, StepResult::Bytes(bytes, response_time)) => self.found(Finding::Bytes { bytes, response_time }),
             (Diagnostic::Scan(_), StepResult::Answer(answer, _)) => self.add_unit(&step, answer),
             (Diagnostic::Sweep(_), StepResult::Answer(answer, _)) => return self.on_swept(&step, answer),
@@ -165,7 +176,7 @@ impl Job {
         }
         self.run.total = self.run.done + to_u32(self.queued.len()) + (self.planned - self.made);
         self.advance();
-        if self.step.is_none() {
+        if self.step.is_none() && self.run.state == DiagnosticState::Running {
             self.conclude();
             self.run.state = DiagnosticState::Done;
         }
@@ -262,7 +273,7 @@ impl Job {
     fn conclude(&mut self) {
         self.conclude_corrupt_units();
         let summary = match &self.run.diagnostic {
-            Diagnostic::Loopback { .. } => loopback_words(&self.run.findings, self.run.done - 1),
+            Diagnostic::Loopback { .. } => loopback::conclusion(&self.run.findings, self.run.done - 1),
             Diagnostic::Scan(scan) => {
                 let units = self.run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
                 match units {
@@ -277,6 +288,7 @@ impl Job {
                 self.found(Finding::Conclusion(tally.to_string()));
                 tally.conclusion()
             }
+            Diagnostic::Signal(test) => signal::conclusion(test, &self.run.findings),
             Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_) => {
                 return;
             }
@@ -297,7 +309,7 @@ impl Job {
             Some((Ask::Message(request), Some(serial))) => format!("{} at {serial}", words(request)),
             Some((Ask::Message(request), None)) => words(request),
             Some((Ask::Raw(_), _)) => "bytes as they are".into(),
-            None => String::new(),
+            Some((Ask::Hold(..) | Ask::PutBack, _)) | None => String::new(),
         };
     }
 }
@@ -312,6 +324,7 @@ fn steps_in(diagnostic: &Diagnostic) -> u32 {
         Diagnostic::Write(_) => write::STEPS,
         Diagnostic::Scan(scan) => scan::steps_in(scan),
         Diagnostic::Sweep(sweep) => sweep.addresses(),
+        Diagnostic::Signal(test) => test.looks() + 1,
     }
 }
 
@@ -335,6 +348,7 @@ fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
         Diagnostic::Write(write) => write::step_of(write, n),
         Diagnostic::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
         Diagnostic::Scan(scan) => scan::step_of(scan, n),
+        Diagnostic::Signal(test) => signal::step_of(test, n),
         // Each of its steps follows from the response to the one before.
         Diagnostic::Sweep(sweep) => step(read(sweep.unit, sweep.table, sweep.first, sweep.block())),
     }
@@ -354,24 +368,6 @@ fn words(request: &[u8]) -> String {
     match request {
         [unit, function, ..] => format!("unit {unit}, function {function} / 0x{function:02X}"),
         _ => String::new(),
-    }
-}
-
-fn loopback_words(findings: &[Finding], sent: u32) -> String {
-    let replies: Vec<Duration> = findings
-        .iter()
-        .filter_map(|finding| match finding {
-            Finding::Exchange(exchange) => exchange.outcome.is_ok().then_some(exchange.response_time).flatten(),
-            _ => None,
-        })
-        .collect();
-    let ms = |span: Option<&Duration>| span.map_or(0.0, |span| span.as_secs_f64() * 1e3);
-    let (least, most) = (ms(replies.iter().min()), ms(replies.iter().max()));
-    let refused = findings.iter().any(|finding| matches!(finding, Finding::Failed { fault: Fault::Exception(_), .. }));
-    match replies.len() {
-        0 if refused => "the unit responds, but does not support loopback: line and unit work".to_owned(),
-        0 => format!("none of {sent} came back"),
-        back => format!("{back} of {sent} came back, {least:.1} to {most:.1} ms"),
     }
 }
 

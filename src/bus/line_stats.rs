@@ -69,7 +69,7 @@ impl LineStats {
         LineStats {
             polls: vec![RequestStats::default(); blocks.len()],
             devices: devices.iter().map(|device| (device.id, RequestStats::default())).collect(),
-            seen: devices.iter().map(|device| (device.id, SeenTime::default())).collect(),
+            seen: devices.iter().map(|device| (device.id, SeenTime::new(device.response_time))).collect(),
             dispatch: Spread::default(),
             busy: VecDeque::new(),
             open: (0.0, 0.0),
@@ -123,8 +123,8 @@ impl LineStats {
 
     /// What a device takes for a response.
     fn time_of(&self, device: &DeviceDef) -> DeviceTime {
-        let seen = self.seen.iter().find(|(id, _)| *id == device.id).map(|(_, seen)| *seen);
-        DeviceTime::new(device.response_time, seen.unwrap_or_default())
+        let seen = self.seen.iter().find(|(id, _)| *id == device.id);
+        seen.map_or_else(|| admission::unseen(device), |(_, seen)| DeviceTime::new(seen))
     }
 
     /// The admission test again, if a device has taken longer than it counts with.
@@ -167,7 +167,7 @@ impl LineStats {
     /// The line has other settings: what reads have taken before is not measured against their worst case.
     pub fn forget_times(&mut self) {
         self.polls.iter_mut().for_each(|stats| stats.read_time = Spread::default());
-        self.seen.iter_mut().for_each(|(_, seen)| *seen = SeenTime::default());
+        self.seen.iter_mut().for_each(|(_, seen)| seen.clear());
     }
 
     /// Nothing is connected: nothing is busy.

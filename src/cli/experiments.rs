@@ -1,8 +1,15 @@
 //! `sightglass experiments`: the six experiments of the thesis on the simulated rig, beside what the thesis measured.
 
-use crate::sim::experiment::{self, Experiment, Milestones, Recorded, THESIS};
+use std::path::Path;
 
 use super::{CliError, say};
+use crate::{
+    profile,
+    sim::experiment::{self, Experiment, Milestones, Recorded},
+};
+
+/// The shipped plant that has them as procedures, with the figures of the thesis.
+const PLANT: &str = "tank";
 
 const DEFINITIONS: &str = "\
 5 l of water at 27 °C, agitator on, SV 70 °C, one hour recorded, one value a second, all in virtual time. One set of
@@ -33,11 +40,15 @@ struct Row {
 
 /// Runs all six and prints them.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let recordings = THESIS.map(|experiment| experiment::record(&experiment.control));
-    let here = |place: usize| experiment::measure(&recordings[place]);
-    let rows: [Row; 6] = std::array::from_fn(|place| Row { experiment: THESIS[place], here: here(place) });
+    let def = profile::load(Path::new(PLANT), &profile::Search::shipped()).expect("a shipped plant is right");
+    let run = |experiment: Experiment| {
+        let recording = experiment::record(&experiment.control);
+        let here = experiment::measure(experiment.control.sv_c, &recording);
+        (Row { experiment, here }, recording)
+    };
+    let (rows, recordings): (Vec<Row>, Vec<Vec<Recorded>>) = experiment::of_plant(&def).into_iter().map(run).unzip();
     let lines = match (args.curves, args.csv) {
-        (true, _) => curves(&recordings),
+        (true, _) => curves(&rows, &recordings),
         (false, true) => csv(&rows),
         (false, false) => table(&rows),
     };
@@ -64,16 +75,17 @@ fn csv(rows: &[Row]) -> Vec<String> {
         .collect()
 }
 
-fn curves(recordings: &[Vec<Recorded>; 6]) -> Vec<String> {
-    let names = THESIS.map(|Experiment { control, .. }| format!("{0} pv_c,{0} mv_percent", control.name));
-    let rows = (0..recordings[0].len()).map(|second| {
-        let values = recordings.each_ref().map(|recording| {
+fn curves(rows: &[Row], recordings: &[Vec<Recorded>]) -> Vec<String> {
+    let name = |row: &Row| format!("{0} pv_c,{0} mv_percent", row.experiment.control.name);
+    let names: Vec<String> = rows.iter().map(name).collect();
+    let seconds = (0..recordings.first().map_or(0, Vec::len)).map(|second| {
+        let value = |recording: &Vec<Recorded>| {
             let Recorded { pv_c, mv_percent, .. } = recording[second];
             format!("{pv_c:.2},{mv_percent:.1}")
-        });
-        format!("{second},{}", values.join(","))
+        };
+        format!("{second},{}", recordings.iter().map(value).collect::<Vec<_>>().join(","))
     });
-    std::iter::once(format!("second,{}", names.join(","))).chain(rows).collect()
+    std::iter::once(format!("second,{}", names.join(","))).chain(seconds).collect()
 }
 
 fn table(rows: &[Row]) -> Vec<String> {
@@ -81,7 +93,7 @@ fn table(rows: &[Row]) -> Vec<String> {
         "                              first at SV              steady from          overshoot °C".into(),
         "control      P     I     D    here  thesis           here  thesis           here  thesis".into(),
     ];
-    lines.extend(rows.iter().map(|Row { experiment: Experiment { control, thesis }, here }| {
+    lines.extend(rows.iter().map(|Row { experiment: Experiment { control, reference: thesis }, here }| {
         format!(
             "{:10} {:3} {:5} {:5}   {}   {}   {:4}  {:6}",
             control.name,
@@ -117,7 +129,7 @@ fn off_percent(here: Option<u32>, thesis: Option<u32>) -> Option<f64> {
 /// The goal, and everything that misses it.
 fn verdict(rows: &[Row]) -> Vec<String> {
     let mut misses = Vec::new();
-    for Row { experiment: Experiment { control, thesis }, here } in rows {
+    for Row { experiment: Experiment { control, reference: thesis }, here } in rows {
         let times = [
             ("first at SV", here.first_at_sv_s, thesis.first_at_sv_s),
             ("steady from", here.steady_from_s, thesis.steady_from_s),
@@ -135,7 +147,7 @@ fn verdict(rows: &[Row]) -> Vec<String> {
             misses.push(format!("{} overshoot", control.name));
         }
     }
-    if order(rows, |row| row.here) != order(rows, |row| row.experiment.thesis) {
+    if order(rows, |row| row.here) != order(rows, |row| row.experiment.reference) {
         misses.push("the order by first at SV".into());
     }
     let goal = "Goal: every time within 10 %, every overshoot within 1 °C, the order by first at SV kept";
@@ -143,7 +155,7 @@ fn verdict(rows: &[Row]) -> Vec<String> {
         [] => format!("{goal}: all met."),
         misses => format!("{goal}. Missed: {}.", misses.join("; ")),
     }];
-    let first = |name: &str| rows.iter().find(|row| row.experiment.control.name == name)?.here.first_at_sv_s;
+    let first = |name: &str| rows.iter().find(|row| *row.experiment.control.name == *name)?.here.first_at_sv_s;
     if first("fuzzy") == first("auto-tuned") {
         lines.extend(TIE.lines().map(str::to_owned));
     }
@@ -168,21 +180,21 @@ The thesis gives one run of each; mains, room and cold water of the day are not 
 fn order(rows: &[Row], outcome: impl Fn(&Row) -> Milestones) -> Vec<&str> {
     let mut names: Vec<&Row> = rows.iter().collect();
     names.sort_by_key(|row| outcome(row).first_at_sv_s.unwrap_or(u32::MAX));
-    names.into_iter().map(|row| row.experiment.control.name).collect()
+    names.into_iter().map(|row| &*row.experiment.control.name).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn rows(change: impl Fn(usize, &mut Milestones)) -> [Row; 6] {
-        let mut number = 0;
-        THESIS.map(|experiment| {
-            let mut here = experiment.thesis;
+    fn rows(change: impl Fn(usize, &mut Milestones)) -> Vec<Row> {
+        let def = profile::load(Path::new(PLANT), &profile::Search::shipped()).expect("a shipped plant is right");
+        let row = |(number, experiment): (usize, Experiment)| {
+            let mut here = experiment.reference;
             change(number, &mut here);
-            number += 1;
             Row { experiment, here }
-        })
+        };
+        experiment::of_plant(&def).into_iter().enumerate().map(row).collect()
     }
 
     #[test]
@@ -196,7 +208,8 @@ mod tests {
     #[test]
     fn the_curves_have_a_row_a_second_and_two_columns_a_control() {
         let recorded = |second| Recorded { second, pv_c: 27.0 + f64::from(second), mv_percent: 100.0 };
-        let lines = curves(&std::array::from_fn(|_| (0..3).map(recorded).collect()));
+        let recordings: Vec<Vec<Recorded>> = (0..6).map(|_| (0..3).map(recorded).collect()).collect();
+        let lines = curves(&rows(|_, _| {}), &recordings);
         assert!(lines[0].starts_with("second,P pv_c,P mv_percent,PI pv_c,"), "{}", lines[0]);
         assert_eq!(lines.len(), 4);
         assert!(lines[3].starts_with("2,29.00,100.0,29.00,") && lines[3].split(',').count() == 13, "{}", lines[3]);

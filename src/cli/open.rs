@@ -238,6 +238,7 @@ fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
         | Finding::Failed { .. }
         | Finding::Written(_)
         | Finding::Swept(_)
+        | Finding::Signals { .. }
         | Finding::Conclusion(_) => None,
     })
 }
@@ -254,6 +255,7 @@ fn trace(run: &DiagnosticRun) -> Option<String> {
         | Finding::Values { .. }
         | Finding::Written(_)
         | Finding::Swept(_)
+        | Finding::Signals { .. }
         | Finding::Conclusion(_) => None,
     })
 }

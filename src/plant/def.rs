@@ -16,6 +16,7 @@ pub use super::{
     line::{Framing, LineDef, Serial, Transport},
     mimic_def::{MimicDef, MimicPage, Picture},
     north_def::{MqttDef, NorthDef, PasswordSource, TlsRoots},
+    output::Output,
     procedure::{ProcedureDef, ProcedureStep, Reference},
     report_def::{CsvDialect, Paper, ReportDef, Section},
     role::{Reauthentication, Role},
@@ -165,6 +166,8 @@ pub struct DeviceDef {
     pub functions: Vec<u8>,
     /// Names of the states that function 07 reads, by bit; what they mean is the device's own.
     pub exception_status: Vec<(u8, String)>,
+    /// What its output is at the terminals; `None` where neither plant file nor profile says.
+    pub output: Option<Output>,
     /// Least silence between two requests to this device (the PXR wants 10 ms).
     pub gap: Duration,
     /// Quiet time after a write before the next request.
@@ -198,6 +201,7 @@ impl DeviceDef {
             limits: Limits { gap_registers_max: 0, ..Limits::STANDARD },
             functions: Vec::new(),
             exception_status: Vec::new(),
+            output: None,
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             response_time: None,

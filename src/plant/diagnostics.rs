@@ -9,8 +9,9 @@ use serde::{Deserialize, Serialize};
 use super::{
     command::{CommandId, Outcome},
     event::Fault,
-    line::Serial,
+    line::{LineDef, Serial},
     line_check::{TIMEOUT_MIN, WAIT_MAX},
+    port_signals::{HOLD_MAX_S, PortSignals, SignalTest},
     sweep::{Sweep, SweptRange},
     tag::Table,
     traffic::Exchange,
@@ -70,9 +71,35 @@ pub enum Diagnostic {
     Sweep(Sweep),
     /// Writes registers or bits once, and reads them back.
     Write(RegisterWrite),
+    /// Sets a signal of the port by hand, and puts it back.
+    Signal(SignalTest),
 }
 
 impl Diagnostic {
+    /// Does it need the line for itself? Then nothing is polled meanwhile.
+    pub fn is_exclusive(&self) -> bool {
+        match self {
+            Diagnostic::Scan(scan) => !scan.serials.is_empty(),
+            Diagnostic::Signal(_) => true,
+            Diagnostic::Send(_)
+            | Diagnostic::Loopback { .. }
+            | Diagnostic::Pattern { .. }
+            | Diagnostic::Identify { .. }
+            | Diagnostic::Read { .. }
+            | Diagnostic::Sweep(_)
+            | Diagnostic::Write(_) => false,
+        }
+    }
+
+    /// The same as [`Diagnostic::check`], and whether a line with these settings can carry it.
+    pub fn check_on(&self, line: &LineDef) -> Result<(), String> {
+        self.check()?;
+        match self {
+            Diagnostic::Signal(test) => test.check_on(line),
+            _ => Ok(()),
+        }
+    }
+
     /// Can a line carry it? `Err` says why not. A line is never busy with one step for longer than `WAIT_MAX`.
     pub fn check(&self) -> Result<(), String> {
         let within = |what: &str, found: usize, most: usize| match found {
@@ -93,6 +120,7 @@ impl Diagnostic {
             Diagnostic::Scan(scan) => scan.check(),
             Diagnostic::Sweep(sweep) => sweep.check(),
             Diagnostic::Write(write) => write.check(),
+            Diagnostic::Signal(test) => within("seconds", usize::from(test.seconds), usize::from(HOLD_MAX_S)),
         }
     }
 }
@@ -125,6 +153,7 @@ impl std::fmt::Display for Diagnostic {
                 let table = translate(table.word());
                 f.write_str(&t!("map of unit {unit} {table} {first} to {last}", unit, table, first, last))
             }
+            Diagnostic::Signal(test) => test.fmt(f),
             Diagnostic::Write(RegisterWrite { unit, table, address, words, expected, .. }) => {
                 let text = |words: &[u16]| words.iter().map(u16::to_string).collect::<Vec<_>>().join(" ");
                 let (place, old, new) = (table.modicon(*address), text(expected), text(words));
@@ -299,6 +328,13 @@ pub enum Finding {
     },
     /// How a write has ended.
     Written(Outcome),
+    /// The signals of the port, at first, whenever one has changed, and when it is put back.
+    Signals {
+        /// So long after it was set.
+        after: Duration,
+        /// How they stand.
+        signals: PortSignals,
+    },
     /// Addresses that a sweep has found to have the same outcome.
     Swept(SweptRange),
     /// A step failed.

@@ -31,6 +31,7 @@ pub(crate) mod poll_class;
 pub(crate) mod confidence;
 pub(crate) mod store_policy;
 pub(crate) mod scale;
+pub mod output;
 pub mod parameter_set;
 pub(crate) mod admission;
 pub mod port_signals;

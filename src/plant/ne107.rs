@@ -62,8 +62,8 @@ pub enum Reason {
     },
     /// It takes longer itself than its profile states: the worst case of its polls is no longer what it was at load.
     AboveStated {
-        /// So long of late.
-        lately: Duration,
+        /// The greatest of its latest responses.
+        measured: Duration,
         /// What the profile states.
         stated: Duration,
     },
@@ -90,6 +90,11 @@ pub enum Reason {
 }
 
 impl Reason {
+    /// A device that is slower than its profile states.
+    pub fn above_stated(time: DeviceTime) -> Option<Reason> {
+        Some(Reason::AboveStated { measured: time.above_stated?, stated: time.stated? })
+    }
+
     /// Which signal it gives.
     pub fn signal(self) -> Signal {
         match self {
@@ -114,9 +119,9 @@ impl fmt::Display for Reason {
                 p99 = p99.as_millis(),
                 timeout = timeout.as_millis()
             )),
-            Reason::AboveStated { lately, stated } => f.write_str(&t!(
-                "takes {lately} ms for a response, its profile states {stated} ms",
-                lately = lately.as_millis(),
+            Reason::AboveStated { measured, stated } => f.write_str(&t!(
+                "takes up to {measured} ms for a response, its profile states {stated} ms",
+                measured = measured.as_millis(),
                 stated = stated.as_millis()
             )),
             Reason::Failing { failed, of } => f.write_str(&t!("{failed} of {of} requests failed", failed, of)),
@@ -174,10 +179,7 @@ pub fn evaluate(input: DiagnosisInput) -> Option<Reason> {
         DeviceState::Down { .. } => Some(Reason::Down),
         DeviceState::Unknown => None,
         DeviceState::Responding | DeviceState::Failing(_) => {
-            let above_stated = || {
-                let time = input.time?;
-                Some(Reason::AboveStated { lately: time.lately?, stated: time.broken_promise()? })
-            };
+            let above_stated = || input.time.and_then(Reason::above_stated);
             let out_of_specification = out_of_specification(input.lately, input.timeout).or_else(above_stated);
             out_of_specification.or_else(|| maintenance(input.lately))
         }
@@ -246,8 +248,8 @@ mod tests {
     #[test]
     fn a_device_slower_than_stated_is_out_of_specification() {
         let ms = Duration::from_millis;
-        let of = |times: [u64; 3]| {
-            let mut seen = SeenTime::default();
+        let of = |times: [u64; 40]| {
+            let mut seen = SeenTime::new(Some(ms(30)));
             times.iter().for_each(|time| seen.add(ms(*time)));
             evaluate(DiagnosisInput {
                 device: UP,
@@ -255,11 +257,13 @@ mod tests {
                 settling: false,
                 lately: &stats(30, 12, &[]),
                 timeout: ms(300),
-                time: Some(DeviceTime::new(Some(ms(30)), seen)),
+                time: Some(DeviceTime::new(&seen)),
             })
         };
-        assert_eq!(of([10, 90, 10]), None, "one slow response");
-        assert_eq!(of([45, 45, 45]), Some(Reason::AboveStated { lately: ms(45), stated: ms(30) }));
+        let mut one_slow = [10; 40];
+        one_slow[20] = 90;
+        assert_eq!(of(one_slow), None, "one slow response");
+        assert_eq!(of([45; 40]), Some(Reason::AboveStated { measured: ms(45), stated: ms(30) }));
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! Alarms: one condition each, on a tag, device or line; "not responding" for every device, "line overloaded" for every
-//! line; the faults of the station.
+//! Alarms: one condition each, on a tag, device or line; "not responding" for every device, "slower than its profile states"
+//! where that states a time, "line overloaded" for every line; the faults of the station.
 
 use std::{collections::HashMap, time::Duration};
 
@@ -22,8 +22,8 @@ const SHELVE_MAX: Duration = Duration::from_secs(7 * 86_400);
 /// A time on the shelf that is too short to be of use.
 const SHELVE_MIN: Duration = Duration::from_secs(60);
 
-/// The alarms of a plant file, one for each device that does not have its own "not responding" and for each line that does
-/// not have its own "line overloaded", and those of the station.
+/// The alarms of a plant file, those that every device and line has unless the file has its own of that kind, and those of
+/// the station.
 pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Problems) -> Vec<AlarmDef> {
     let mut alarms = Vec::new();
     for table in tables.iter().map(|table| &table.value) {
@@ -35,8 +35,10 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     check_names(tables, problems);
     check_order(tables, problems);
     let of_devices = defs.devices.iter().map(|device| (&device.name, not_responding(device)));
+    let timed = defs.devices.iter().filter(|device| device.response_time.is_some());
+    let of_timed = timed.map(|device| (&device.name, slower_than_stated(device)));
     let of_lines = defs.lines.iter().map(|line| (&line.name, overloaded(line)));
-    for (name, alarm) in of_devices.chain(of_lines) {
+    for (name, alarm) in of_devices.chain(of_timed).chain(of_lines) {
         if !alarms.iter().any(|own| (own.subject, own.condition) == (alarm.subject, alarm.condition)) {
             check_generated(tables, name, &alarm.message, problems);
             alarms.push(AlarmDef { id: AlarmId(to_u16(alarms.len())), ..alarm });
@@ -160,7 +162,19 @@ fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
 fn message(condition: Condition) -> &'static str {
     match condition {
         Condition::Overloaded => "line overloaded",
-        _ => "not responding",
+        Condition::SlowerThanStated => "slower than its profile states",
+        Condition::Limit { .. }
+        | Condition::Deviation { .. }
+        | Condition::State { .. }
+        | Condition::Bit { .. }
+        | Condition::Rate { .. }
+        | Condition::NoChange { .. }
+        | Condition::NoUpdate { .. }
+        | Condition::Changes { .. }
+        | Condition::NotResponding
+        | Condition::Health { .. }
+        | Condition::NotConnected
+        | Condition::Station(_) => "not responding",
     }
 }
 
@@ -172,7 +186,23 @@ fn guidance(condition: Condition) -> [&'static str; 3] {
             "alarm inputs are polled on time, other values less often; no device is faulty",
             "see the Bus tab; poll less often, increase the baud rate, or split the line",
         ],
-        _ => [
+        Condition::SlowerThanStated => [
+            "the device takes longer than `response_time_ms` of its profile, or adapter, gateway or computer delay it",
+            "its values are right; the worst case of its polls was too low, so polls of its line may be late",
+            "raise `response_time_ms` of the device ([device.limits] in the plant file), or poll it less often; Bus tab",
+        ],
+        Condition::Limit { .. }
+        | Condition::Deviation { .. }
+        | Condition::State { .. }
+        | Condition::Bit { .. }
+        | Condition::Rate { .. }
+        | Condition::NoChange { .. }
+        | Condition::NoUpdate { .. }
+        | Condition::Changes { .. }
+        | Condition::NotResponding
+        | Condition::Health { .. }
+        | Condition::NotConnected
+        | Condition::Station(_) => [
             "the device has no power, its cable is open, or its unit address or serial parameters differ",
             "its values are unknown and it cannot be operated",
             "check the device; then supply, cable, terminator and the Bus tab",
@@ -187,6 +217,16 @@ fn not_responding(device: &DeviceDef) -> AlarmDef {
         // The link has already asked more than once; the delay keeps a single lost frame quiet.
         on_delay: Duration::from_secs(3),
         guidance: Guidance::new(guidance(condition), Some(Duration::from_secs(600))),
+        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), condition, message(condition))
+    }
+}
+
+fn slower_than_stated(device: &DeviceDef) -> AlarmDef {
+    let condition = Condition::SlowerThanStated;
+    AlarmDef {
+        priority: Priority::Low,
+        class: AlarmClass::System,
+        guidance: Guidance::new(guidance(condition), None),
         ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), condition, message(condition))
     }
 }

@@ -40,6 +40,8 @@ toml_tables! {
         opt "line" line: String,
         /// With `line`: it has too much to do, instead of not connected.
         opt "overloaded" overloaded: bool,
+        /// Beside `device`: it takes longer for a response than its profile states.
+        opt "slower_than_stated" slower_than_stated: bool,
         /// `F`, `C`, `S` or `M`.
         opt "ne107" ne107: Signal,
         opt "enabled_when" enabled_when: String,
@@ -86,6 +88,9 @@ pub(super) fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) 
     if let Some(overloaded) = table.overloaded.filter(|overloaded| table.line.is_none() || !overloaded.value) {
         problems.add(overloaded.at, "only a `line` can be overloaded").label("expected `true`, beside `line`");
     }
+    if let Some(slower) = table.slower_than_stated.filter(|slower| table.device.is_none() || !slower.value) {
+        problems.add(slower.at, "only a `device` can be slower than stated").label("expected `true`, beside `device`");
+    }
     match (&table.tag, &table.device, &table.line) {
         (Some(tag), None, None) => {
             let tag = defs.tag(tag, problems)?;
@@ -96,10 +101,9 @@ pub(super) fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) 
         }
         (None, Some(device), None) => {
             let id = defs.device(device, problems)?;
-            no_condition(table, "device", "not responding, or with `ne107` a signal", problems);
-            let condition =
-                table.ne107.map_or(Condition::NotResponding, |ne107| Condition::Health { signal: ne107.value });
-            Some((Subject::Device(id), condition))
+            let means = "not responding, with `slower_than_stated` slower than its profile, with `ne107` a signal";
+            no_condition(table, "device", means, problems);
+            Some((Subject::Device(id), of_device(table)))
         }
         (None, None, Some(line)) => {
             let id = defs.line(line, problems)?;
@@ -116,6 +120,14 @@ pub(super) fn subject(table: &AlarmTable, defs: &Defs, problems: &mut Problems) 
             problems.add(table.at, "an alarm watches one of tag, device and line").label("here");
             None
         }
+    }
+}
+
+fn of_device(table: &AlarmTable) -> Condition {
+    match table.ne107 {
+        Some(ne107) => Condition::Health { signal: ne107.value },
+        None if table.slower_than_stated.value_or(false) => Condition::SlowerThanStated,
+        None => Condition::NotResponding,
     }
 }
 

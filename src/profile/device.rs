@@ -44,6 +44,7 @@ pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Op
         // These of the device itself are read with it.
         roles: None,
         exception_status: None,
+        output: None,
         tags: Vec::new(),
         actions: table.actions.clone(),
         faceplate: table.faceplate.clone(),

@@ -273,6 +273,7 @@ fn define_device<'a>(
             8,
             problems,
         ),
+        output: table.output.or(profile.output).map(|output| output.value),
         gap: timing.gap,
         write_gap: timing.write_gap,
         response_time: timing.response_time,

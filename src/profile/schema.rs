@@ -16,6 +16,7 @@ use super::{
 };
 use crate::plant::{
     def::{Paper, Parity, ParquetVersion, Role, Rs485, Section},
+    output::Output,
     report::PeriodKind,
 };
 
@@ -90,6 +91,8 @@ toml_tables! {
         opt "roles" roles: Roles,
         /// Names of the eight states that function 07 reads; they stand for those of the profile.
         opt "exception_status" exception_status: Numbered,
+        /// What its output is at the terminals, which the order code says; it stands for that of the profile.
+        opt "output" output: Output,
         // What follows belongs to a device without a profile.
         opt "vendor" vendor: String,
         opt "model" model: String,

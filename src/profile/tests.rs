@@ -19,7 +19,7 @@ use super::{
     plant::{Library, Text, build},
 };
 use crate::plant::{
-    def::{Condition, HistoryDef, LineId, ParquetVersion, PlantDef, Role, Subject},
+    def::{Condition, DeviceId, HistoryDef, LineId, ParquetVersion, PlantDef, Priority, Role, Subject},
     interlock::InterlockCondition,
     station::StationFault,
     tag::{Bound, DataType, PollClass},

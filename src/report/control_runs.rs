@@ -153,8 +153,9 @@ pub fn figures(run: &ControlRun) -> Vec<String> {
     };
     let steady = match (run.steady, running) {
         (Figure::After(time), _) => t!("steady from {time}", time = clock(time)),
-        (Figure::NotYet | Figure::Unknown, true) => t!("not yet steady").to_owned(),
-        (Figure::NotYet | Figure::Unknown, false) => t!("never steady").to_owned(),
+        (Figure::Unknown, _) => t!("steady, time unknown").to_owned(),
+        (Figure::NotYet, true) => t!("not yet steady").to_owned(),
+        (Figure::NotYet, false) => t!("never steady").to_owned(),
     };
     let overshoot = run.overshoot.map(|over| t!("overshoot {bound}{value} {unit}", bound, value = value(over), unit));
     let offset = match run.offset {

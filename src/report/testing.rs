@@ -70,6 +70,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             },
             functions: Vec::new(),
             exception_status: Vec::new(),
+            output: None,
             gap: Duration::ZERO,
             write_gap: Duration::ZERO,
             response_time: None,

@@ -1,17 +1,19 @@
-//! The six experiments of the thesis, repeated on the simulated rig in virtual time: one rig, one controller, six settings.
+//! The experiments that a plant file has as procedures, repeated on the simulated rig in virtual time: one rig, one
+//! controller, their settings.
 //!
-//! 5 l of water at 27 °C, agitator on, SV 70 °C, an hour recorded, one value a second, as the display shows it: rounded
-//! to 1 °C.
+//! 5 l of water at 27 °C, agitator on, an hour recorded, one value a second, as the display shows it: rounded to 1 °C.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use super::pxr::map;
 use super::rig::Rig;
 use super::slave::Unit;
-use crate::plant::number::{to_i32, to_u16, to_u32};
+use crate::plant::{
+    PlantDef,
+    def::{ProcedureDef, ProcedureStep, TagId},
+    number::{to_i32, to_u16, to_u32},
+};
 
-/// Setpoint of all experiments, in °C.
-pub const SV_C: i32 = 70;
 /// Length of each recording.
 pub const RECORDING: Duration = Duration::from_secs(3600);
 /// PV that came to SV later than this before the end of the recording is not called steady.
@@ -21,18 +23,20 @@ const FILL_L: f64 = 5.0;
 const ENGINEERING: u16 = 1000;
 
 /// Settings of the controller.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Control {
     /// Name of the kind of control.
-    pub name: &'static str,
+    pub name: Arc<str>,
+    /// Setpoint in °C, a whole number.
+    pub sv_c: i32,
     /// Proportional band in percent of the range.
     pub p_percent: f64,
     /// Integral time in seconds; 0 is none.
     pub i_s: f64,
     /// Derivative time in seconds; 0 is none.
     pub d_s: f64,
-    /// Whether register 41002 selects the fuzzy law.
-    pub fuzzy: bool,
+    /// What register 41002 is set to: the law.
+    pub law: u16,
 }
 
 /// What a recording shows.
@@ -46,32 +50,48 @@ pub struct Milestones {
     pub overshoot_c: i32,
 }
 
-/// One experiment with what the thesis measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// One experiment with what was measured on the real rig.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// The settings.
     pub control: Control,
-    /// Measured on the real rig: to compare with, never to compute from.
-    pub thesis: Milestones,
+    /// The reference of the plant file: to compare with, never to compute from.
+    pub reference: Milestones,
 }
 
-const fn experiment(control: Control, first_at_sv_s: u32, steady_from_s: Option<u32>, overshoot_c: i32) -> Experiment {
-    Experiment { control, thesis: Milestones { first_at_sv_s: Some(first_at_sv_s), steady_from_s, overshoot_c } }
+/// The procedures of a plant that measure one controller and have a reference, in the order of its file.
+pub fn of_plant(def: &PlantDef) -> Vec<Experiment> {
+    def.procedures.iter().filter_map(|procedure| experiment(def, procedure)).collect()
 }
 
-const fn control(name: &'static str, p_percent: f64, i_s: f64, d_s: f64, fuzzy: bool) -> Control {
-    Control { name, p_percent, i_s, d_s, fuzzy }
+fn experiment(def: &PlantDef, procedure: &ProcedureDef) -> Option<Experiment> {
+    let reference = procedure.reference.as_ref()?;
+    let (controller, _) = procedure.measured().next()?;
+    let faceplate = def.device(controller).faceplate.as_ref()?;
+    let [p, i, d] = faceplate.tunes[..] else { return None };
+    // The last write of a tag holds: those of the procedures that it names come first.
+    let written = |tag: TagId| {
+        procedure.steps.iter().rev().find_map(|step| match step {
+            ProcedureStep::Write { tag: of, value } if *of == tag => Some(*value),
+            _ => None,
+        })
+    };
+    let control = Control {
+        name: procedure.name.clone(),
+        sv_c: to_i32(written(faceplate.sv)?),
+        p_percent: written(p)?,
+        i_s: written(i)?,
+        d_s: written(d)?,
+        law: to_u16(written(faceplate.mode?)?),
+    };
+    let seconds = |time: Option<Duration>| time.map(|time| to_u32(time.as_secs()));
+    let reference = Milestones {
+        first_at_sv_s: seconds(reference.at_sv),
+        steady_from_s: seconds(reference.steady),
+        overshoot_c: to_i32(reference.overshoot.unwrap_or(0.0)),
+    };
+    Some(Experiment { control, reference })
 }
-
-/// KMITL thesis, 2008, chapter 4.
-pub const THESIS: [Experiment; 6] = [
-    experiment(control("P", 5.0, 0.0, 0.0, false), 12 * 60 + 45, None, 0),
-    experiment(control("PI", 5.0, 240.0, 0.0, false), 13 * 60 + 27, Some(17 * 60 + 46), 0),
-    experiment(control("PD", 5.0, 0.0, 60.0, false), 12 * 60 + 57, None, 0),
-    experiment(control("PID", 5.0, 240.0, 60.0, false), 13 * 60 + 3, Some(22 * 60 + 35), 1),
-    experiment(control("auto-tuned", 1.2, 70.0, 13.5, false), 10 * 60 + 44, Some(19 * 60 + 21), 2),
-    experiment(control("fuzzy", 5.0, 240.0, 60.0, true), 9 * 60 + 47, Some(16 * 60 + 51), 2),
-];
 
 /// A second of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +113,7 @@ fn record_filled(control: &Control, fill_l: f64) -> Vec<Recorded> {
     let mut rig = Rig::filled(fill_l);
     let tenths = |value: f64| to_u16((value * 10.0).round());
     let settings = [
-        (map::CONTROL, u16::from(control.fuzzy)),
+        (map::CONTROL, control.law),
         (map::P, tenths(control.p_percent)),
         (map::I, tenths(control.i_s)),
         (map::D, tenths(control.d_s)),
@@ -119,14 +139,14 @@ fn record_filled(control: &Control, fill_l: f64) -> Vec<Recorded> {
 }
 
 /// What a recording of seconds and PV shows on a display without decimals.
-pub fn measure(recording: &[Recorded]) -> Milestones {
+pub fn measure(sv_c: i32, recording: &[Recorded]) -> Milestones {
     let mut outcome = Milestones { first_at_sv_s: None, steady_from_s: None, overshoot_c: 0 };
     let mut last_s = 0;
     for Recorded { second, pv_c, .. } in recording.iter().copied() {
         last_s = second;
         let shown_c = to_i32(pv_c.round());
-        outcome.overshoot_c = outcome.overshoot_c.max(shown_c - SV_C);
-        if shown_c != SV_C {
+        outcome.overshoot_c = outcome.overshoot_c.max(shown_c - sv_c);
+        if shown_c != sv_c {
             outcome.steady_from_s = None;
             continue;
         }
@@ -140,10 +160,7 @@ pub fn measure(recording: &[Recorded]) -> Milestones {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        plant::def::{ProcedureStep, Reference},
-        profile,
-    };
+    use crate::profile;
 
     fn of((second, pv_c): (u32, f64)) -> Recorded {
         Recorded { second, pv_c, mv_percent: 0.0 }
@@ -157,7 +174,7 @@ mod tests {
             let seconds = (0..).zip(recording.iter().copied().chain(held));
             let recorded: Vec<Recorded> = seconds.map(of).collect();
             let expect = Milestones { first_at_sv_s, steady_from_s, overshoot_c };
-            assert_eq!(measure(&recorded), expect, "{recording:?}");
+            assert_eq!(measure(70, &recorded), expect, "{recording:?}");
         };
         check(&[27.0, 69.4, 69.5, 70.4, 70.0], Some(2), Some(2), 0);
         check(&[27.0, 69.5, 69.4, 69.6], Some(1), Some(3), 0);
@@ -165,48 +182,46 @@ mod tests {
         check(&[27.0, 69.5, 70.6], Some(1), None, 1);
         check(&[27.0, 69.4], None, None, 0);
         let late: Vec<Recorded> = (0..300).map(|second| of((second, if second < 10 { 27.0 } else { 70.0 }))).collect();
-        assert_eq!(measure(&late), Milestones { first_at_sv_s: Some(10), steady_from_s: None, overshoot_c: 0 });
+        assert_eq!(measure(70, &late), Milestones { first_at_sv_s: Some(10), steady_from_s: None, overshoot_c: 0 });
         // What jumps over SV was not at it.
         check(&[27.0, 71.0, 70.0], Some(2), Some(2), 1);
     }
 
-    /// The shipped plant has them as procedures: with the same settings, beside the same figures of the thesis.
-    #[test]
-    fn the_procedures_of_the_shipped_plant_are_these() {
+    fn shipped() -> Vec<Experiment> {
         let def = profile::load(std::path::Path::new("tank"), &profile::Search::shipped()).expect("a shipped plant");
-        let seconds = |time: Option<Duration>| time.map(|time| to_u32(time.as_secs()));
-        for Experiment { control, thesis } in THESIS {
-            let procedure = def.procedures.iter().find(|procedure| *procedure.name == *control.name);
-            let procedure = procedure.expect(control.name);
-            let written = |name: &str| {
-                procedure.steps.iter().rev().find_map(|step| match step {
-                    ProcedureStep::Write { tag, value } if def.tag(*tag).name == name => Some(*value),
-                    _ => None,
-                })
-            };
-            let set = ["TIC-1.P", "TIC-1.I", "TIC-1.D", "TIC-1.CTRL", "TIC-1.SV"].map(written);
-            let fuzzy = f64::from(u8::from(control.fuzzy));
-            let expected = [control.p_percent, control.i_s, control.d_s, fuzzy, f64::from(SV_C)];
-            assert_eq!(set, expected.map(Some), "{}", control.name);
-            let Reference { at_sv, steady, overshoot, .. } = procedure.reference.as_ref().expect(control.name);
-            let figures = (seconds(*at_sv), seconds(*steady), *overshoot);
-            let overshoot = Some(f64::from(thesis.overshoot_c));
-            assert_eq!(figures, (thesis.first_at_sv_s, thesis.steady_from_s, overshoot), "{}", control.name);
-        }
+        of_plant(&def)
+    }
+
+    #[test]
+    fn the_procedures_of_the_shipped_plant_are_experiments() {
+        let found = shipped();
+        let names: Vec<&str> = found.iter().map(|experiment| &*experiment.control.name).collect();
+        assert_eq!(names, ["P", "PI", "PD", "PID", "auto-tuned", "fuzzy"], "not the filling, nor all six together");
+        let Experiment { control, reference } = &found[4];
+        let settings = (control.sv_c, control.p_percent, control.i_s, control.d_s, control.law);
+        assert_eq!(settings, (70, 1.2, 70.0, 13.5, 0), "the setpoint of the filling is not that of the experiment");
+        assert_eq!(reference.first_at_sv_s, Some(10 * 60 + 44));
+        let laws: Vec<u16> = found.iter().map(|experiment| experiment.control.law).collect();
+        assert_eq!(laws, [0, 0, 0, 0, 0, 1]);
     }
 
     /// Why fuzzy and auto-tuned tie here: both heat fully until PV is within 1.5 °C of SV, so that their settings have no time
     /// to differ. The 57 s between them in the thesis are those of another process: 0.4 l less water give them all.
     #[test]
     fn full_power_until_sv_leaves_no_time_for_the_law() {
-        let [.., tuned, fuzzy] = THESIS;
+        let found = shipped();
+        let [.., tuned, fuzzy] = &found[..] else { panic!("six experiments: {found:?}") };
         for experiment in [tuned, fuzzy] {
             let recording = record(&experiment.control);
             let throttled = recording.iter().skip(5).find(|recorded| recorded.mv_percent < 99.9).expect("it throttles");
-            assert!(f64::from(SV_C) - 1.5 < throttled.pv_c, "{}: {throttled:?}", experiment.control.name);
+            assert!(
+                f64::from(experiment.control.sv_c) - 1.5 < throttled.pv_c,
+                "{}: {throttled:?}",
+                experiment.control.name
+            );
         }
-        let less = measure(&record_filled(&fuzzy.control, FILL_L - 0.4)).first_at_sv_s;
-        let thesis = fuzzy.thesis.first_at_sv_s.expect("it came to SV");
+        let less = measure(fuzzy.control.sv_c, &record_filled(&fuzzy.control, FILL_L - 0.4)).first_at_sv_s;
+        let thesis = fuzzy.reference.first_at_sv_s.expect("it came to SV");
         assert!(less.is_some_and(|less| less.abs_diff(thesis) <= 10), "{less:?}, thesis {thesis}");
     }
 
@@ -214,18 +229,21 @@ mod tests {
     /// time at SV as in the thesis but for one tie.
     #[test]
     fn the_six_experiments_come_out_as_in_the_thesis() {
-        let outcomes = THESIS.map(|experiment| measure(&record(&experiment.control)));
-        for (Experiment { control, thesis }, here) in THESIS.iter().zip(outcomes) {
+        let found = shipped();
+        let outcome = |experiment: &Experiment| measure(experiment.control.sv_c, &record(&experiment.control));
+        let outcomes: Vec<Milestones> = found.iter().map(outcome).collect();
+        for (Experiment { control, reference: thesis }, here) in found.iter().zip(&outcomes) {
             let near = |here: Option<u32>, thesis: Option<u32>| match (here, thesis) {
                 (Some(here), Some(thesis)) => (f64::from(here) / f64::from(thesis) - 1.0).abs() <= 0.10,
                 (here, thesis) => here == thesis,
             };
-            let name = control.name;
+            let name = &control.name;
             assert!(near(here.first_at_sv_s, thesis.first_at_sv_s), "{name}: {here:?}, thesis {thesis:?}");
             assert!(near(here.steady_from_s, thesis.steady_from_s), "{name}: {here:?}, thesis {thesis:?}");
             assert!((here.overshoot_c - thesis.overshoot_c).abs() <= 1, "{name}: {here:?}, thesis {thesis:?}");
         }
-        let [p, pi, pd, pid, tuned, fuzzy] = outcomes.map(|outcome| outcome.first_at_sv_s);
+        let first: Vec<Option<u32>> = outcomes.iter().map(|outcome| outcome.first_at_sv_s).collect();
+        let [p, pi, pd, pid, tuned, fuzzy] = first[..] else { panic!("six experiments: {first:?}") };
         // Fuzzy and auto-tuned heat fully until SV and reach it in the same second; in the thesis fuzzy was 57 s earlier.
         assert!(fuzzy <= tuned && tuned < p && p < pd && pd < pid && pid < pi, "{outcomes:?}");
     }

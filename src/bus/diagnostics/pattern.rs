@@ -83,6 +83,7 @@ impl PatternTally {
             | Finding::Values { .. }
             | Finding::Written(_)
             | Finding::Swept(_)
+            | Finding::Signals { .. }
             | Finding::Failed { .. }
             | Finding::Conclusion(_) => None,
         });

@@ -1,12 +1,12 @@
 //! Diagnostics against a device that is a function from request to response.
 
 use super::*;
-use crate::plant::diagnostics::Scan;
 use crate::plant::{
     command::{NotConfirmed, Outcome, Refusal},
     def::Framing,
     event::ExceptionCode,
 };
+use crate::plant::{diagnostics::Scan, port_signals::SignalTest};
 
 /// Runs a diagnostic against a device given as a function from request to answer.
 fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> DiagnosticRun {
@@ -16,6 +16,7 @@ fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>)
         let Some(next) = job.next() else { return job.run().clone() };
         let result = match next.ask.clone() {
             Ask::Raw(bytes) => StepResult::Bytes(bytes, Some(Duration::from_millis(1))),
+            Ask::Hold(..) | Ask::PutBack => panic!("no diagnostic of these tests sets a signal"),
             Ask::Message(request) => {
                 let answer = device(&request);
                 let exchange = Exchange {
@@ -244,4 +245,43 @@ fn writes_of_several_and_of_bits_have_their_functions() {
     assert_eq!(write(Table::Holding, vec![1, 2], false), [1, 16, 0, 5, 0, 2, 4, 0, 1, 0, 2]);
     assert_eq!(write(Table::Holding, vec![7], true), [1, 16, 0, 5, 0, 1, 2, 0, 7]);
     assert_eq!(write(Table::Coil, vec![1, 0, 1, 1, 0, 0, 0, 0, 1], false), [1, 15, 0, 5, 0, 9, 2, 0x0D, 0x01]);
+}
+
+/// Runs a signal test on a port given as a function from what is asked to how its signals stand then.
+fn with_signals(test: SignalTest, port: impl Fn(&Ask) -> Result<u32, String>) -> DiagnosticRun {
+    let id = CommandId { terminal: 1, number: 1 };
+    let mut job = Job::new(id, "anna".into(), Diagnostic::Signal(test), Timestamp::UNIX_EPOCH);
+    assert!(job.is_exclusive(), "nothing is polled meanwhile");
+    while let Some(step) = job.next().cloned() {
+        job.on_result(StepResult::Signals(port(&step.ask).map(PortSignals)));
+    }
+    job.run().clone()
+}
+
+#[test]
+fn a_signal_is_held_put_back_and_what_followed_is_said() {
+    let (rts, cts, dsr) = (0x004, 0x020, 0x100);
+    let test = SignalTest { signal: OutputSignal::Rts, on: false, seconds: 2 };
+    let joined = with_signals(test, |ask| match ask {
+        Ask::Hold(OutputSignal::Rts, false) => Ok(dsr),
+        Ask::PutBack => Ok(rts | cts | dsr),
+        other => panic!("it sets nothing else: {other:?}"),
+    });
+    assert_eq!((joined.done, joined.total, &joined.state), (9, 9, &DiagnosticState::Done));
+    let ms = Duration::from_millis;
+    let at = |after, bits| Finding::Signals { after, signals: PortSignals(bits) };
+    assert_eq!(joined.findings[..2], [at(ms(250), dsr), at(ms(2_000), rts | cts | dsr)], "only what is new");
+    assert_eq!(verdict(&joined), "RTS was set and put back; with it changed CTS");
+    let open = with_signals(test, |ask| Ok(if *ask == Ask::PutBack { rts } else { 0 }));
+    assert_eq!(verdict(&open), "RTS was set and put back; no input changed with it");
+    let stuck = with_signals(test, |_| Ok(rts));
+    assert_eq!(verdict(&stuck), "the port did not set RTS: its driver or adapter has no such output");
+}
+
+#[test]
+fn a_port_without_signals_ends_the_test_with_the_reason() {
+    let test = SignalTest { signal: OutputSignal::Dtr, on: true, seconds: 60 };
+    let run = with_signals(test, |_| Err("this port has none".to_owned()));
+    assert_eq!((run.done, run.state), (1, DiagnosticState::Failed("this port has none".to_owned())));
+    assert_eq!(run.findings, []);
 }

@@ -11,6 +11,7 @@
 
 mod raw;
 mod receive;
+mod signals;
 mod transactions;
 
 use std::{sync::Arc, time::Duration};
@@ -31,7 +32,7 @@ use self::{receive::Received, transactions::Transactions};
 use super::{
     clock::Clock,
     transport::Opened,
-    uart::PortWatch,
+    uart::{HeldSignal, PortWatch},
     wire::{LineMemory, Wire},
 };
 use crate::{
@@ -79,6 +80,8 @@ pub struct Link {
     gaps: Vec<(u8, Instant)>,
     /// What the driver of the port counts and sees.
     watch: Option<PortWatch>,
+    /// A signal that a test holds.
+    held: Option<HeldSignal>,
     /// The adapter gives back what it sends.
     echoes: bool,
     /// Exchanges in a row to which nothing came back.
@@ -105,6 +108,7 @@ impl Link {
             frame_timeout: wire.frame_timeout,
             turnaround: clock.real_span(line.turnaround),
             watch,
+            held: None,
             echoes: false,
             unanswered: 0,
             last: None,

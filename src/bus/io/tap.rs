@@ -20,6 +20,7 @@ use super::{
 use crate::plant::{
     event::UartCounters,
     line::{Parity, Serial, Transport},
+    port_signals::OutputSignal,
 };
 
 /// The bytes of both sides of a line.
@@ -66,7 +67,7 @@ fn open_serial(path: &str, serial: Serial, rts: bool) -> Result<Tap, String> {
     }
     // Opening it has raised RTS, by which some adapters switch their driver on: it would hold the line.
     if !rts {
-        uart::lower_rts(&port);
+        let _ = uart::set_signal(&port, OutputSignal::Rts, false);
     }
     set(&port, serial).map_err(|error| failed(error.into()))?;
     let watch = Some(PortWatch::of(port.try_clone().map_err(failed)?.into()));

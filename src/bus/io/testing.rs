@@ -93,6 +93,8 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<StepResult, LinkError>
         Ask::Raw(bytes) => {
             link.send_raw(bytes).await.map(|(bytes, response_time)| StepResult::Bytes(bytes, response_time))
         }
+        Ask::Hold(signal, on) => link.hold_signal(*signal, *on).await.map(StepResult::Signals),
+        Ask::PutBack => link.put_back_signal().map(StepResult::Signals),
         Ask::Message(message) => {
             let (usual, unanswered) = (link.timeout(), link.unanswered);
             link.set_timeout(step.timeout.unwrap_or(usual));

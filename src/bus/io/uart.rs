@@ -12,7 +12,11 @@ use std::{
 use rustix::ioctl::{Ioctl, IoctlOutput, Opcode};
 use tokio_serial::SerialStream;
 
-use crate::plant::{def::Rs485, event::UartCounters, port_signals::PortSignals};
+use crate::plant::{
+    def::Rs485,
+    event::UartCounters,
+    port_signals::{OutputSignal, PortSignals},
+};
 
 /// Looks at what the driver of an open port counts and sees, through a handle of its own, which is closed with this.
 #[derive(Debug)]
@@ -46,6 +50,14 @@ impl PortWatch {
         })
     }
 
+    /// Sets a signal, until what is returned is dropped.
+    pub fn hold(&self, signal: OutputSignal, on: bool) -> io::Result<HeldSignal> {
+        let before = self.signals().ok_or(io::ErrorKind::Unsupported)?.is_on(signal);
+        let held = HeldSignal { handle: self.handle.try_clone()?, signal, before };
+        set_signal(&self.handle, signal, on)?;
+        Ok(held)
+    }
+
     /// How the signals stand; `None` where the driver has none.
     pub fn signals(&self) -> Option<PortSignals> {
         // SAFETY: TIOCMGET fills one int.
@@ -76,11 +88,31 @@ pub(super) fn send_break(port: &SerialStream) -> io::Result<()> {
     rustix::termios::tcsendbreak(borrowed(port)).map_err(io::Error::from)
 }
 
-/// Lowers RTS, where there is one.
-pub(super) fn lower_rts(port: &impl AsFd) {
-    const RTS: i32 = 4;
-    // SAFETY: TIOCMBIC reads one int, the signals to lower. A pseudo-terminal has none, and says so.
-    let _ = unsafe { rustix::ioctl::ioctl(port, rustix::ioctl::Setter::<0x5417, i32>::new(RTS)) };
+/// Raises or lowers a signal; a pseudo-terminal has none, and says so.
+pub(super) fn set_signal(port: &impl AsFd, signal: OutputSignal, on: bool) -> io::Result<()> {
+    let bit = signal.bit();
+    // SAFETY: TIOCMBIS and TIOCMBIC read one int, the signals to raise or to lower.
+    let set = match on {
+        true => unsafe { rustix::ioctl::ioctl(port, rustix::ioctl::Setter::<0x5416, u32>::new(bit)) },
+        false => unsafe { rustix::ioctl::ioctl(port, rustix::ioctl::Setter::<0x5417, u32>::new(bit)) },
+    };
+    set.map_err(io::Error::from)
+}
+
+/// A signal that is held by hand. It is put back as it was when this is dropped, whatever ended the test.
+#[derive(Debug)]
+pub struct HeldSignal {
+    handle: OwnedFd,
+    signal: OutputSignal,
+    before: bool,
+}
+
+impl Drop for HeldSignal {
+    fn drop(&mut self) {
+        if let Err(error) = set_signal(&self.handle, self.signal, self.before) {
+            tracing::warn!(signal = self.signal.word(), %error, "a signal could not be put back");
+        }
+    }
 }
 
 fn borrowed(port: &SerialStream) -> BorrowedFd<'_> {

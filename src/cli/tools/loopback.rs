@@ -52,6 +52,7 @@ fn lines(finding: &Finding, verbose: bool) -> Vec<String> {
         Finding::Exchange(_)
         | Finding::Written(_)
         | Finding::Swept(_)
+        | Finding::Signals { .. }
         | Finding::Failed { .. }
         | Finding::Bytes { .. }
         | Finding::Unit { .. }

@@ -39,6 +39,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Exchange(_)
         | Finding::Written(_)
         | Finding::Swept(_)
+        | Finding::Signals { .. }
         | Finding::Bytes { .. }
         | Finding::Unit { .. }
         | Finding::Conclusion(_) => Vec::new(),

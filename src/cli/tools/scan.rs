@@ -74,6 +74,7 @@ pub fn describe(finding: &Finding) -> Vec<String> {
         Finding::Exchange(_)
         | Finding::Written(_)
         | Finding::Swept(_)
+        | Finding::Signals { .. }
         | Finding::Bytes { .. }
         | Finding::Object { .. }
         | Finding::Values { .. } => Vec::new(),

@@ -78,6 +78,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Exchange(_)
         | Finding::Written(_)
         | Finding::Swept(_)
+        | Finding::Signals { .. }
         | Finding::Unit { .. }
         | Finding::Object { .. }
         | Finding::Values { .. }

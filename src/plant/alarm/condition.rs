@@ -34,6 +34,8 @@ pub enum Condition {
     NotResponding,
     /// The device has this signal of NE 107.
     Health { signal: Signal },
+    /// The device takes longer for a response than its profile states.
+    SlowerThanStated,
     /// The line is not connected although it should be.
     NotConnected,
     /// The line has no time for all of its polls: some are read less often.
@@ -108,6 +110,7 @@ impl Condition {
             Condition::Bit { .. }
             | Condition::NotResponding
             | Condition::Health { .. }
+            | Condition::SlowerThanStated
             | Condition::NotConnected
             | Condition::Overloaded
             | Condition::Station(_) => none,
@@ -260,6 +263,7 @@ pub fn holds(
         }
         Condition::NotResponding
         | Condition::Health { .. }
+        | Condition::SlowerThanStated
         | Condition::NotConnected
         | Condition::Overloaded
         | Condition::Station(_) => facts.ill,

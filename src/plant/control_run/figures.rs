@@ -20,8 +20,8 @@ pub(super) struct Figures {
     good: Duration,
     /// Since when they have not been.
     gap_from: Option<Timestamp>,
-    /// Since when PV is at SV.
-    in_band: Option<Timestamp>,
+    /// Since when PV is seen at SV, and when it came there: unknown where that was in a gap.
+    in_band: Option<(Timestamp, Figure)>,
     /// +1 where PV comes to SV from below, -1 from above; `None` while it has not been away from SV.
     toward: Option<f64>,
     /// When PV had done 10 % and 90 % of its way; `None` for a way that cannot be measured.
@@ -110,10 +110,10 @@ impl Figures {
         }
         self.rise_to(run, pv, now);
         run.overshoot = Some(run.overshoot.unwrap_or_default().max(beyond));
-        // In a gap it may have been anywhere.
-        self.in_band = inside.then(|| self.in_band.filter(|_| !gap).unwrap_or(view.at));
+        // In a gap it may have been anywhere, also at SV all the time: the end of the gap is not when it became steady.
+        self.in_band = inside.then(|| self.in_band.filter(|_| !gap).unwrap_or((view.at, now)));
         run.steady = match self.in_band {
-            Some(since) if def.steady_for <= elapsed(since, view.at) => Figure::After(elapsed(run.from, since)),
+            Some((since, from)) if def.steady_for <= elapsed(since, view.at) => from,
             Some(_) | None => Figure::NotYet,
         };
     }

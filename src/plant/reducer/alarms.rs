@@ -5,8 +5,9 @@ use crate::plant::{
     alarm::{AlarmCommand, AlarmRefusal, condition::Facts, state::OperatorNote},
     command::{CommandStatus, NotConfirmed, Outcome, Refusal},
     def::{AlarmDef, AlarmId, Condition, Subject},
+    device_time::DeviceTime,
     event::LineState,
-    ne107::Signal,
+    ne107::{Reason, Signal},
     process_image::ProcessImage,
     record::{AlarmEvent, AlarmRecord, Record},
     snapshot::{DeviceState, DeviceStatus, LineStatus},
@@ -70,6 +71,13 @@ impl Plant {
             (Subject::Device(device), Condition::Health { signal }) => {
                 diagnosed.get(device.index()).and_then(|status| has_signal(status, signal))
             }
+            // A computer that plays a plant faster is what takes the time.
+            (Subject::Device(_), Condition::SlowerThanStated) if 1.0 < speed => Some(false),
+            (Subject::Device(device), Condition::SlowerThanStated) => {
+                let report = lines[def.device(device).line.index()].report.as_deref();
+                let time = report.and_then(|report| report.device_time(device));
+                is_slow(devices[device.index()].state, time)
+            }
             (Subject::Device(device), _) => {
                 let report = lines[def.device(device).line.index()].report.as_deref();
                 let no_values = report.is_some_and(|report| report.gives_no_values(device));
@@ -84,7 +92,24 @@ impl Plant {
         };
         let mut events = self.alarm_manager.evaluate(self.at, |alarm| facts(image, ill(alarm), alarm));
         events.iter_mut().for_each(|event| explain(event, faults));
+        events.iter_mut().for_each(|event| self.explain_slow(event));
         events
+    }
+
+    /// Adds what a slow device takes to its alarm event.
+    fn explain_slow(&self, event: &mut AlarmRecord) {
+        let of_event = |alarm: &&AlarmDef| {
+            let device = match alarm.subject {
+                Subject::Device(device) if alarm.condition == Condition::SlowerThanStated => self.def.device(device),
+                _ => return false,
+            };
+            (&*device.name, &*alarm.message) == (&*event.subject, &*event.message)
+        };
+        let alarm = self.def.alarms.iter().find(of_event).filter(|_| event.event == AlarmEvent::Raised);
+        let Some(Subject::Device(device)) = alarm.map(|alarm| alarm.subject) else { return };
+        let report = self.lines[self.def.device(device).line.index()].report.as_deref();
+        let reason = report.and_then(|report| Reason::above_stated(report.device_time(device)?));
+        event.reason = reason.map(|reason| reason.to_string().into());
     }
 }
 
@@ -121,6 +146,14 @@ fn answers(state: DeviceState, no_values: bool) -> Option<bool> {
         DeviceState::Unknown | DeviceState::Failing(_) => None,
         DeviceState::Responding => Some(true),
         DeviceState::Down { .. } => Some(false),
+    }
+}
+
+/// Unknown while it does not answer.
+fn is_slow(state: DeviceState, time: Option<DeviceTime>) -> Option<bool> {
+    match state {
+        DeviceState::Responding | DeviceState::Failing(_) => Some(time?.above_stated.is_some()),
+        DeviceState::Unknown | DeviceState::Down { .. } => None,
     }
 }
 

@@ -26,7 +26,7 @@ impl Plant {
                 effects.bus.push((settings.id, BusRequest::Configure(settings.clone())));
             }
             CommandKind::Test(line, diagnostic) => {
-                if let Err(why) = diagnostic.check() {
+                if let Err(why) = diagnostic.check_on(self.settings(*line)) {
                     return refused(Refusal::NotValid(why));
                 }
                 let (id, by, diagnostic) = (status.command.id, status.by.clone(), diagnostic.clone());
@@ -93,6 +93,7 @@ mod tests {
         event::Event,
         fixture,
         line_report::LineReport,
+        port_signals::{OutputSignal, SignalTest},
         record::ActionRecord,
     };
 
@@ -161,13 +162,22 @@ mod tests {
     fn what_no_line_can_carry_is_refused_and_never_sent() {
         let used = fixture::plant().lines[0].clone();
         let scan = Scan { first: 1, last: 2, serials: Vec::new(), timeout: Duration::MAX };
+        let rts = SignalTest { signal: OutputSignal::Rts, on: true, seconds: 10 };
         for kind in [
             CommandKind::Configure(Box::new(LineDef { timeout: Duration::MAX, ..used.clone() })),
             CommandKind::Configure(Box::new(LineDef { timeout: Duration::ZERO, ..used })),
             CommandKind::Configure(Box::new(baud(0))),
             CommandKind::Test(L1, Diagnostic::Scan(scan)),
+            CommandKind::Test(L1, Diagnostic::Signal(SignalTest { seconds: 61, ..rts })),
+            // As the settings in use have it, not those of the plant file.
+            CommandKind::Test(L1, Diagnostic::Signal(rts)),
         ] {
             let mut plant = plant();
+            if matches!(&kind, CommandKind::Test(_, Diagnostic::Signal(test)) if *test == rts) {
+                let tcp = LineDef { transport: Transport::tcp("host", 502), ..plant.def.line(L1).clone() };
+                let report = Arc::new(LineReport::new(tcp));
+                plant.on_event(Event::Report { at: at(1), line: L1, report });
+            }
             let effects = command(&mut plant, 1, kind.clone());
             assert_eq!(effects.bus, [], "{kind:?} goes to the line");
             let refused = actions(&effects);

@@ -6,6 +6,7 @@ use crate::{
     plant::{
         def::{Reauthentication, Role},
         keyword::keyword_enum,
+        output::Output,
         tag::{Access, ByteOrder, Confidence, DataType, PollClass, StorePolicy, Table},
     },
     profile::{
@@ -38,6 +39,8 @@ toml_tables! {
         opt "roles" roles: Roles,
         /// Names of the eight states that function 07 reads.
         opt "exception_status" exception_status: Numbered,
+        /// What its output is at the terminals.
+        opt "output" output: Output,
         list "tag" tags: Raw,
         list "action" actions: ActionTable,
         opt "faceplate" faceplate: FaceplateTable,

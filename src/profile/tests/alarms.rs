@@ -29,6 +29,24 @@ fn the_alarm_of_an_overloaded_line_may_be_written() {
 }
 
 #[test]
+fn a_device_with_a_stated_time_has_an_alarm_for_it() {
+    let slow = |plant: &PlantDef| {
+        let found = plant.alarms.iter().filter(|alarm| alarm.condition == Condition::SlowerThanStated);
+        found.map(|alarm| (alarm.subject, alarm.priority, alarm.message.clone())).collect::<Vec<_>>()
+    };
+    let loaded = |plant: &str, meter: &str| load(plant.as_bytes(), meter, PLC).expect("a good plant");
+    assert_eq!(slow(&loaded(PLANT, METER)), [], "nothing is stated");
+    let meter = METER.replacen("[limits]", "[limits]\nresponse_time_ms = 30", 1);
+    let usual = (Subject::Device(DeviceId(0)), Priority::Low, "slower than its profile states".to_owned());
+    assert_eq!(slow(&loaded(PLANT, &meter)), [usual]);
+    let own = "[[alarm]]\ndevice = \"D1\"\nslower_than_stated = true\npriority = \"high\"\nmessage = \"slow\"\n[mimic]";
+    let plant = PLANT.replacen("[mimic]", own, 1);
+    assert_eq!(slow(&loaded(&plant, &meter)), [(Subject::Device(DeviceId(0)), Priority::High, "slow".to_owned())]);
+    check("[mimic]", &own.replace("true", "false"), &["only a `device` can be slower than stated", "expected `true`"]);
+    check("[mimic]", &own.replace("device = \"D1\"", "line = \"L1\""), &["only a `device` can be slower"]);
+}
+
+#[test]
 fn two_alarms_of_one_name_are_refused() {
     let second = "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\npriority = \"low\"\nmessage = \"hot\"\n[mimic]";
     check("[mimic]", second, &["[small.toml:36:11]", "duplicate alarm `hot` of D1.T", "first here"]);

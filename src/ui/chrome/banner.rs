@@ -15,7 +15,7 @@ use crate::{
     ui::{
         modal::{
             confirm::subject,
-            faceplate::{device_text, line_state_text},
+            faceplate::{device_alarm_text, line_state_text},
         },
         rights,
         widgets::value,
@@ -163,7 +163,7 @@ fn what_text(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
     let def = cx.def().alarm(alarm.id);
     let now = match def.subject {
         Subject::Tag(tag) => value::show(cx, tag).with_unit(),
-        Subject::Device(device) => device_text(cx, device),
+        Subject::Device(device) => device_alarm_text(cx, alarm.id, device),
         Subject::Line(line) => line_state_text(cx, line),
         Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };

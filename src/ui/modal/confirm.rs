@@ -164,6 +164,7 @@ impl Confirm {
             ConfirmAction::Command(CommandKind::Test(_, Diagnostic::Scan(_))) => t!("scan"),
             ConfirmAction::Command(CommandKind::Test(_, Diagnostic::Sweep(_))) => t!("map"),
             ConfirmAction::Command(CommandKind::Test(_, Diagnostic::Write(_))) => t!("write and verify"),
+            ConfirmAction::Command(CommandKind::Test(_, Diagnostic::Signal(_))) => t!("start"),
             ConfirmAction::Command(CommandKind::Test(..)) => t!("send"),
             ConfirmAction::Command(CommandKind::StopTest(_) | CommandKind::StopRestore(_)) => t!("stop"),
             ConfirmAction::Command(CommandKind::StartProcedure(_)) => t!("start"),

@@ -16,8 +16,9 @@ use crate::{
     access::right,
     plant::{
         command::CommandKind,
-        def::TagId,
+        def::{AlarmId, Condition, DeviceId, TagId},
         event::LineState,
+        ne107::Reason,
         snapshot::DeviceState,
         tag::{Access, Poll},
         time::elapsed,
@@ -235,7 +236,7 @@ fn command_of(cx: &ViewContext, tag: TagId) -> Option<TagId> {
 }
 
 /// How a device stands, in words.
-pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
+pub fn device_text(cx: &ViewContext, device: DeviceId) -> String {
     let status = cx.snapshot.device(device);
     match status.state {
         DeviceState::Unknown => t!("not polled yet").to_owned(),
@@ -254,8 +255,19 @@ pub fn device_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> Str
     }
 }
 
+/// What an alarm of a device says now: how the device stands, or what it takes where the alarm is about that.
+pub fn device_alarm_text(cx: &ViewContext, alarm: AlarmId, device: DeviceId) -> String {
+    let report = cx.snapshot.line(cx.def().device(device).line).report.as_ref();
+    let time = report.and_then(|report| report.device_time(device));
+    let reason = match cx.def().alarm(alarm).condition {
+        Condition::SlowerThanStated => time.and_then(Reason::above_stated),
+        _ => None,
+    };
+    reason.map_or_else(|| device_text(cx, device), |reason| reason.to_string())
+}
+
 /// `, retry in 12 s` for a device that does not answer.
-pub fn retry_text(cx: &ViewContext, device: crate::plant::def::DeviceId) -> String {
+pub fn retry_text(cx: &ViewContext, device: DeviceId) -> String {
     let report = cx.snapshot.line(cx.def().device(device).line).report.as_ref();
     match report.and_then(|report| report.retry_at(device)) {
         Some(at) if cx.now < at => t!(", retry {ceil} s", ceil = elapsed(cx.now, at).as_secs_f64().ceil()),

@@ -10,6 +10,7 @@ use sightglass::plant::{
     def::{AlarmId, DeviceId, LineId, ProcedureId, Serial},
     diagnostics::{Diagnostic, Scan},
     parameter_set::ParameterSet,
+    port_signals::{OutputSignal, SignalTest},
     restore::RestoreRequest,
     sweep::Sweep,
     tag::Table,
@@ -42,9 +43,11 @@ pub fn of_command(def: &PlantDef, kind: &CommandKind) -> Row {
         CommandKind::SaveSettings(_) => row("save settings", "---S--"),
         CommandKind::Test(_, diagnostic) => match diagnostic {
             Diagnostic::Scan(Scan { serials, .. }) if serials.is_empty() => row("test", "--TS--"),
-            Diagnostic::Send(_) | Diagnostic::Write(_) | Diagnostic::Scan(_) | Diagnostic::Pattern { .. } => {
-                row("test", "---S--")
-            }
+            Diagnostic::Send(_)
+            | Diagnostic::Write(_)
+            | Diagnostic::Scan(_)
+            | Diagnostic::Signal(_)
+            | Diagnostic::Pattern { .. } => row("test", "---S--"),
             Diagnostic::Sweep(_)
             | Diagnostic::Loopback { .. }
             | Diagnostic::Identify { .. }
@@ -99,6 +102,7 @@ pub fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
         CommandKind::TakeOver,
         CommandKind::Test(line, Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
         CommandKind::Test(line, Diagnostic::Pattern { bits: 8, count: 1 }),
+        CommandKind::Test(line, Diagnostic::Signal(SignalTest { signal: OutputSignal::Rts, on: true, seconds: 1 })),
         CommandKind::Test(line, Diagnostic::Identify { unit: 1 }),
         CommandKind::Test(line, Diagnostic::Sweep(Sweep { unit: 1, table, first: 0, last: 9, every: 8 })),
         CommandKind::Test(line, Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 }),

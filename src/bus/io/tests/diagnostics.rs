@@ -13,6 +13,7 @@ use crate::plant::{
     def::{Serial, TagId},
     diagnostics::{Diagnostic, DiagnosticState, Finding, Scan},
     event::{Event, LineState, WriteResult},
+    port_signals::{OutputSignal, SignalTest},
 };
 
 async fn start(line: &Line, diagnostic: Diagnostic) {
@@ -34,6 +35,28 @@ async fn a_line_can_be_closed_while_a_scan_has_it_for_itself() {
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Testing, .. }).then_some(())).await;
     line.requests.send(BusRequest::Connect(false)).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Line { state: LineState::Disconnected, .. }).then_some(())).await;
+}
+
+/// A port that has no signals: the line is back in service at once, and the operator sees why.
+#[tokio::test(start_paused = true)]
+async fn a_signal_test_without_signals_fails_and_polls_go_on() {
+    let def = plant(Mode::Rtu);
+    let mut line = line(def.clone());
+    (0..3).for_each(|_| drop(line.plug(Mode::Rtu, |_, _| SlaveAction::Answer)));
+    line.read(&def).await;
+    start(&line, Diagnostic::Signal(SignalTest { signal: OutputSignal::Dtr, on: false, seconds: 10 })).await;
+    line.until(&def, |event| matches!(event, Event::Line { state: LineState::Testing, .. }).then_some(())).await;
+    let why = line
+        .until(&def, |event| match event {
+            Event::Diagnostic { run, .. } => match &run.state {
+                DiagnosticState::Failed(why) => Some(why.clone()),
+                _ => None,
+            },
+            _ => None,
+        })
+        .await;
+    assert!(why.starts_with("this port has no RTS and DTR"), "{why}");
+    line.read(&def).await;
 }
 
 /// Bytes that are no request are sent as they are, and whatever comes back is reported.

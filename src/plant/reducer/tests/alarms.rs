@@ -1,7 +1,10 @@
 //! Commands on alarms.
 
 use super::*;
-use crate::plant::alarm::AlarmCommand;
+use crate::plant::{
+    alarm::AlarmCommand,
+    device_time::{DeviceTime, SeenTime},
+};
 
 #[test]
 fn an_alarm_is_raised_acknowledged_by_name_and_returns() {
@@ -44,4 +47,42 @@ fn several_alarms_are_shelved_by_one_command() {
     let snapshot = plant.snapshot();
     let status = snapshot.commands.iter().find(|status| status.command.id.number == 2).expect("the second command");
     assert_eq!(status.outcome, Outcome::NotConfirmed(NotConfirmed::Partly("1 of 2; no such alarm".to_owned())));
+}
+
+#[test]
+fn a_device_slower_than_stated_is_an_alarm_with_figures() {
+    let mut def = fixture::plant();
+    let slow = AlarmId(def.alarms.len() as u16);
+    def.alarms.push(AlarmDef::new(slow, Subject::Device(TIC), Condition::SlowerThanStated, "slow"));
+    let def = Arc::new(def);
+    let ms = Duration::from_millis;
+    let mut seen = SeenTime::new(Some(ms(30)));
+    // `responses` of so many ms come, then a second passes: what the alarm says, as an event and as a state.
+    let mut after = |plant: &mut Plant, second: i64, responses: usize, of_ms: u64| {
+        (0..responses).for_each(|_| seen.add(ms(of_ms)));
+        let device_times = vec![(TIC, DeviceTime::new(&seen))];
+        let report = LineReport { device_times, ..LineReport::new(plant.def().line(L1).clone()) };
+        let mut records = plant.on_event(Event::Report { at: at(second), line: L1, report: Arc::new(report) }).records;
+        records.extend(plant.on_event(read(second, &[(PV, 700.0), (SV, 700.0), (DP, 1.0), (FAULT, 0.0)])).records);
+        records.extend(plant.on_tick(at(second)).records);
+        let event = records.into_iter().find_map(|record| match record {
+            Record::Alarm(event) => Some((event.event, event.reason.map(|reason| reason.to_string()))),
+            _ => None,
+        });
+        (event, plant.snapshot().alarms.iter().map(|alarm| alarm.state).collect::<Vec<_>>())
+    };
+    let mut plant = Plant::new(def.clone(), at(0), 1.0);
+    plant.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
+    let none = (None, vec![]);
+    assert_eq!(after(&mut plant, 1, 100, 10), none, "as fast as stated");
+    assert_eq!(after(&mut plant, 2, 2, 400), none, "two pauses");
+    let words = "takes up to 400 ms for a response, its profile states 30 ms".to_owned();
+    let raised = (Some((AlarmEvent::Raised, Some(words))), vec![AlarmState::Unacknowledged]);
+    assert_eq!(after(&mut plant, 3, 1, 45), raised);
+    assert_eq!(after(&mut plant, 4, 200, 10), (None, vec![AlarmState::Unacknowledged]), "some are still slow");
+    let gone = (Some((AlarmEvent::ReturnedToNormal, None)), vec![AlarmState::ReturnedToNormal]);
+    assert_eq!(after(&mut plant, 5, 256, 10), gone);
+    let mut fast = Plant::new(def, at(0), 60.0);
+    fast.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
+    assert_eq!(after(&mut fast, 6, 100, 400), none, "only the machine that plays the plant is slow");
 }

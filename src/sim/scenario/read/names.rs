@@ -4,7 +4,7 @@ use crate::{
     plant::{
         PlantDef,
         alarm::manager::subject_name,
-        def::{AlarmDef, AlarmId, Subject, TagId},
+        def::{AlarmDef, AlarmId, Condition, Subject, TagId},
     },
     profile::{
         diagnostic::Problems,
@@ -48,7 +48,9 @@ pub(super) fn alarm(
     let mut known: Vec<&str> = def.alarms.iter().map(|alarm| name(alarm.subject)).collect();
     known.dedup();
     unknown(of_subject.first(), "alarm of", subject, known.into_iter(), problems)?;
-    let fits = |alarm: &&&AlarmDef| words.as_ref().is_none_or(|words| words.value == alarm.message);
+    // The name of a device alone means "not responding", as in every file from before it could also be slow.
+    let usual = |alarm: &AlarmDef| alarm.condition != Condition::SlowerThanStated;
+    let fits = |alarm: &&&AlarmDef| words.as_ref().map_or_else(|| usual(alarm), |words| words.value == alarm.message);
     let found: Vec<_> = of_subject.iter().filter(fits).collect();
     let texts = || of_subject.iter().map(|alarm| alarm.message.as_str());
     match (found.as_slice(), words) {

@@ -10,7 +10,7 @@ use crate::{
     ui::{
         modal::{
             confirm::subject,
-            faceplate::{device_text, line_state_text},
+            faceplate::{device_alarm_text, line_state_text},
         },
         rights,
     },
@@ -172,7 +172,7 @@ pub fn now_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
             let raised = alarm.value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
             t!("{whole}, raised at {raised}", whole = value::show(cx, tag).whole(), raised)
         }
-        Subject::Device(device) => device_text(cx, device),
+        Subject::Device(device) => device_alarm_text(cx, alarm.id, device),
         Subject::Line(line) => line_state_text(cx, line),
         Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };

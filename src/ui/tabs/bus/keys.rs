@@ -70,6 +70,7 @@ const TEST_KEYS: &[Key<Action>] = &[
     Key::new(char('f'), "", "build a request from its fields", Action::Try(Tried::Request)),
     Key::new(char('b'), "", "loopback", Action::Try(Tried::Loopback)),
     Key::new(char('p'), "", "loopback plug", Action::Try(Tried::Plug)),
+    Key::new(char('g'), "", "raise or lower RTS or DTR for a time", Action::Try(Tried::Signal)),
     Key::new(char('i'), "", "identify a device", Action::Try(Tried::Identify)),
     Key::new(char('s'), "", "scan for units", Action::Try(Tried::Scan)),
     Key::new(char('m'), "", "map of the addresses that a unit answers at", Action::Try(Tried::Sweep)),

@@ -2,6 +2,7 @@
 
 mod fields;
 mod functions;
+mod signal;
 mod sweep;
 
 use fields::{all_settings, number};
@@ -81,6 +82,7 @@ impl Form {
         let unit = text(t!("unit"), &unit.to_string());
         let fields = match tried {
             Tried::Sweep => sweep::fields(unit),
+            Tried::Signal => signal::fields(),
             Tried::Bytes | Tried::Request => {
                 let function = choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec());
                 [vec![unit, function], functions::fields(FUNCTIONS[0], &[])].concat()
@@ -228,6 +230,7 @@ impl Form {
             }
             Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?)?,
             Tried::Sweep => self.build_sweep(unit(0)?)?,
+            Tried::Signal => self.build_signal(line)?,
         })
     }
 
@@ -311,6 +314,7 @@ impl Form {
             Tried::Identify => t!("identify a device"),
             Tried::Scan => t!("scan for units"),
             Tried::Sweep => t!("map of addresses"),
+            Tried::Signal => t!("line signals"),
         }
     }
 }

@@ -18,6 +18,7 @@ use crate::{
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
         event::Fault,
         number::to_u32,
+        port_signals::PortSignals,
         sweep::{SweptOutcome, SweptRange},
     },
 };
@@ -80,6 +81,7 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
                 let (words, trouble) = outcome_words(outcome);
                 rows.push(plain(words, if trouble { theme.trouble() } else { theme.strong() }));
             }
+            Finding::Signals { after, signals } => rows.push(signal_row(cx, *after, *signals)),
             Finding::Swept(range) => {
                 let answers = range.outcome == SweptOutcome::Answers;
                 rows.push(plain(swept(range), if answers { theme.strong() } else { theme.dim() }));
@@ -90,6 +92,12 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
         }
     }
     rows
+}
+
+/// How the signals of the port stood, and when.
+fn signal_row(cx: &ViewContext, after: std::time::Duration, signals: PortSignals) -> Row {
+    let after = format!("{:5.2} s  ", after.as_secs_f64());
+    vec![(after, cx.theme.dim()), (signals.to_string(), cx.theme.strong())]
 }
 
 /// What became of a pattern, unless all of it came back.
@@ -116,6 +124,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
         | Diagnostic::Read { .. }
         | Diagnostic::Write(_)
         | Diagnostic::Sweep(_)
+        | Diagnostic::Signal(_)
         | Diagnostic::Scan(_)) => diagnostic.to_string(),
     };
     let mut rows = vec![vec![(t!("{at} {what} by {by}   ", at, what, by = run.by), theme.normal()), (state, style)]];
@@ -183,6 +192,7 @@ fn came_back(
         | Diagnostic::Read { .. }
         | Diagnostic::Write(_)
         | Diagnostic::Sweep(_)
+        | Diagnostic::Signal(_)
         | Diagnostic::Scan(_) => None,
     };
     let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());

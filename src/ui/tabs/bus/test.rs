@@ -40,6 +40,8 @@ pub enum Tried {
     Loopback,
     /// Patterns that a plug returns.
     Plug,
+    /// RTS or DTR, set by hand for a time.
+    Signal,
     /// Device identification.
     Identify,
     /// Which units answer.
@@ -49,8 +51,16 @@ pub enum Tried {
 }
 
 impl Tried {
-    const ALL: [Tried; 7] =
-        [Tried::Bytes, Tried::Request, Tried::Loopback, Tried::Plug, Tried::Identify, Tried::Scan, Tried::Sweep];
+    const ALL: [Tried; 8] = [
+        Tried::Bytes,
+        Tried::Request,
+        Tried::Loopback,
+        Tried::Plug,
+        Tried::Signal,
+        Tried::Identify,
+        Tried::Scan,
+        Tried::Sweep,
+    ];
 
     /// Its key, its name and what it is for.
     fn words(self) -> [&'static str; 3] {
@@ -61,6 +71,7 @@ impl Tried {
             }
             Tried::Loopback => ["b", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
             Tried::Plug => ["p", t!("loopback plug"), t!("bytes that a plug returns; wrong, missing, local echo")],
+            Tried::Signal => ["g", t!("line signals"), t!("RTS or DTR by hand, for a time; which inputs follow")],
             Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
             Tried::Scan => ["s", t!("scan for units"), t!("units that respond, with these or all serial settings")],
             Tried::Sweep => ["m", t!("map of addresses"), t!("which of the addresses 0 to 65535 a unit answers at")],
@@ -99,13 +110,19 @@ impl Bench {
                 bare: self.bare,
                 problem: None,
             }),
-            Tried::Request | Tried::Loopback | Tried::Plug | Tried::Identify | Tried::Scan | Tried::Sweep => {
+            Tried::Request
+            | Tried::Loopback
+            | Tried::Plug
+            | Tried::Signal
+            | Tried::Identify
+            | Tried::Scan
+            | Tried::Sweep => {
                 let last = self.form.take_if(|form| form.is(at.id, tried));
                 Window::Form(last.unwrap_or_else(|| Form::new(cx, at, tried)))
             }
         };
         // What is sent as it was typed may be a write.
-        let diagnostic = match matches!(tried, Tried::Bytes | Tried::Request | Tried::Plug) {
+        let diagnostic = match matches!(tried, Tried::Bytes | Tried::Request | Tried::Plug | Tried::Signal) {
             true => Diagnostic::Send(Vec::new()),
             false => Diagnostic::Identify { unit: 1 },
         };
@@ -156,7 +173,13 @@ fn begin(at: &LineView) -> usize {
         Some(Diagnostic::Loopback { .. } | Diagnostic::Pattern { .. } | Diagnostic::Scan(_) | Diagnostic::Sweep(_)) => {
             usize::MAX
         }
-        Some(Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_))
+        Some(
+            Diagnostic::Send(_)
+            | Diagnostic::Identify { .. }
+            | Diagnostic::Read { .. }
+            | Diagnostic::Write(_)
+            | Diagnostic::Signal(_),
+        )
         | None => 0,
     }
 }
@@ -178,10 +201,10 @@ pub fn closed(at: &LineView) -> Option<String> {
 
 /// Starts a test, or asks first; `Err` says why it cannot be started.
 pub fn start(cx: &ViewContext, at: &LineView, diagnostic: Diagnostic) -> Result<UiAction, String> {
-    let alone = matches!(&diagnostic, Diagnostic::Scan(scan) if !scan.serials.is_empty());
-    if let Some(why) = closed(at).filter(|_| !alone) {
+    if let Some(why) = closed(at).filter(|_| !diagnostic.is_exclusive()) {
         return Err(why);
     }
+    diagnostic.check_on(at.settings)?;
     let query = danger(cx, at, &diagnostic);
     let command = CommandKind::Test(at.id, diagnostic);
     let Some(words) = query else { return Ok(UiAction::Command(command)) };
@@ -205,6 +228,11 @@ fn danger(cx: &ViewContext, at: &LineView, diagnostic: &Diagnostic) -> Option<St
             t!("Sends bytes that are no Modbus, between the polls: units on the line may count errors. Start it?")
                 .to_owned(),
         ),
+        Diagnostic::Signal(test) => Some(t!(
+            "Polling of {name} pauses, and its alarms are not evaluated: {test}, then put back. Start it?",
+            name = at.settings.name,
+            test
+        )),
         Diagnostic::Write(_) => {
             Some(t!("{diagnostic}. This bypasses all limits of the plant file. Write it?", diagnostic))
         }

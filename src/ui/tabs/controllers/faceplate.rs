@@ -116,7 +116,7 @@ pub fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, layout
         canvas.text(if tall { 0 } else { 1 }, y, name, cx.theme.dim());
         let room = if tall { canvas.width().saturating_sub(4) } else { values };
         let end = canvas.text(4, y, &shown.within(room), shown.style);
-        let apart = sv_difference(cx, faceplate).filter(|_| tag == faceplate.sv_to_show());
+        let apart = beside(cx, faceplate, tag);
         if let Some(words) = apart.as_ref().filter(|_| tall) {
             canvas.text(end + 2, y, words, cx.theme.strong());
         }
@@ -139,6 +139,15 @@ pub fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, layout
         };
         bar(cx, &mut canvas.part(x, y, wide, 1), faceplate, tag, scale);
     }
+}
+
+/// What is said beside a value: an SV that is set and not in use, an output as it is at the terminals.
+fn beside(cx: &ViewContext, faceplate: &Faceplate, tag: TagId) -> Option<String> {
+    if tag == faceplate.sv_to_show() {
+        return sv_difference(cx, faceplate);
+    }
+    let output = cx.def().device(cx.def().tag(tag).device).output.filter(|_| faceplate.mv == Some(tag))?;
+    output.text(cx.snapshot.sample(tag).good_value()?)
 }
 
 /// The ends of a tag's range: `0.0`, `120.0 °C`.

@@ -1,6 +1,10 @@
 //! The pages of the bus tab and the keys between them.
 
 use super::*;
+use crate::plant::{
+    def::{Rs485, Transport},
+    port_signals::{OutputSignal, PortSignals, SignalTest},
+};
 
 #[test]
 fn a_silent_device_shows_its_next_poll_and_r_polls_it_now() {
@@ -212,4 +216,43 @@ fn local_echo_and_signals_stand_on_the_page_of_the_line() {
     let shown = screen(&mut bus(&fixture, Theme::FULL, "l"), 120, 40);
     assert!(shown.contains("local echo: the adapter gives back what it sends"), "{shown}");
     assert!(shown.contains("RTS on") && shown.contains("CTS on") && shown.contains("DCD off"), "{shown}");
+}
+
+#[test]
+fn a_signal_is_set_after_a_question_and_its_inputs_are_listed() {
+    let mut model = bus(&Fixture::traffic(), Theme::FULL, "Tg→");
+    type_keys(&mut model, "↓→⏎");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("DTR off for") && shown.contains("10 s, then put back"), "{shown}");
+    let effects = type_keys(&mut model, "y");
+    let test = SignalTest { signal: OutputSignal::Dtr, on: false, seconds: 10 };
+    let diagnostic = Diagnostic::Signal(test);
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, diagnostic.clone())));
+    let mut fixture = Fixture::traffic();
+    let signals = |ms, bits| Finding::Signals { after: Duration::from_millis(ms), signals: PortSignals(bits) };
+    let findings = vec![signals(250, 0x004), signals(10_000, 0x146)];
+    fixture.line.test = Some(run(diagnostic, DiagnosticState::Done, 41, 41, findings));
+    let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
+    assert!(shown.contains(" 0.25 s  RTS on  DTR off") && shown.contains("10.00 s  RTS on  DTR on"), "{shown}");
+}
+
+#[test]
+fn no_signal_is_set_where_the_driver_has_it_or_there_is_none() {
+    let on = |transport: &dyn Fn(&mut Transport)| {
+        let mut fixture = Fixture::traffic();
+        let mut report = fixture.line.report.as_deref().cloned().expect("the line has reported");
+        transport(&mut report.settings.transport);
+        fixture.line.report = Some(Arc::new(report));
+        let mut model = bus(&fixture, Theme::FULL, "Tg");
+        assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None);
+        screen(&mut model, 80, 24)
+    };
+    let shown = on(&|transport| *transport = Transport::tcp("host", 502));
+    assert!(shown.contains("a TCP connection has no RTS and DTR"), "{shown}");
+    let shown = on(&|transport| {
+        if let Transport::Serial { rs485, .. } = transport {
+            *rs485 = Rs485::RtsHigh;
+        }
+    });
+    assert!(shown.contains("the driver switches RTS on this line"), "{shown}");
 }
