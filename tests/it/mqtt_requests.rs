@@ -161,7 +161,7 @@ fn what_is_no_valid_request_is_refused_and_writes_nothing() {
     check(&text("r-7", "TIC-1.SV", json!(50)), &["-r"], "retained");
     // What the plant refuses, as it would refuse it to a person: out of limits, and not for this role.
     check(&text("r-8", "TIC-1.SV", json!(100_000)), &[], "outside");
-    check(&text("r-9", "TIC-1.P", json!(7)), &[], "this is for a Supervisor, you are Technician");
+    check(&text("r-9", "TIC-1.P", json!(7)), &[], "this is for a supervisor, you are technician");
 
     // Longer than a packet may be: the broker keeps it to itself, and the connection stays.
     client.publish(TOPIC, &vec![b' '; 100_000], &[]);
@@ -197,7 +197,7 @@ fn a_station_killed_before_the_outcome_answers_unknown() {
     station.signal("KILL");
     assert_eq!(station.end(), None);
     place.simulator().signal("CONT");
-    // Sent while no station runs: the broker keeps it for nobody.
+    // Sent while no station runs: the broker keeps it for no later subscriber.
     client.send(&request("k-2", "TIC-1.SV", 54), &[]);
 
     let mut station = place.station();

@@ -23,7 +23,7 @@ fn requests_have_the_rights_of_their_user() {
     assert_eq!(tech.last(), ("tech login", "tech", "done: named by the plant file"));
     assert_eq!(refused(&mut tech, RUN), None);
     let mut view = bench("view", AccessDef::default());
-    assert_eq!(refused(&mut view, RUN).as_deref(), Some("this is for a Technician, you are Viewer"));
+    assert_eq!(refused(&mut view, RUN).as_deref(), Some("this is for a technician, you are viewer"));
     let trusted = AccessDef { trusted: vec![("mes".into(), Role::Technician)], ..AccessDef::default() };
     assert_eq!(refused(&mut bench("mes", trusted), RUN), None);
 }
@@ -53,7 +53,7 @@ fn disabling_the_user_ends_its_requests_at_once() {
     bench.later(1);
     assert_eq!(bench.who(MES).as_deref(), Some("tech"));
     bench.request(1, SessionRequest::SetRole { user: "tech".into(), role: Role::Viewer }).unwrap();
-    assert!(refused(&mut bench, RUN).is_some_and(|why| why.contains("for a Technician")));
+    assert!(refused(&mut bench, RUN).is_some_and(|why| why.contains("for a technician")));
 }
 
 #[test]
