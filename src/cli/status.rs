@@ -119,7 +119,7 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
     let until = |north: &NorthStatus| local(north.sent_until, def);
     lines.extend(snapshot.north.iter().map(|north| format!("data out {}", north.words(&until(north)))));
     let requests = snapshot.north.iter().filter_map(|north| north.requests.as_ref());
-    lines.extend(requests.map(|requests| format!("requests {}", requests.words(|at| local(at, def)))));
+    lines.extend(requests.map(|requests| format!("requests {}", requests.words(|at| local(at, def)).join(", "))));
     lines.extend(snapshot.suppressed.iter().map(|alarm| format!("suppressed {}", suppressed_words(snapshot, alarm))));
     if client::is_withheld(snapshot) {
         lines.push("tag      values are shown after a login: --user NAME".to_owned());

@@ -105,8 +105,9 @@ pub enum MqttRefusal {
 }
 
 impl MqttRequestStatus {
-    /// `as mes, 3 accepted, 2 refused, 0 unanswered, last at 14:02:30: 4711 TIC-1.SV = 50: verified`; `at` gives an instant in words.
-    pub fn words(&self, at: impl Fn(Timestamp) -> String) -> String {
+    /// `as mes, 3 accepted, 2 refused, 0 unanswered`, and `last at 14:02:30: 4711 TIC-1.SV = 50: verified` if there was one;
+    /// `at` gives an instant in words.
+    pub fn words(&self, at: impl Fn(Timestamp) -> String) -> Vec<String> {
         let MqttRequestStatus { user, accepted, refused, unanswered, last, error } = self;
         let why = error.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
         let counts = t!(
@@ -117,11 +118,9 @@ impl MqttRequestStatus {
             refused,
             unanswered
         );
-        match last {
-            None => counts,
-            Some(LastMqttRequest { at: came, what, result }) => {
-                counts + ", " + &t!("last at {at}: {what}: {result}", at = at(*came), what, result)
-            }
-        }
+        let last = last.as_ref().map(|LastMqttRequest { at: came, what, result }| {
+            t!("last at {at}: {what}: {result}", at = at(*came), what, result)
+        });
+        std::iter::once(counts).chain(last).collect()
     }
 }
