@@ -104,6 +104,7 @@
 //! | audit log, chain hash, seal | who did what; links its entries; signs it with a key that is then replaced |
 //! | automatic report | a report that the station makes at the end of each shift, day, week or month; on record in the history |
 //! | data out, cursor | values for other systems, over MQTT; the instant before which the broker has acknowledged everything |
+//! | request from outside | a write that another system asks for over MQTT, as a user of the plant file |
 //! | epoch | counts the steps of the clock, so that records of a doubled time can be distinguished |
 //! | batch, phase | what the plant makes between two conditions of its file; a value of its phase tag |
 //! | control run | what a control loop did after a change of its setpoint, a program step or the start of a batch |

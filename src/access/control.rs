@@ -2,6 +2,7 @@
 
 mod history_jobs;
 mod commands;
+mod delegate;
 mod login;
 mod audit_entries;
 mod user_admin;
@@ -337,6 +338,7 @@ impl AccessControl {
     /// Time passes.
     pub fn tick(&mut self, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.lock_idle(at);
+        effects.extend(self.follow_delegates());
         effects.extend(self.summarise_refusals(at));
         effects.extend(self.start_waiting_jobs(at));
         if self.unsaved && self.saving.is_none() {
@@ -361,7 +363,11 @@ impl AccessControl {
     /// The user, if the role is sufficient. `Err` is the reply to the user.
     fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&LoggedInUser, String> {
         let session = self.session(terminal)?;
-        let who = session.who.as_ref().ok_or(LOG_IN_FIRST)?;
+        let unknown = || match &session.acts_as {
+            Some(user) => format!("{user} is not a user of this station, or is disabled"),
+            None => LOG_IN_FIRST.to_owned(),
+        };
+        let who = session.who.as_ref().ok_or_else(unknown)?;
         if session.locked {
             return Err("this terminal is locked".to_owned());
         }

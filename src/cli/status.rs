@@ -118,6 +118,8 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
     lines.extend(snapshot.load.iter().map(|load| format!("program  {}", load.words())));
     let until = |north: &NorthStatus| local(north.sent_until, def);
     lines.extend(snapshot.north.iter().map(|north| format!("data out {}", north.words(&until(north)))));
+    let requests = snapshot.north.iter().filter_map(|north| north.requests.as_ref());
+    lines.extend(requests.map(|requests| format!("requests {}", requests.words(|at| local(at, def)).join(", "))));
     lines.extend(snapshot.suppressed.iter().map(|alarm| format!("suppressed {}", suppressed_words(snapshot, alarm))));
     if client::is_withheld(snapshot) {
         lines.push("tag      values are shown after a login: --user NAME".to_owned());
@@ -269,6 +271,13 @@ fn in_json(snapshot: &Snapshot) -> Value {
         "north": snapshot.north.as_ref().map(|north| json!({
             "connected": north.connected, "sent": north.sent, "refused": north.refused,
             "sent_until": north.sent_until.to_string(), "error": north.error,
+            "requests": north.requests.as_ref().map(|requests| json!({
+                "as": requests.user, "accepted": requests.accepted, "refused": requests.refused,
+                "unanswered": requests.unanswered, "error": requests.error,
+                "last": requests.last.as_ref().map(|last| json!({
+                    "at": last.at.to_string(), "what": last.what, "result": last.result.to_string(),
+                })),
+            })),
         })),
     })
 }

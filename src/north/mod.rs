@@ -8,6 +8,12 @@
 //!                    └────── cursor file              written when the broker has acknowledged
 //! ```
 //!
+//! Only where the plant file names a user for it, a third one comes in:
+//!
+//! ```text
+//!   TOPIC/DEVICE/request ──> list on disk ──> command of that user ──> outcome ──> TOPIC/DEVICE/response
+//! ```
+//!
 //! The state is for those who look, the samples are for those who store. A sample goes from the history, never from memory: an
 //! outage of any length, of the broker, the network or the station, delays it and loses nothing.
 
@@ -15,3 +21,6 @@ pub mod deadband;
 pub mod forwarder;
 pub mod io;
 pub mod payload;
+pub mod request;
+pub(crate) mod request_log;
+pub(crate) mod requests;

@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
+use super::request::ReplyTo;
 use crate::plant::{
     Snapshot,
     def::{DeviceDef, MqttDef, PlantDef, TagId},
@@ -21,11 +22,18 @@ pub struct Message {
     pub payload: Vec<u8>,
     /// The broker keeps it for who subscribes later.
     pub retained: bool,
+    /// By which a client knows the answer to its request.
+    pub correlation: Option<Vec<u8>>,
 }
 
 impl Message {
     fn new(topic: String, payload: &Value, retained: bool) -> Message {
-        Message { topic, payload: payload.to_string().into_bytes(), retained }
+        Message { topic, payload: payload.to_string().into_bytes(), retained, correlation: None }
+    }
+
+    /// The answer to a request.
+    pub fn answer(to: &ReplyTo, payload: &Value) -> Message {
+        Message { correlation: to.correlation.clone(), ..Message::new(to.topic.clone(), payload, false) }
     }
 }
 
@@ -104,6 +112,7 @@ pub(super) mod tests {
             password: None,
             tls: None,
             topic: "sightglass/tank".into(),
+            commands_as: None,
             deadbands: Vec::new(),
             max_interval: Duration::from_secs(60),
             lag_max: Duration::from_secs(120),

@@ -12,6 +12,7 @@ pub(crate) mod time;
 pub(crate) mod keyword;
 pub mod visible;
 pub mod history_def;
+pub mod mqtt_request;
 pub mod north_def;
 pub mod id;
 pub mod role;

@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::id::TagId;
+use super::{id::TagId, mqtt_request::MqttRequestStatus};
 use crate::t;
 
 /// What the table `[north]` of a plant file says.
@@ -39,6 +39,8 @@ pub struct MqttDef {
     pub tls: Option<TlsRoots>,
     /// The topic above those of the devices: `sightglass/tank`.
     pub topic: String,
+    /// The user as whom requests from outside act; `None`: none are taken.
+    pub commands_as: Option<String>,
     /// A value is sent when it differs from the last one sent by more than this, in the tag's unit; by [`TagId`], 0 for
     /// every stored sample.
     pub deadbands: Vec<f64>,
@@ -84,7 +86,7 @@ pub fn topic_level(name: &str) -> String {
 }
 
 /// How far the data out has come.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct NorthStatus {
     /// The broker has accepted the station.
     pub connected: bool,
@@ -96,12 +98,14 @@ pub struct NorthStatus {
     pub sent_until: Timestamp,
     /// What went wrong last; `None` while all is well.
     pub error: Option<String>,
+    /// The requests from outside, where the plant file permits them.
+    pub requests: Option<MqttRequestStatus>,
 }
 
 impl NorthStatus {
     /// `connected, 5192 samples sent, 0 refused, complete until 14:02:30`; `until` is the instant in words.
     pub fn words(&self, until: &str) -> String {
-        let NorthStatus { connected, sent, refused, sent_until: _, error } = self;
+        let NorthStatus { connected, sent, refused, sent_until: _, error, requests: _ } = self;
         let state = if *connected { t!("connected") } else { t!("not connected") };
         let why = error.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
         t!(

@@ -51,12 +51,34 @@ fn mqtt_of(plant: &str, table: &MqttTable, defs: &Defs, problems: &mut Problems)
         client_id: client_id.map_or_else(|| format!("sightglass-{plant}"), |id| id.value.clone()),
         user: table.user.as_ref().map(|user| user.value.clone()),
         password,
+        commands_as: table
+            .commands_as
+            .as_ref()
+            .map(|user| commands_as(user, tls.is_some() || is_local(table), problems)),
         tls,
         topic,
         deadbands: deadbands(table, defs, problems),
         max_interval: max_interval.value_or(MAX_INTERVAL),
         lag_max: lag_max.value_or(LAG_MAX),
     })
+}
+
+/// The user as whom requests from outside act. Whether that user exists is known to the station alone, which says so.
+fn commands_as(user: &At<String>, is_private: bool, problems: &mut Problems) -> String {
+    if user.value.trim().is_empty() {
+        problems
+            .add(user.at, "requests need a user as whom they act")
+            .label("expected the name of a user of the station");
+    } else if !is_private {
+        let problem = problems.warn(user.at, "requests are taken over a connection without TLS");
+        problem.label("anybody on the network may read and forge them").help("set `tls = true`");
+    }
+    user.value.clone()
+}
+
+/// Is the broker on this computer?
+fn is_local(table: &MqttTable) -> bool {
+    table.host.as_ref().is_some_and(|host| matches!(host.value.as_str(), "localhost" | "127.0.0.1" | "::1"))
 }
 
 fn host(host: &At<String>, problems: &mut Problems) -> String {

@@ -317,6 +317,7 @@ toml_tables! {
         opt "tls" tls: bool,
         opt "ca_file" ca_file: String,
         opt "topic" topic: String,
+        opt "commands_as" commands_as: String,
         opt "deadband_percent" deadband_percent: f64,
         list "deadband" deadbands: DeadbandTable,
         opt "max_interval" max_interval: Duration,

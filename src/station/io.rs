@@ -3,6 +3,7 @@
 mod delivery;
 mod process_load;
 pub(crate) mod report_files;
+mod requests;
 pub mod reports;
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
@@ -40,7 +41,8 @@ use super::{
     past::Past,
     plant_task::{KEPT_FOR_STOPS, Persistence, PlantTask, RecordObserver},
     session::Session,
-    session_server::{self, Outputs, SessionAcceptor, SessionServer},
+    session_acceptor::SessionAcceptor,
+    session_server::{self, Outputs, SessionServer},
     sets, supervisor,
 };
 
@@ -247,6 +249,7 @@ fn assemble(
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
+    let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots.clone());
     let store = persistence.records.clone().map(|records| (records, persistence.store.clone()));
     let plant_task = PlantTask::new(plant, clock, links, file, persistence, publish);
     let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
@@ -256,8 +259,9 @@ fn assemble(
     }
     if let (Some((_, history)), Some(mqtt)) = (&store, &def.north.mqtt) {
         let (snapshots, queries, events) = (snapshots.clone(), queries.clone(), events.clone());
+        let requests = requests::start(mqtt, clock, &acceptor, &history_file, stopped.clone());
         let (def, mqtt, history, history_file) = (def.clone(), mqtt.clone(), history.clone(), history_file.clone());
-        let task = NorthTask { def, mqtt, clock, snapshots, queries, history, events, history_file };
+        let task = NorthTask { def, mqtt, clock, snapshots, queries, history, events, history_file, requests };
         tasks.push(tokio::spawn(north::run(task, stopped.clone())));
     }
     if let Some((records, status)) = store.filter(|_| !def.report.automatic.is_empty()) {
@@ -276,7 +280,6 @@ fn assemble(
         audit,
         lifecycle: lifecycle_sender,
     };
-    let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
     let open = guarded.is_none();
     let (access, users) = guarded.map_or_else(
         || (AccessControl::new(def, Some(own_user().into())), None),

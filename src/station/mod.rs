@@ -30,6 +30,7 @@ pub mod session;
 mod audit_queue;
 mod durability;
 mod entries;
+mod session_acceptor;
 mod session_server;
 mod past;
 mod plant_task;
@@ -45,4 +46,5 @@ pub mod io;
 mod tests;
 
 pub use session::{Request, Session};
-pub use session_server::{LifecycleRequest, SessionAcceptor};
+pub use session_acceptor::SessionAcceptor;
+pub use session_server::LifecycleRequest;

@@ -1,14 +1,6 @@
 //! The task between terminals and plant: owns the sessions and routes what access control permits.
 
-use std::{
-    collections::BTreeMap,
-    path::PathBuf,
-    sync::{
-        Arc,
-        atomic::{AtomicU32, Ordering},
-    },
-    time::Duration,
-};
+use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
     sync::{mpsc, oneshot, watch},
@@ -20,37 +12,23 @@ use super::{
     audit_queue::AuditMessage,
     blocking_jobs::{BlockingJobs, Done},
     companions,
-    session::{Request, Session},
+    session::Request,
+    session_acceptor::AttachRequest,
 };
 use crate::{
-    access::{AccessControl, Durability, Effect, Peer, SessionStatus},
+    access::{AccessControl, Durability, Effect, SessionStatus},
     bus::io::{clock::Clock, live_reads::LiveRequest},
     history::{
         Answer, HistoryError, Query,
         io::{HistoryJob, JobRequest, QueryRequest},
     },
-    plant::{Snapshot, command::CommandStatus},
+    plant::command::CommandStatus,
 };
 
-/// Requests of all terminals that may wait; more are refused.
-const REQUESTS: usize = 256;
-/// Attach requests that may wait.
-const ATTACH_QUEUE_MAX: usize = 16;
 /// Requests for the station as a whole that may wait.
 pub const LIFECYCLE_REQUESTS_MAX: usize = 4;
 /// How often timeouts are checked: idle terminals, ends of lockouts, closed terminals.
 const TICK: Duration = Duration::from_millis(500);
-
-/// A terminal asks to attach.
-#[derive(Debug)]
-pub struct AttachRequest {
-    /// Its number.
-    pub terminal: u32,
-    /// Where it is.
-    pub peer: Peer,
-    /// Receives its session status; closed when the terminal has gone.
-    pub status: watch::Sender<Arc<SessionStatus>>,
-}
 
 /// What a terminal has requested of the station as a whole.
 #[derive(Debug)]
@@ -80,38 +58,6 @@ pub struct Outputs {
     pub audit: mpsc::Sender<AuditMessage>,
     /// To the owner of the station.
     pub lifecycle: mpsc::Sender<LifecycleRequest>,
-}
-
-/// Opens sessions; cheap to clone.
-#[derive(Debug, Clone)]
-pub struct SessionAcceptor {
-    /// The latest snapshot only.
-    pub snapshots: watch::Receiver<Arc<Snapshot>>,
-    attach_requests: mpsc::Sender<AttachRequest>,
-    requests: mpsc::Sender<(u32, Request)>,
-    terminals: Arc<AtomicU32>,
-}
-
-impl SessionAcceptor {
-    /// The acceptor, and the queues of attach requests and of requests.
-    pub fn new(
-        snapshots: watch::Receiver<Arc<Snapshot>>,
-    ) -> (SessionAcceptor, mpsc::Receiver<AttachRequest>, mpsc::Receiver<(u32, Request)>) {
-        let (attach_requests, attach_queue) = mpsc::channel(ATTACH_QUEUE_MAX);
-        let (requests, requested) = mpsc::channel(REQUESTS);
-        (SessionAcceptor { snapshots, attach_requests, requests, terminals: Arc::default() }, attach_queue, requested)
-    }
-
-    /// Attaches a terminal. It has no rights until its first status arrives, which never happens while the attach queue is full.
-    pub fn attach(&self, peer: Peer) -> Session {
-        let terminal = self.terminals.fetch_add(1, Ordering::Relaxed) + 1;
-        let (status_sender, status) = watch::channel(Arc::new(SessionStatus::default()));
-        if let Err(error) = self.attach_requests.try_send(AttachRequest { terminal, peer, status: status_sender }) {
-            tracing::error!(%error, "a terminal was refused");
-        }
-        let (snapshots, requests) = (self.snapshots.clone(), self.requests.clone());
-        Session { snapshots, status, requests, terminal }
-    }
 }
 
 /// Whether the audit entry of a request that is answered is on its way to the log.
@@ -174,7 +120,11 @@ impl SessionServer {
                 _ = stopped.wait_for(|stopped| *stopped) => break,
                 Some(request) = attach_requests.recv() => {
                     self.terminals.insert(request.terminal, request.status);
-                    let effects = self.access.open(request.terminal, request.peer, self.clock.now());
+                    let (terminal, peer, now) = (request.terminal, request.peer, self.clock.now());
+                    let effects = match &request.acts_as {
+                        Some(user) => self.access.open_delegate(terminal, user, &peer.from, now),
+                        None => self.access.open(terminal, peer, now),
+                    };
                     self.apply_effects(effects);
                 }
                 done = self.jobs.next() => {

@@ -12,6 +12,7 @@
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `listen` | the line of a master and a slave that we did not write, heard over a tap: frames, values, capture; nothing is sent |
 //! | `mqtt` | data out to a broker that is stopped and killed, as the station is; TLS and passwords |
+//! | `mqtt_requests` | requests from outside: written once, refused, repeated, before and after a kill |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
 //! | `shift` | a whole shift in virtual time, and its report read by an independent reader |
 //! | `automatic_reports` | a station killed while it makes reports: each is there once, whole, and on record |
@@ -54,6 +55,7 @@ mod listen;
 mod logs;
 mod masters;
 mod mqtt;
+mod mqtt_requests;
 mod outstanding;
 mod peers;
 mod users;

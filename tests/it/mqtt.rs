@@ -22,17 +22,17 @@ use crate::support::{Process, TIMEOUT, folder, free_port, have, sightglass, simu
 /// Tag, time and value of a sample.
 type Row = (String, Timestamp, Option<String>);
 
-struct Place {
+pub struct Place {
     folder: tempfile::TempDir,
     sockets: PathBuf,
-    port: u16,
+    pub port: u16,
     devices: String,
-    _sim: Process,
+    sim: Process,
 }
 
 impl Place {
     /// A tank that sends to a broker, and more lines of `[north.mqtt]`.
-    fn new(more: &str) -> Place {
+    pub fn new(more: &str) -> Place {
         let (folder, sockets) = (folder(), sockets());
         let (sim, devices) = simulated_tank();
         let port = free_port();
@@ -43,15 +43,15 @@ impl Place {
         );
         let plant = String::from_utf8(shipped.stdout).unwrap() + &rules;
         fs::write(folder.path().join("tank.toml"), plant).unwrap();
-        Place { folder, sockets, port, devices, _sim: sim }
+        Place { folder, sockets, port, devices, sim }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
     /// A broker that keeps what it has acknowledged for a subscriber that is away.
-    fn broker(&self, listener: &str) -> Process {
+    pub fn broker(&self, listener: &str) -> Process {
         let broker = Broker { port: self.port, folder: self.folder.path() };
         broker.start(listener)
     }
@@ -90,7 +90,12 @@ impl Place {
         subscriber.wait_for(&format!("sightglass/tank/mark {mark}"));
     }
 
-    fn station(&self) -> Process {
+    /// The devices.
+    pub fn simulator(&self) -> &Process {
+        &self.sim
+    }
+
+    pub fn station(&self) -> Process {
         let mut station = Process::start(
             sightglass()
                 .arg("run")
@@ -105,7 +110,7 @@ impl Place {
     }
 
     /// Asks the station until it says so.
-    fn wait_until(&self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
+    pub fn wait_until(&self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
         let end = Instant::now() + TIMEOUT;
         loop {
             let output =
@@ -167,7 +172,7 @@ fn received(lines: &[String]) -> Vec<Row> {
     .collect()
 }
 
-fn have_mosquitto() -> bool {
+pub fn have_mosquitto() -> bool {
     have("mosquitto", "mosquitto") && have("mosquitto_sub", "mosquitto-clients")
 }
 

@@ -40,6 +40,7 @@ impl AccessControl {
             // On record it would name what the plant file of this run has in its place.
             return self.undelivered(command.id, OTHER_RUN);
         }
+        let mut effects = self.follow_delegates();
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let number = command.id.number;
         if session.last_command.is_some_and(|last| number <= last) {
@@ -50,10 +51,12 @@ impl AccessControl {
         if !session.locked {
             session.active = at;
         }
-        match self.may(terminal, Some(right::needs(&self.def, &command.kind))) {
+        let passed = match self.may(terminal, Some(right::needs(&self.def, &command.kind))) {
             Err(why) => self.refuse_command(terminal, command, Refusal::NotPermitted(why), at),
             Ok(_) => self.reauthenticate(terminal, command, credentials, at),
-        }
+        };
+        effects.extend(passed);
+        effects
     }
 
     /// The role is enough, and so is the reauthentication.

@@ -33,6 +33,8 @@ pub struct SessionState {
     pub login_number: u64,
     /// Known by the operating system, without a password.
     pub trusted: bool,
+    /// The user as whom requests from outside act here; `None` for a terminal.
+    pub acts_as: Option<Arc<str>>,
     /// Locked until the password is entered.
     pub locked: bool,
     /// When a key was last pressed.
@@ -55,6 +57,7 @@ impl SessionState {
             who: None,
             login_number: 0,
             trusted: false,
+            acts_as: None,
             locked: false,
             active: at,
             requests: REQUESTS,

@@ -40,7 +40,8 @@ impl AccessControl {
         whose: &str,
         at: Timestamp,
     ) -> Result<Vec<Effect>, String> {
-        let these = || self.sessions.iter().filter(|(_, session)| !session.peer.in_process && counts(session));
+        let is_terminal = |session: &SessionState| !session.peer.in_process && session.acts_as.is_none();
+        let these = || self.sessions.iter().filter(|(_, session)| is_terminal(session) && counts(session));
         let there = these().count();
         if there < most {
             return Ok(Vec::new());

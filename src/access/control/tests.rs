@@ -358,6 +358,7 @@ mod late;
 mod commands;
 mod place;
 mod room;
+mod delegate;
 
 proptest! {
     #[test]

@@ -1,15 +1,29 @@
 //! One connection to an MQTT broker, from its acceptance to its end. MQTT 5, because only there a broker says what it refuses.
 
-use std::{future::Future, time::Duration};
+use std::{
+    future::Future,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Duration,
+};
 
 use rumqttc::{
-    AsyncClient, ConnectionError, Event, EventLoop, LastWill, MqttOptions, Packet, PubAckReason, PublishNoticeError,
-    PublishOptions, QoS, TlsConfiguration, Transport,
+    AsyncClient, ConnectionError, Event, EventLoop, LastWill, MqttOptions, Packet, PubAckReason, Publish,
+    PublishNoticeError, PublishOptions, PublishProperties, QoS, SubscribeFilterInput, TlsConfiguration, Transport,
 };
-use tokio::{sync::oneshot, task::JoinHandle, time::timeout};
+use tokio::{
+    sync::{mpsc, oneshot},
+    task::JoinHandle,
+    time::timeout,
+};
 
 use crate::{
-    north::payload::{self, Message},
+    north::{
+        payload::{self, Message},
+        request::{self, PACKET_MAX, Received},
+    },
     plant::def::{MqttDef, PasswordSource, TlsRoots},
 };
 
@@ -22,6 +36,35 @@ const KEEP_ALIVE_S: u16 = 20;
 /// Messages on their way to the connection.
 const QUEUE_MAX: usize = 16;
 
+/// Where messages on the topics of requests go. The connection never waits for it.
+#[derive(Debug, Clone)]
+pub struct Inbox {
+    queue: mpsc::Sender<Received>,
+    lost: Arc<AtomicU64>,
+}
+
+impl Inbox {
+    /// `lost` counts what the queue had no room for.
+    pub fn new(queue: mpsc::Sender<Received>, lost: Arc<AtomicU64>) -> Inbox {
+        Inbox { queue, lost }
+    }
+
+    fn put(&self, publish: Publish) {
+        let Publish { retain, topic, payload, properties, .. } = publish;
+        let PublishProperties { response_topic, correlation_data, .. } = properties.unwrap_or_default();
+        let received = Received {
+            topic: String::from_utf8_lossy(&topic).into_owned(),
+            payload: payload.into(),
+            retained: retain,
+            response_topic,
+            correlation: correlation_data.map(Into::into),
+        };
+        if self.queue.try_send(received).is_err() {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
 /// A connection that the broker has accepted.
 pub struct Broker {
     client: AsyncClient,
@@ -30,11 +73,11 @@ pub struct Broker {
 }
 
 impl Broker {
-    /// Connects, and says that the station is there. The error is for people.
-    pub async fn connect(def: &MqttDef) -> Result<Broker, String> {
+    /// Connects, and says that the station is there; requests go to the inbox, if there is one. The error is for people.
+    pub async fn connect(def: &MqttDef, inbox: Option<&Inbox>) -> Result<Broker, String> {
         let (client, events) = AsyncClient::builder(options(def)?).capacity(QUEUE_MAX).build();
         let (accepted, is_accepted) = oneshot::channel();
-        let mut broker = Broker { client, connection: tokio::spawn(drive(events, accepted)) };
+        let mut broker = Broker { client, connection: tokio::spawn(drive(events, accepted, inbox.cloned())) };
         let accepted = broker.unless_ended(is_accepted);
         match timeout(CONNECT_MAX, accepted).await {
             Ok(Ok(Ok(()))) => {}
@@ -46,13 +89,27 @@ impl Broker {
         Ok(broker)
     }
 
+    /// Asks for the requests. What was sent before is not delivered: the connection began clean. The error is for people.
+    pub async fn subscribe(&mut self, def: &MqttDef) -> Result<(), String> {
+        let client = self.client.clone();
+        // What is retained arrives as such, and is refused.
+        let filter = SubscribeFilterInput::new(request::filter(def), QoS::AtLeastOnce).preserve_retain(true);
+        let notice = self.within(client.subscribe_many_tracked([filter])).await?.map_err(|error| error.to_string())?;
+        self.within(notice.wait_async()).await?.map(drop).map_err(|error| error.to_string())
+    }
+
+    /// Publishes over this connection, without the others waiting.
+    pub fn client(&self) -> AsyncClient {
+        self.client.clone()
+    }
+
     /// Publishes messages and waits until the broker has all of them. Returns how many it will never take.
     pub async fn publish(&mut self, messages: &[Message]) -> Result<u64, String> {
         let mut notices = Vec::with_capacity(messages.len());
-        for Message { topic, payload, retained } in messages {
-            let options = PublishOptions::at_least_once().retain(*retained);
+        for message in messages {
             let client = self.client.clone();
-            let queued = client.publish_tracked(topic.clone(), payload.clone(), options);
+            let queued =
+                client.publish_tracked(message.topic.clone(), message.payload.clone(), publish_options(message));
             notices.push(self.within(queued).await?.map_err(|error| error.to_string())?);
         }
         let mut refused = 0;
@@ -99,6 +156,17 @@ impl Drop for Broker {
     }
 }
 
+/// How a message is published.
+pub(super) fn publish_options(message: &Message) -> PublishOptions {
+    let options = PublishOptions::at_least_once().retain(message.retained);
+    match &message.correlation {
+        None => options,
+        Some(data) => {
+            options.properties(PublishProperties { correlation_data: Some(data.clone().into()), ..Default::default() })
+        }
+    }
+}
+
 /// Will it be refused again, however often it is sent?
 fn is_final(reason: PubAckReason) -> bool {
     match reason {
@@ -114,7 +182,7 @@ fn is_final(reason: PubAckReason) -> bool {
 }
 
 /// Moves bytes until the connection ends.
-async fn drive(mut events: EventLoop, accepted: oneshot::Sender<()>) -> String {
+async fn drive(mut events: EventLoop, accepted: oneshot::Sender<()>, inbox: Option<Inbox>) -> String {
     let mut accepted = Some(accepted);
     loop {
         match events.poll().await {
@@ -123,6 +191,11 @@ async fn drive(mut events: EventLoop, accepted: oneshot::Sender<()>) -> String {
                 let _ = accepted.take().map(|accepted| accepted.send(()));
             }
             Ok(Event::Incoming(Packet::Disconnect(why))) => return format!("the broker ends: {:?}", why.reason_code),
+            Ok(Event::Incoming(Packet::Publish(publish))) => {
+                if let Some(inbox) = &inbox {
+                    inbox.put(publish);
+                }
+            }
             Ok(_) => {}
             Err(ConnectionError::ConnectionRefused(code)) => return format!("the broker refuses: {code:?}"),
             Err(ConnectionError::Io(error)) => return error.to_string(),
@@ -133,8 +206,8 @@ async fn drive(mut events: EventLoop, accepted: oneshot::Sender<()>) -> String {
 
 fn options(def: &MqttDef) -> Result<MqttOptions, String> {
     let mut options = MqttOptions::new(def.client_id.clone(), (def.host.clone(), def.port));
-    let Message { topic, payload, retained } = payload::status(def, false);
-    options.set_keep_alive(KEEP_ALIVE_S).set_clean_start(true);
+    let Message { topic, payload, retained, correlation: _ } = payload::status(def, false);
+    options.set_keep_alive(KEEP_ALIVE_S).set_clean_start(true).set_max_packet_size(Some(PACKET_MAX));
     options.set_last_will(LastWill::new(topic, payload, QoS::AtLeastOnce, retained, None));
     if let Some(user) = &def.user {
         let password = def.password.as_ref().map(password).transpose()?.unwrap_or_default();

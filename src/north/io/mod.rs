@@ -1,5 +1,7 @@
-//! The connection to the broker, the cursor file, and the task that moves samples from the history to the broker.
+//! The connection to the broker, the files beside the history, and the tasks that move samples and answers to the broker.
 
-mod broker;
+pub(crate) mod answers;
+pub(crate) mod broker;
 mod cursor;
+pub(crate) mod request_file;
 pub mod task;

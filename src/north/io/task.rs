@@ -4,13 +4,17 @@
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
+use rumqttc::AsyncClient;
 use tokio::{
     sync::{mpsc, oneshot, watch},
     task::spawn_blocking,
     time::{sleep, timeout},
 };
 
-use super::{broker::Broker, cursor};
+use super::{
+    broker::{Broker, Inbox},
+    cursor,
+};
 use crate::{
     bus::io::clock::Clock,
     history::{
@@ -26,6 +30,7 @@ use crate::{
         PlantDef, Snapshot,
         def::{DeviceDef, MqttDef, TagId},
         event::Event,
+        mqtt_request::MqttRequestStatus,
         north_def::NorthStatus,
         sample::Sample,
         snapshot::HistoryStatus,
@@ -59,6 +64,18 @@ pub(crate) struct NorthTask {
     pub events: mpsc::Sender<Event>,
     /// The file of the history, beside which the cursor lies.
     pub history_file: PathBuf,
+    /// Requests from outside, where the plant file permits them.
+    pub requests: Option<RequestChannels>,
+}
+
+/// What connects the requests from outside with the broker.
+pub(crate) struct RequestChannels {
+    /// Where they go.
+    pub inbox: Inbox,
+    /// Gets the connection that answers are sent over.
+    pub clients: watch::Sender<Option<AsyncClient>>,
+    /// How they stand.
+    pub status: watch::Receiver<MqttRequestStatus>,
 }
 
 /// Runs until the station stops.
@@ -72,7 +89,7 @@ pub(crate) async fn run(task: NorthTask, mut stopped: watch::Receiver<bool>) {
     let forwarder = Forwarder::new(cursor, task.def.tags.len(), task.clock.speed());
     let state = Deadband::new(task.def.tags.len());
     let status = NorthStatus { sent_until: forwarder.complete_until(), error: damaged, ..NorthStatus::default() };
-    let mut north = North { task, path, forwarder, state, status, broker: None, alarm: None };
+    let mut north = North { task, path, forwarder, state, status, broker: None, alarm: None, not_subscribed: None };
     if let Some(why) = &north.status.error {
         tracing::error!(why, "samples before now are not sent");
         north.tell(FaultState::Occurred(why.as_str().into()));
@@ -97,6 +114,8 @@ struct North {
     broker: Option<Broker>,
     /// The words of the alarm that is active.
     alarm: Option<String>,
+    /// Why the broker delivers no requests.
+    not_subscribed: Option<String>,
 }
 
 impl North {
@@ -114,7 +133,7 @@ impl North {
                 }
                 Err(why) => {
                     tracing::warn!(why, "data out");
-                    self.broker = None;
+                    self.disconnect();
                     self.status.error = Some(why);
                     self.report();
                     self.pause(retry).await;
@@ -138,12 +157,33 @@ impl North {
     /// Publishes what has changed and one window of samples. Is there more?
     async fn step(&mut self) -> Result<bool, String> {
         if self.broker.is_none() {
-            self.broker = Some(Broker::connect(&self.task.mqtt).await?);
+            self.connect().await?;
             // The broker may have forgotten everything.
             self.state = Deadband::new(self.task.def.tags.len());
         }
         self.publish_state().await?;
         self.forward().await
+    }
+
+    /// Connects, and asks for requests where the plant file permits them. Data goes out even if the broker refuses these.
+    async fn connect(&mut self) -> Result<(), String> {
+        let mqtt = &self.task.mqtt;
+        let requests = self.task.requests.as_ref();
+        let mut broker = Broker::connect(mqtt, requests.map(|requests| &requests.inbox)).await?;
+        if let Some(requests) = requests {
+            let refused = broker.subscribe(mqtt).await.err();
+            self.not_subscribed = refused.map(|why| format!("the broker delivers no requests: {why}"));
+            requests.clients.send_replace(Some(broker.client()));
+        }
+        self.broker = Some(broker);
+        Ok(())
+    }
+
+    fn disconnect(&mut self) {
+        self.broker = None;
+        if let Some(requests) = &self.task.requests {
+            requests.clients.send_replace(None);
+        }
     }
 
     async fn publish_state(&mut self) -> Result<(), String> {
@@ -218,6 +258,10 @@ impl North {
     /// Says how far it is, and raises or clears the alarm. What the plant has no room for is said again in a second.
     fn report(&mut self) {
         self.status.connected = self.broker.is_some();
+        self.status.requests = self.task.requests.as_ref().map(|requests| {
+            let status = requests.status.borrow().clone();
+            MqttRequestStatus { error: status.error.or(self.not_subscribed.clone()), ..status }
+        });
         let at = self.task.clock.now();
         let _ = self.task.events.try_send(Event::North { at, status: Arc::new(self.status.clone()) });
         let words = alarm_words(&self.task.mqtt, &self.status, self.task.clock.utc());

@@ -44,6 +44,11 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
         let until = moment(north.sent_until, cx.now, &cx.def().time_zone);
         let style = if north.error.is_none() && north.connected { cx.theme.normal() } else { cx.theme.trouble() };
         rows.extend(flow(t!("data out"), cx.theme.dim(), width, [plain(north.words(&until), style)]));
+        if let Some(requests) = &north.requests {
+            let words = requests.words(|at| moment(at, cx.now, &cx.def().time_zone));
+            let style = if requests.error.is_none() { cx.theme.normal() } else { cx.theme.trouble() };
+            rows.extend(flow(t!("data in"), cx.theme.dim(), width, words.into_iter().map(|words| plain(words, style))));
+        }
     }
     if let Some(load) = cx.snapshot.load {
         rows.extend(flow(t!("program"), cx.theme.dim(), width, [plain(load.words(), cx.theme.normal())]));
@@ -317,7 +322,11 @@ fn tenths(ms: f64) -> String {
 mod tests {
     use super::*;
     use crate::{
-        plant::north_def::NorthStatus,
+        plant::{
+            command::Outcome,
+            mqtt_request::{LastMqttRequest, MqttRequestStatus, MqttResult},
+            north_def::NorthStatus,
+        },
         ui::fixture::{Fixture, with_cx},
     };
 
@@ -333,9 +342,22 @@ mod tests {
         assert!(words(&snapshot).contains("140 wake-ups/s") && !words(&snapshot).contains("data out"));
         let sent_until = crate::ui::fixture::now();
         let error = Some("refused".to_owned());
-        snapshot.north = Some(NorthStatus { connected: false, sent: 12, refused: 3, sent_until, error }.into());
+        let north = NorthStatus { connected: false, sent: 12, refused: 3, sent_until, error, requests: None };
+        snapshot.north = Some(north.clone().into());
         let found = words(&snapshot);
         assert!(found.contains("not connected: refused, 12 samples sent, 3 refused, complete until 14:02:"), "{found}");
+        assert!(!found.contains("data in"), "{found}");
+
+        let result = MqttResult::Outcome(Outcome::Verified);
+        let last = Some(LastMqttRequest { at: sent_until, what: "4711 TIC-1.SV = 50".into(), result });
+        let requests = MqttRequestStatus { user: "mes".into(), accepted: 3, refused: 2, last, ..Default::default() };
+        snapshot.north = Some(NorthStatus { requests: Some(requests), ..north }.into());
+        let found = words(&snapshot);
+        assert!(
+            found.contains("as mes, 3 accepted, 2 refused, 0 unanswered") && found.contains("last at 14:02:"),
+            "{found}"
+        );
+        assert!(found.contains("4711 TIC-1.SV = 50: verified"), "{found}");
     }
 
     #[test]

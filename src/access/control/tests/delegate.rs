@@ -1,0 +1,68 @@
+//! Requests from outside act as a user of the station, with no more rights and only while that user has them.
+
+use super::*;
+
+const MES: u32 = 9;
+
+fn bench(user: &str, rules: AccessDef) -> Bench {
+    let mut bench = Bench::new(rules);
+    let effects = bench.access.open_delegate(MES, &user.into(), "MQTT broker:1883, tank/+/request", bench.now);
+    bench.work(effects);
+    bench
+}
+
+fn refused(bench: &mut Bench, kind: CommandKind) -> Option<String> {
+    let (status, refused) = bench.send_command(MES, kind, None).expect("it is on record");
+    assert_eq!(&*status.from, "MQTT broker:1883, tank/+/request");
+    refused.map(|why| why.to_string())
+}
+
+#[test]
+fn requests_have_the_rights_of_their_user() {
+    let mut tech = bench("tech", AccessDef::default());
+    assert_eq!(tech.last(), ("tech login", "tech", "done: named by the plant file"));
+    assert_eq!(refused(&mut tech, RUN), None);
+    let mut view = bench("view", AccessDef::default());
+    assert_eq!(refused(&mut view, RUN).as_deref(), Some("this is for a technician, you are viewer"));
+    let trusted = AccessDef { trusted: vec![("mes".into(), Role::Technician)], ..AccessDef::default() };
+    assert_eq!(refused(&mut bench("mes", trusted), RUN), None);
+}
+
+#[test]
+fn a_tag_that_needs_a_second_user_is_not_for_requests() {
+    let mut boss = bench("boss", AccessDef::default());
+    assert_eq!(refused(&mut boss, SV).as_deref(), Some("this tag requires a second user"));
+}
+
+#[test]
+fn a_user_that_does_not_exist_may_nothing() {
+    let mut bench = bench("mes", AccessDef::default());
+    assert_eq!(bench.last(), ("not logged in login", "mes", "refused: no such user"));
+    let expect = "mes is not a user of this station, or is disabled";
+    assert_eq!(refused(&mut bench, RUN).as_deref(), Some(expect));
+}
+
+#[test]
+fn disabling_the_user_ends_its_requests_at_once() {
+    let mut bench = bench("tech", AccessDef::default());
+    bench.open(1, "here");
+    bench.login(1, "boss", BOSS).unwrap();
+    bench.request(1, SessionRequest::Disable { user: "tech".into(), disabled: true }).unwrap();
+    assert!(refused(&mut bench, RUN).is_some_and(|why| why.contains("is disabled")));
+    bench.request(1, SessionRequest::Disable { user: "tech".into(), disabled: false }).unwrap();
+    bench.later(1);
+    assert_eq!(bench.who(MES).as_deref(), Some("tech"));
+    bench.request(1, SessionRequest::SetRole { user: "tech".into(), role: Role::Viewer }).unwrap();
+    assert!(refused(&mut bench, RUN).is_some_and(|why| why.contains("for a technician")));
+}
+
+#[test]
+fn requests_are_never_locked_and_take_no_place_of_a_terminal() {
+    let mut bench = bench("tech", AccessDef { sessions_max: 8, ..AccessDef::default() });
+    bench.later(100_000);
+    assert_eq!(refused(&mut bench, RUN), None, "no key is pressed, and no idle lock comes");
+    for terminal in 20..100 {
+        bench.open(terminal, "10.0.0.5");
+    }
+    assert_eq!(bench.who(MES).as_deref(), Some("tech"));
+}

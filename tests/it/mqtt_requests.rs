@@ -1,0 +1,235 @@
+//! Requests from outside over MQTT, sent by clients that we did not write: done once, refused with a reason, never done again.
+
+use std::process::Command;
+
+use jiff::{SignedDuration, Timestamp};
+use serde_json::{Value, json};
+
+use crate::{
+    mqtt::{Place, have_mosquitto},
+    support::Process,
+};
+
+const AS_MES: &str = "commands_as = \"mes\"\n\n[[access.trusted]]\nuser = \"mes\"\nrole = \"technician\"\n";
+const TOPIC: &str = "sightglass/tank/TIC-1/request";
+
+/// A client that sends requests and hears the answers.
+struct Client<'a> {
+    place: &'a Place,
+    answers: Process,
+}
+
+impl Client<'_> {
+    fn new(place: &Place) -> Client<'_> {
+        let mut answers = Process::start(
+            Command::new("stdbuf")
+                .args(["-oL", "mosquitto_sub", "-d", "-V", "5", "-q", "1", "-h", "localhost", "-p"])
+                .arg(place.port.to_string())
+                .args(["-t", "sightglass/tank/+/response", "-t", "mes/answers", "-F", "answer %t %D %p"]),
+        );
+        answers.wait_for("Subscribed");
+        Client { place, answers }
+    }
+
+    fn publish(&self, topic: &str, payload: &[u8], more: &[&str]) {
+        let file = self.place.path("payload");
+        std::fs::write(&file, payload).expect("the folder is writable");
+        let sent = Command::new("mosquitto_pub")
+            .args(["-V", "5", "-q", "1", "-h", "localhost", "-p", &self.place.port.to_string(), "-t", topic, "-f"])
+            .arg(file)
+            .args(more)
+            .status()
+            .expect("mosquitto_pub runs");
+        assert!(sent.success());
+    }
+
+    fn send(&self, request: &Value, more: &[&str]) {
+        self.publish(TOPIC, request.to_string().as_bytes(), more);
+    }
+
+    /// The next answer that contains this.
+    fn answer(&mut self, what: &str) -> Value {
+        loop {
+            let line = self.answers.wait_for("answer ");
+            if line.contains(what) {
+                let start = line.find('{').expect("an answer is JSON");
+                return serde_json::from_str(&line[start..]).expect("an answer is JSON");
+            }
+        }
+    }
+
+    /// Its outcome, with or without an answer before that says that the plant has it.
+    fn outcome(&mut self, what: &str) -> Value {
+        loop {
+            let answer = self.answer(what);
+            if answer["result"] != "accepted" {
+                return answer;
+            }
+        }
+    }
+
+    /// The reason for which a message is refused.
+    fn refusal(&mut self, topic: &str, payload: &[u8], more: &[&str]) -> String {
+        self.publish(topic, payload, more);
+        let answer = self.answer("\"result\":\"refused\"");
+        answer["reason"].as_str().unwrap_or_default().to_owned()
+    }
+}
+
+fn request(id: &str, tag: &str, value: impl Into<Value>) -> Value {
+    let expires = Timestamp::now() + SignedDuration::from_secs(120);
+    let value: Value = value.into();
+    json!({ "id": id, "tag": tag, "value": value, "reason": "recipe 7", "expires": expires.to_string() })
+}
+
+fn requests_of(status: &Value, key: &str) -> u64 {
+    status["north"]["requests"][key].as_u64().unwrap_or_default()
+}
+
+fn is_ready(status: &Value) -> bool {
+    status["north"]["connected"] == true && status["north"]["requests"]["error"].is_null()
+}
+
+#[test]
+fn a_request_is_written_once_read_back_and_answered() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new(AS_MES);
+    let _broker = place.broker("allow_anonymous true\n");
+    let mut station = place.station();
+    place.wait_until("it takes requests", |status| status["north"]["requests"]["as"] == "mes" && is_ready(status));
+    let mut client = Client::new(&place);
+
+    let first = request("mes-1", "TIC-1.SV", 51.5);
+    client.send(
+        &first,
+        &["-D", "PUBLISH", "response-topic", "mes/answers", "-D", "PUBLISH", "correlation-data", "key-1"],
+    );
+    let done = client.outcome("mes/answers key-1");
+    assert_eq!((&done["result"], &done["value"], &done["recorded"]), (&json!("verified"), &json!(51.5), &json!(true)));
+
+    // The same once more, as QoS 1 may deliver it: its answer, and no second write.
+    client.send(&first, &[]);
+    assert_eq!(client.answer("mes-1")["result"], "verified");
+    client.send(&request("mes-2", "TIC-1.SV", 51.5), &[]);
+    let unchanged = client.outcome("mes-2");
+    assert_eq!((&unchanged["result"], unchanged["reason"].is_string()), (&json!("verified"), true), "{unchanged}");
+    let status = place.wait_until("it is counted", |status| requests_of(status, "accepted") == 2);
+    assert_eq!(requests_of(&status, "refused"), 0, "{}", status["north"]);
+    let value = |status: &Value| {
+        let tags = status["tags"].as_array().cloned().unwrap_or_default();
+        tags.into_iter().find(|tag| tag["name"] == "TIC-1.SV").map(|tag| tag["value"].clone())
+    };
+    place.wait_until("the value is shown", |status| value(status) == Some(json!(51.5)));
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+}
+
+#[test]
+fn what_is_no_valid_request_is_refused_and_writes_nothing() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new(AS_MES);
+    let _broker = place.broker("allow_anonymous true\n");
+    let mut station = place.station();
+    place.wait_until("it takes requests", is_ready);
+    let mut client = Client::new(&place);
+    let mut check = |payload: &[u8], more: &[&str], expect: &str| {
+        let found = client.refusal(TOPIC, payload, more);
+        assert!(found.contains(expect), "{expect}: {found}");
+    };
+    let text = |id: &str, tag: &str, value: Value| request(id, tag, value).to_string().into_bytes();
+    check(b"on", &[], "not a request");
+    check(&[0xff, 0xfe, 0x00], &[], "not a request");
+    check(&text("r-1", "TIC-1.SV", json!("hot")), &[], "invalid type: string");
+    check(&text("r-2", "TIC-1.SV", json!(null)), &[], "invalid type: null");
+    check(&vec![b' '; 5_000], &[], "longer than 4096 bytes");
+    check(&text("r-3", "TIC-7.SV", json!(50)), &[], "no tag is called TIC-7.SV");
+    check(&text("r-4", "PLC-1.RUN", json!(1)), &[], "not of the device");
+    check(
+        &text("r-5", "TIC-1.SV", json!(50)),
+        &["-D", "PUBLISH", "response-topic", "sightglass/tank/status"],
+        "response topic",
+    );
+    let mut old = request("r-6", "TIC-1.SV", 50);
+    old["expires"] = json!((Timestamp::now() - SignedDuration::from_secs(1)).to_string());
+    check(old.to_string().as_bytes(), &[], "expired");
+    old["expires"] = json!((Timestamp::now() + SignedDuration::from_hours(1)).to_string());
+    check(old.to_string().as_bytes(), &[], "expires later than 600 s");
+    check(&text("r-7", "TIC-1.SV", json!(50)), &["-r"], "retained");
+    // What the plant refuses, as it would refuse it to a person: out of limits, and not for this role.
+    check(&text("r-8", "TIC-1.SV", json!(100_000)), &[], "outside");
+    check(&text("r-9", "TIC-1.P", json!(7)), &[], "this is for a supervisor, you are technician");
+
+    // Longer than a packet may be: the broker keeps it to itself, and the connection stays.
+    client.publish(TOPIC, &vec![b' '; 100_000], &[]);
+    client.send(&request("r-10", "TIC-1.SV", 52), &[]);
+    assert_eq!(client.outcome("r-10")["result"], "verified");
+    let status = place.wait_until("it is counted", |status| requests_of(status, "refused") == 13);
+    assert_eq!(status["north"]["connected"], true);
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+
+    // What the broker keeps is delivered again after each start, and refused again.
+    let mut station = place.station();
+    place.wait_until("the retained one is refused", |status| requests_of(status, "refused") == 1);
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+}
+
+#[test]
+fn a_station_killed_before_the_outcome_answers_unknown() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new(AS_MES);
+    let _broker = place.broker("allow_anonymous true\n");
+    let mut station = place.station();
+    place.wait_until("it takes requests", is_ready);
+    let mut client = Client::new(&place);
+    // The device falls silent, so the write has no outcome yet.
+    place.simulator().signal("STOP");
+    let killed = request("k-1", "TIC-1.SV", 53);
+    client.send(&killed, &[]);
+    assert_eq!(client.answer("k-1")["result"], "accepted");
+    station.signal("KILL");
+    assert_eq!(station.end(), None);
+    place.simulator().signal("CONT");
+    // Sent while no station runs: the broker keeps it for no later subscriber.
+    client.send(&request("k-2", "TIC-1.SV", 54), &[]);
+
+    let mut station = place.station();
+    let answer = client.answer("k-1");
+    assert_eq!(answer["result"], "unknown", "{answer}");
+    assert!(answer["reason"].as_str().is_some_and(|why| why.contains("look at the value")), "{answer}");
+    place.wait_until("it takes requests", is_ready);
+    client.send(&killed, &[]);
+    assert_eq!(client.answer("k-1")["result"], "unknown", "and it is not done again");
+    client.send(&request("k-3", "TIC-1.SV", 55), &[]);
+    assert_eq!(client.outcome("k-3")["result"], "verified");
+    let status = place.wait_until("it is counted", |status| requests_of(status, "accepted") == 1);
+    assert_eq!(requests_of(&status, "refused"), 0, "{}", status["north"]);
+    assert!(client.answers.said.iter().all(|line| !line.contains("k-2")), "nothing old is done");
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+}
+
+#[test]
+fn without_the_key_the_station_subscribes_to_nothing() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new("");
+    let mut broker = place.broker("allow_anonymous true\n");
+    let mut station = place.station();
+    let status = place.wait_until("it is connected", |status| status["north"]["connected"] == true);
+    assert!(status["north"]["requests"].is_null(), "{}", status["north"]);
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+    broker.signal("TERM");
+    broker.end();
+    assert!(broker.said.iter().any(|line| line.contains("sightglass-tank")));
+    assert!(broker.said.iter().all(|line| !line.contains("SUBSCRIBE from sightglass-tank")), "{:?}", broker.said);
+}
