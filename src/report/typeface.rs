@@ -122,6 +122,13 @@ impl Letters {
     }
 }
 
+/// The pictures have this character, alone or as part of a letter.
+#[cfg(test)]
+pub(crate) fn has_letter(character: char) -> bool {
+    ('\u{2800}'..='\u{28ff}').contains(&character)
+        || Letters::new().is_some_and(|letters| letters.mono.has(character) || letters.thai.has(character))
+}
+
 /// Moves the curves of a glyph, which count upwards, into a path, which counts downwards.
 struct Outline<'a> {
     at: (f32, f32),

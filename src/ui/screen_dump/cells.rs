@@ -156,7 +156,8 @@ fn shape(rects: &mut Vec<[f32; 4]>, symbol: char, left: f32, top: f32) -> bool {
             let high = HEIGHT * (code - 0x2580) as f32 / 8.0;
             rect(rects, left, top + HEIGHT - high, WIDTH, high);
         }
-        '▌' => rect(rects, left, top, WIDTH / 2.0, HEIGHT),
+        // Seven to one eighths from the left.
+        '▉'..='▏' => rect(rects, left, top, WIDTH * (0x2590 - code) as f32 / 8.0, HEIGHT),
         // Shades are rows of lines: a share of the cell is filled.
         '░' | '▒' | '▓' => {
             let share = (code - 0x2590) as f32 / 4.0;

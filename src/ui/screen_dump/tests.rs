@@ -10,6 +10,7 @@ use ratatui::{
 use super::*;
 use crate::{
     access::Durability,
+    report::typeface::has_letter,
     ui::{
         Msg,
         fixture::Fixture,
@@ -92,12 +93,15 @@ fn a_picture_has_shapes_for_lines_and_text_for_words() {
 }
 
 #[test]
-fn no_line_of_any_screen_is_left_to_a_font() {
+fn no_sign_of_any_screen_is_left_to_the_font_of_a_viewer() {
     let mut model = model(&Fixture::alarm(), Theme::FULL);
     for tab in "1234567".chars() {
         type_keys(&mut model, &tab.to_string());
         screen(&mut model, 160, 50);
-        let picture = svg(&drawn(&model));
+        let buffer = drawn(&model);
+        let unknown: String = text(&buffer).chars().filter(|c| !c.is_whitespace() && !has_letter(*c)).collect();
+        assert_eq!(unknown, "", "question marks in the picture of tab {tab}");
+        let picture = svg(&buffer);
         let texts = picture.lines().filter(|line| line.starts_with("<text"));
         let left: String = texts
             .flat_map(str::chars)
