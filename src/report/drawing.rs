@@ -1,16 +1,18 @@
-//! A page of lines and texts, as SVG and as PNG. The PNG needs no font of the system: it has the letters of Latin-1.
+//! A page of lines, rectangles and texts, as SVG and as PNG, which needs no font of the system.
 
-use std::fmt::Write;
+use std::fmt::{self, Write};
 
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
-use tiny_skia::{
-    Color, LineCap, Paint, PathBuilder, Pixmap, PremultipliedColorU8, Rect, Stroke, StrokeDash, Transform,
-};
+use tiny_skia::{Color, FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
+use unicode_width::UnicodeWidthStr;
 
-use crate::plant::number::{to_u8, to_u32, to_usize};
+use super::typeface::{CELL, Letters};
 
-/// Height of a line of text, and width of a letter of the SVG, in pixels.
+/// Height of a line of text, and room of a letter, in pixels.
 pub const TEXT: (f32, f32) = (16.0, 8.0);
+/// Size of the letters of a chart.
+const LETTERS: f32 = 13.0;
+/// From the middle of a text down to its base line, in sizes.
+const BASE: f32 = 4.5 / LETTERS;
 /// The pens in print, distinguishable with any colour vision (Okabe and Ito).
 const PENS: [Rgb; 8] = [
     Rgb(0, 114, 178),
@@ -24,7 +26,7 @@ const PENS: [Rgb; 8] = [
 ];
 
 /// A colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Rgb(pub u8, pub u8, pub u8);
 
 /// What a line or text is, which decides its colour.
@@ -36,6 +38,8 @@ pub enum Ink {
     Grid,
     /// The pen of this number.
     Pen(usize),
+    /// A colour of its own.
+    Own(Rgb),
 }
 
 /// Where a text stands at its place.
@@ -54,6 +58,9 @@ pub enum Anchor {
 pub struct Drawing {
     width: u16,
     height: u16,
+    paper: Rgb,
+    /// Size of its letters.
+    letters: f32,
     shapes: Vec<Shape>,
 }
 
@@ -62,8 +69,23 @@ pub struct Drawing {
 pub enum Shape {
     /// A line through points.
     Line { points: Vec<(f32, f32)>, ink: Ink, width: f32, dashed: bool },
+    /// Filled rectangles: left, top, width and height.
+    Fill { rects: Vec<[f32; 4]>, ink: Ink },
     /// A text with its middle at this height.
-    Text { at: (f32, f32), anchor: Anchor, text: String, ink: Ink },
+    Text { at: (f32, f32), anchor: Anchor, text: String, ink: Ink, look: Look },
+}
+
+/// How a text looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Look {
+    /// Bold.
+    pub bold: bool,
+    /// Italic.
+    pub italic: bool,
+    /// Underlined.
+    pub underlined: bool,
+    /// Its letters fill so many columns, whatever the font of the viewer; `None`: as wide as they are.
+    pub columns: Option<u16>,
 }
 
 impl Anchor {
@@ -84,6 +106,7 @@ impl Ink {
             Ink::Text => Rgb(30, 30, 30),
             Ink::Grid => Rgb(210, 210, 210),
             Ink::Pen(n) => PENS[n % PENS.len()],
+            Ink::Own(rgb) => rgb,
         }
     }
 }
@@ -91,7 +114,12 @@ impl Ink {
 impl Drawing {
     /// An empty page.
     pub fn new(width: u16, height: u16) -> Drawing {
-        Drawing { width, height, shapes: Vec::new() }
+        Drawing { width, height, paper: Rgb(255, 255, 255), letters: LETTERS, shapes: Vec::new() }
+    }
+
+    /// An empty page of a colour, with letters of a size.
+    pub fn on(width: u16, height: u16, paper: Rgb, letters: f32) -> Drawing {
+        Drawing { paper, letters, ..Drawing::new(width, height) }
     }
 
     /// Its width and height.
@@ -111,18 +139,30 @@ impl Drawing {
         }
     }
 
+    /// Rectangles of a colour.
+    pub fn fill(&mut self, rects: Vec<[f32; 4]>, ink: Ink) {
+        if !rects.is_empty() {
+            self.shapes.push(Shape::Fill { rects, ink });
+        }
+    }
+
     /// A text with its middle at this height.
     pub fn text(&mut self, at: (f32, f32), anchor: Anchor, text: impl Into<String>, ink: Ink) {
-        self.shapes.push(Shape::Text { at, anchor, text: text.into(), ink });
+        self.shapes.push(Shape::Text { at, anchor, text: text.into(), ink, look: Look::default() });
+    }
+
+    /// A text that begins here and looks so.
+    pub fn styled(&mut self, at: (f32, f32), text: impl Into<String>, ink: Ink, look: Look) {
+        self.shapes.push(Shape::Text { at, anchor: Anchor::Start, text: text.into(), ink, look });
     }
 
     /// The page as SVG.
     pub fn svg(&self) -> Vec<u8> {
-        let Drawing { width, height, shapes } = self;
+        let Drawing { width, height, paper, letters, shapes } = self;
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-             viewBox=\"0 0 {width} {height}\" font-family=\"DejaVu Sans Mono, monospace\" font-size=\"13\">\n\
-             <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
+             viewBox=\"0 0 {width} {height}\" font-family=\"DejaVu Sans Mono, ui-monospace, monospace\" \
+             font-size=\"{letters}\">\n<rect width=\"100%\" height=\"100%\" fill=\"{paper}\"/>\n"
         );
         for shape in shapes {
             // Writing into a string never fails.
@@ -133,25 +173,23 @@ impl Drawing {
                     writeln!(
                         svg,
                         "<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"{width}\"{dash} points=\"{}\"/>",
-                        hex(*ink),
+                        ink.rgb(),
                         points.join(" ")
                     )
                 }
-                Shape::Text { at: (x, y), anchor, text, ink } => {
-                    let anchor = match anchor {
-                        Anchor::Start => "start",
-                        Anchor::Middle => "middle",
-                        Anchor::End => "end",
-                    };
-                    writeln!(
-                        svg,
-                        "<text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\" fill=\"{}\" \
-                         xml:space=\"preserve\">{}</text>",
-                        y + 4.5,
-                        hex(*ink),
-                        escaped(text)
-                    )
+                Shape::Fill { rects, ink } => {
+                    let path = rects.iter().map(|[x, y, w, h]| format!("M{x:.1} {y:.1}h{w:.1}v{h:.1}h{:.1}z", -w));
+                    writeln!(svg, "<path fill=\"{}\" d=\"{}\"/>", ink.rgb(), path.collect::<String>())
                 }
+                Shape::Text { at: (x, y), anchor, text, ink, look } => writeln!(
+                    svg,
+                    "<text x=\"{x:.1}\" y=\"{:.1}\"{} fill=\"{}\"{} xml:space=\"preserve\">{}</text>",
+                    y + letters * BASE,
+                    anchor.attribute(),
+                    ink.rgb(),
+                    look.attributes(*letters),
+                    escaped(text)
+                ),
             };
         }
         svg.push_str("</svg>\n");
@@ -160,21 +198,58 @@ impl Drawing {
 
     /// The page as PNG; `None` where it has no size.
     pub fn png(&self) -> Option<Vec<u8>> {
+        self.pixels()?.encode_png().ok()
+    }
+
+    /// The page as pixels; `None` where it has no size.
+    pub fn pixels(&self) -> Option<Pixmap> {
         let mut page = Pixmap::new(self.width.into(), self.height.into())?;
-        page.fill(Color::WHITE);
+        let Rgb(r, g, b) = self.paper;
+        page.fill(Color::from_rgba8(r, g, b, 255));
+        let letters = Letters::new()?;
         for shape in &self.shapes {
             match shape {
                 Shape::Line { points, ink, width, dashed } => stroke(&mut page, points, *ink, *width, *dashed),
-                Shape::Text { at, anchor, text, ink } => letters(&mut page, *at, *anchor, text, *ink),
+                Shape::Fill { rects, ink } => fill(&mut page, rects, *ink),
+                Shape::Text { at, anchor, text, ink, look } => {
+                    let before = text.width() as f32 * self.letters * CELL * anchor.before();
+                    let begin = (at.0 - before, at.1 + self.letters * BASE);
+                    set(&mut page, letters.outline(text, begin, self.letters), (begin, self.letters), *ink, *look);
+                }
             }
         }
-        page.encode_png().ok()
+        Some(page)
     }
 }
 
-fn hex(ink: Ink) -> String {
-    let Rgb(r, g, b) = ink.rgb();
-    format!("#{r:02x}{g:02x}{b:02x}")
+impl fmt::Display for Rgb {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Rgb(r, g, b) = self;
+        write!(f, "#{r:02x}{g:02x}{b:02x}")
+    }
+}
+
+impl Anchor {
+    fn attribute(self) -> &'static str {
+        match self {
+            Anchor::Start => "",
+            Anchor::Middle => " text-anchor=\"middle\"",
+            Anchor::End => " text-anchor=\"end\"",
+        }
+    }
+}
+
+impl Look {
+    fn attributes(self, letters: f32) -> String {
+        let looks = [
+            (self.bold, " font-weight=\"bold\""),
+            (self.italic, " font-style=\"italic\""),
+            (self.underlined, " text-decoration=\"underline\""),
+        ];
+        let looks = looks.iter().filter(|(is_set, _)| *is_set).map(|(_, look)| *look);
+        let length = |columns| format!(" textLength=\"{:.1}\"", f32::from(columns) * letters * CELL);
+        looks.collect::<String>() + &self.columns.map(length).unwrap_or_default()
+    }
 }
 
 /// A text in XML.
@@ -182,10 +257,14 @@ pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-fn stroke(page: &mut Pixmap, points: &[(f32, f32)], ink: Ink, width: f32, dashed: bool) {
+fn paint(ink: Ink) -> Paint<'static> {
     let Rgb(r, g, b) = ink.rgb();
     let mut paint = Paint::default();
     paint.set_color_rgba8(r, g, b, 255);
+    paint
+}
+
+fn stroke(page: &mut Pixmap, points: &[(f32, f32)], ink: Ink, width: f32, dashed: bool) {
     let mut path = PathBuilder::new();
     for (n, (x, y)) in points.iter().enumerate() {
         if n == 0 { path.move_to(*x, *y) } else { path.line_to(*x, *y) }
@@ -193,53 +272,33 @@ fn stroke(page: &mut Pixmap, points: &[(f32, f32)], ink: Ink, width: f32, dashed
     let dash = if dashed { StrokeDash::new(vec![6.0, 4.0], 0.0) } else { None };
     let stroke = Stroke { width, line_cap: LineCap::Butt, dash, ..Stroke::default() };
     match path.finish() {
-        Some(path) => page.stroke_path(&path, &paint, &stroke, Transform::identity(), None),
+        Some(path) => page.stroke_path(&path, &paint(ink), &stroke, Transform::identity(), None),
         // A line without length is a point.
-        None => {
-            if let Some(rect) = points.first().and_then(|(x, y)| Rect::from_xywh(*x, *y, width, width)) {
-                page.fill_rect(rect, &paint, Transform::identity(), None);
-            }
-        }
+        None => points.first().into_iter().for_each(|(x, y)| fill(page, &[[*x, *y, width, width]], ink)),
     }
 }
 
-/// A place in whole pixels; what lies before the edge is at it.
-fn whole(place: f32) -> u32 {
-    to_u32(to_usize(f64::from(place).round()))
+/// Whole pixels, so that neighbours join without a seam.
+fn fill(page: &mut Pixmap, rects: &[[f32; 4]], ink: Ink) {
+    let paint = Paint { anti_alias: false, ..paint(ink) };
+    for rect in rects.iter().filter_map(|[x, y, w, h]| Rect::from_xywh(*x, *y, *w, *h)) {
+        page.fill_rect(rect, &paint, Transform::identity(), None);
+    }
 }
 
-/// Sets a text; a letter that the font lacks is a question mark.
-fn letters(page: &mut Pixmap, (x, y): (f32, f32), anchor: Anchor, text: &str, ink: Ink) {
-    let length = (text.chars().count() * get_raster_width(FontWeight::Regular, RasterHeight::Size16)) as f32;
-    let left = match anchor {
-        Anchor::Start => x,
-        Anchor::Middle => x - length / 2.0,
-        Anchor::End => x - length,
-    };
-    let (mut left, top) = (whole(left), whole(y - TEXT.0 / 2.0));
-    let (width, height, Rgb(r, g, b)) = (page.width(), page.height(), ink.rgb());
-    for letter in text.chars() {
-        let letter = match letter {
-            '–' | '−' => '-',
-            'Δ' => 'd',
-            letter => letter,
-        };
-        let raster = |letter| get_raster(letter, FontWeight::Regular, RasterHeight::Size16);
-        let Some(raster) = raster(letter).or_else(|| raster('?')) else { continue };
-        for (row, line) in (top..height).zip(raster.rows()) {
-            for (column, cover) in (left..width).zip(line) {
-                let pixel = &mut page.pixels_mut()[(row * width + column) as usize];
-                let mix = |under: u8, over: u8| {
-                    let cover = u32::from(*cover);
-                    to_u8((u32::from(under) * (255 - cover) + u32::from(over) * cover) / 255)
-                };
-                let mixed = [mix(pixel.red(), r), mix(pixel.green(), g), mix(pixel.blue(), b)];
-                if let Some(mixed) = PremultipliedColorU8::from_rgba(mixed[0], mixed[1], mixed[2], 255) {
-                    *pixel = mixed;
-                }
-            }
-        }
-        left += to_u32(raster.width());
+/// Sets the outlines of a text that begins at a place and has letters of a size.
+fn set(page: &mut Pixmap, outline: Option<Path>, ((x, y), size): ((f32, f32), f32), ink: Ink, look: Look) {
+    if look.underlined {
+        let length = f32::from(look.columns.unwrap_or(0)) * size * CELL;
+        fill(page, &[[x, y + size * 0.12, length, size * 0.08]], ink);
+    }
+    let Some(path) = outline else { return };
+    // Leans to the right, around the base line.
+    let lean = if look.italic { Transform::from_row(1.0, 0.0, -0.2, 1.0, 0.2 * y, 0.0) } else { Transform::identity() };
+    page.fill_path(&path, &paint(ink), FillRule::Winding, lean, None);
+    if look.bold {
+        let stroke = Stroke { width: size * 0.05, ..Stroke::default() };
+        page.stroke_path(&path, &paint(ink), &stroke, lean, None);
     }
 }
 
@@ -251,6 +310,7 @@ mod tests {
         let mut drawing = Drawing::new(120, 60);
         drawing.line(vec![(10.0, 50.0), (60.0, 20.0), (110.0, 50.0)], Ink::Pen(0), 1.5, false);
         drawing.line(vec![(5.0, 5.0)], Ink::Grid, 1.0, false);
+        drawing.fill(vec![[0.0, 55.0, 4.0, 5.0], [4.0, 55.0, 4.0, 5.0]], Ink::Own(Rgb(255, 0, 0)));
         drawing.text((60.0, 10.0), Anchor::Middle, "20 °C <&>", Ink::Text);
         drawing
     }
@@ -274,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn a_png_has_lines_and_letters_without_a_font() {
+    fn a_png_has_lines_and_letters_without_a_system_font() {
         let png = drawing().png().expect("it has a size");
         let page = Pixmap::decode_png(&png).expect("a PNG");
         let dark = |x: std::ops::Range<u32>, y: std::ops::Range<u32>| {
@@ -284,7 +344,7 @@ mod tests {
         };
         assert!(dark(24..96, 2..18) > 40, "letters");
         assert!(dark(10..110, 20..50) > 60, "the line");
-        assert_eq!(dark(0..120, 54..60), 0);
+        assert_eq!(dark(0..120, 54..60), 40, "two rectangles without a seam");
         assert_eq!(Drawing::new(0, 10).png(), None);
     }
 }

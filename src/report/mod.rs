@@ -16,6 +16,7 @@ pub mod content;
 mod csv;
 pub(crate) mod shift_csv;
 pub(crate) mod record_csv;
+pub(crate) mod typeface;
 pub(crate) mod drawing;
 pub(crate) mod export;
 pub(crate) mod value_log;

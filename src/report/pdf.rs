@@ -13,15 +13,15 @@ use krilla::{
     surface::Surface,
     text::{Font, GlyphId, KrillaGlyph},
 };
-use rustybuzz::{Face, UnicodeBuffer};
 
 use self::layout::{Item, Metrics};
-use super::{ReportFormat, Style, document::Document, drawing::Ink};
+use super::{
+    ReportFormat, Style,
+    document::Document,
+    drawing::Ink,
+    typeface::{BOLD, Glyph, REGULAR, Typeface},
+};
 use crate::plant::number::{to_u8, to_u16};
-
-/// Letters of all texts.
-const REGULAR: &[u8] = include_bytes!("pdf/fonts/Sarabun-Regular.ttf");
-const BOLD: &[u8] = include_bytes!("pdf/fonts/Sarabun-Bold.ttf");
 
 /// The format `pdf`.
 #[derive(Debug)]
@@ -96,13 +96,13 @@ fn draw(surface: &mut Surface, fonts: &Fonts, item: &Item) {
             }));
             surface.draw_path(&path);
         }
-        Item::Ground(left, top, width, height) => {
+        Item::Fill([left, top, width, height], ink) => {
             let Some(rect) = Rect::from_xywh(*left, *top, *width, *height) else { return };
             let mut path = PathBuilder::new();
             path.push_rect(rect);
             let Some(path) = path.finish() else { return };
             surface.set_stroke(None);
-            surface.set_fill(Some(fill((242, 242, 242))));
+            surface.set_fill(Some(fill(ink.colour())));
             surface.draw_path(&path);
         }
     }
@@ -118,48 +118,27 @@ fn fill((red, green, blue): (u8, u8, u8)) -> Fill {
 
 /// The two weights of the font, to shape with and to embed.
 struct Fonts {
-    weights: [(Face<'static>, Font); 2],
+    weights: [(Typeface, Font); 2],
 }
 
 impl Fonts {
     fn new() -> Option<Fonts> {
-        let weight = |bytes: &'static [u8]| Some((Face::from_slice(bytes, 0)?, Font::new(bytes.into(), 0)?));
+        let weight = |bytes: &'static [u8]| Some((Typeface::new(bytes)?, Font::new(bytes.into(), 0)?));
         Some(Fonts { weights: [weight(REGULAR)?, weight(BOLD)?] })
     }
 
     /// A letter that the font does not have is a question mark, never nothing.
     fn printable(&self, text: &str, bold: bool) -> String {
         let face = &self.weights[usize::from(bold)].0;
-        text.chars().map(|letter| if face.glyph_index(letter).is_some() { letter } else { '?' }).collect()
+        text.chars().map(|letter| if face.has(letter) { letter } else { '?' }).collect()
     }
 
-    /// Glyphs with their advances in parts of the size. Thai and other letters are shaped apart, each by the rules of its script.
+    /// Glyphs as the library takes them.
     fn shape(&self, text: &str, bold: bool) -> Vec<KrillaGlyph> {
-        let face = &self.weights[usize::from(bold)].0;
-        let size = f32::from(u16::try_from(face.units_per_em()).unwrap_or(1_000));
-        let mut glyphs = Vec::new();
-        for (begin, run) in runs(text) {
-            let mut buffer = UnicodeBuffer::new();
-            buffer.push_str(run);
-            buffer.guess_segment_properties();
-            let shaped = rustybuzz::shape(face, &[], buffer);
-            let infos = shaped.glyph_infos();
-            for (n, (info, place)) in infos.iter().zip(shaped.glyph_positions()).enumerate() {
-                let next = infos[n..].iter().find(|other| other.cluster != info.cluster);
-                let end = next.map_or(run.len(), |other| other.cluster as usize);
-                let part = |units: i32| crate::plant::number::to_f32(f64::from(units)) / size;
-                glyphs.push(KrillaGlyph::new(
-                    GlyphId::new(info.glyph_id),
-                    part(place.x_advance),
-                    part(place.x_offset),
-                    part(place.y_offset),
-                    part(place.y_advance),
-                    begin + info.cluster as usize..begin + end,
-                    None,
-                ));
-            }
-        }
-        glyphs
+        let glyph = |Glyph { id, advance, offset, text }| {
+            KrillaGlyph::new(GlyphId::new(id.0.into()), advance, offset.0, offset.1, 0.0, text, None)
+        };
+        self.weights[usize::from(bold)].0.shape(text).into_iter().map(glyph).collect()
     }
 
     fn draw(&self, surface: &mut Surface, (x, y): (f32, f32), size: f32, bold: bool, text: &str) {
@@ -176,25 +155,6 @@ impl Metrics for Fonts {
     }
 }
 
-/// The runs of Thai and of other letters, each with its place in the text.
-fn runs(text: &str) -> Vec<(usize, &str)> {
-    let is_thai = |letter: char| ('\u{e00}'..'\u{e80}').contains(&letter);
-    let mut starts: Vec<usize> = vec![0];
-    let mut thai = None;
-    for (place, letter) in text.char_indices() {
-        if thai.replace(is_thai(letter)).is_some_and(|before| before != is_thai(letter)) {
-            starts.push(place);
-        }
-    }
-    let ends = starts.iter().skip(1).copied().chain([text.len()]);
-    starts
-        .iter()
-        .zip(ends)
-        .map(|(begin, end)| (*begin, &text[*begin..end]))
-        .filter(|(_, run)| !run.is_empty())
-        .collect()
-}
-
 impl Ink {
     fn colour(self) -> (u8, u8, u8) {
         let super::drawing::Rgb(red, green, blue) = self.rgb();
@@ -207,9 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn thai_and_latin_are_shaped_apart_and_unknown_letters_are_seen() {
-        let found: Vec<&str> = runs("TIC-1 กำลังทำงาน 5 °C").into_iter().map(|(_, run)| run).collect();
-        assert_eq!(found, ["TIC-1 ", "กำลังทำงาน", " 5 °C"]);
+    fn letters_that_the_font_lacks_are_seen() {
         let fonts = Fonts::new().expect("the font is embedded");
         assert_eq!(fonts.printable("✓ 漢 °C ≤ ก", false), "? ? °C ≤ ก");
         let advance = |text: &str| fonts.width(text, 10.0, false);

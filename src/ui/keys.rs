@@ -235,7 +235,7 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(char('L'), "", "change the language of the screens", Global::Language),
     Key::new(ctrl('t'), "", "change the language, in every window too", Global::Language),
     Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
-    Key::new(char('P'), "", "save this screen as text and SVG in the folder of the reports", Global::Dump),
+    Key::new(char('P'), "", "save this screen as text, SVG and PNG in the folder of the reports", Global::Dump),
     Key::new(code(KeyCode::F(2)), "", "settings: theme, characters, motion, bell, mouse, language", Global::Settings),
     Key::new(char('y'), "", "copy what is selected, with its unit, quality and time", Global::Copy),
     Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),

@@ -1,6 +1,6 @@
-//! The screen as files: what `P` saves for a hand-over mail, as text and as a picture.
+//! The screen as files: what `P` saves for a hand-over mail, as text and as pictures.
 
-mod svg;
+mod cells;
 #[cfg(test)]
 mod tests;
 
@@ -13,7 +13,7 @@ use ratatui::{
 };
 use unicode_width::UnicodeWidthStr;
 
-pub(crate) use self::svg::svg as picture;
+pub(crate) use self::cells::drawing;
 use super::{Effect, Model, QueryId, UiAction};
 use crate::{
     access::{SessionRequest, audit_log::sha256},
@@ -35,7 +35,9 @@ pub(super) fn begin(model: &mut Model) -> Vec<UiAction> {
     let stamp = cx.now.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d-%H%M%S");
     let name = format!("screen-{stamp}-{}", model.tabs.shown.title().to_lowercase());
     let path = |end: &str| cx.def().report.folder.join(format!("{name}.{end}"));
-    let files = vec![(path("txt"), text(&drawn).into_bytes()), (path("svg"), picture(&drawn).into_bytes())];
+    let drawing = drawing(&drawn);
+    let mut files = vec![(path("txt"), text(&drawn).into_bytes()), (path("svg"), drawing.svg())];
+    files.extend(drawing.png().map(|png| (path("png"), png)));
     model.screen_dump.files = files;
     next(model)
 }

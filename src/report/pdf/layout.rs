@@ -6,7 +6,7 @@ use crate::{
     plant::{def::Paper, number::to_usize},
     report::{
         document::{ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
-        drawing::{Drawing, Ink, Shape, TEXT},
+        drawing::{Drawing, Ink, Rgb, Shape, TEXT},
     },
     t,
 };
@@ -19,6 +19,8 @@ const SIZES: [f32; 4] = [8.5, 7.5, 6.5, 6.0];
 /// Height of a line in sizes, and room around a cell.
 const LINE: f32 = 1.3;
 const PADDING: (f32, f32) = (3.0, 1.5);
+/// The ground of a table head.
+const HEAD_GROUND: Rgb = Rgb(242, 242, 242);
 /// Width of a chart in pixels.
 const CHART: u16 = 720;
 
@@ -42,8 +44,8 @@ pub(super) enum Item {
     Text { at: (f32, f32), size: f32, bold: bool, text: String, ink: Ink },
     /// A line through points.
     Line { points: Vec<(f32, f32)>, width: f32, dashed: bool, ink: Ink },
-    /// The ground of a table head: left, top, width, height.
-    Ground(f32, f32, f32, f32),
+    /// A filled rectangle: left, top, width, height.
+    Fill([f32; 4], Ink),
 }
 
 /// Width and height of a paper.
@@ -235,7 +237,7 @@ impl<M: Metrics> Layout<'_, M> {
         let tall = height(self.metrics, cells, widths, size, head);
         let whole: f32 = widths.iter().sum();
         if head {
-            self.put(Item::Ground(MARGIN, self.y, whole, tall));
+            self.put(Item::Fill([MARGIN, self.y, whole, tall], Ink::Own(HEAD_GROUND)));
         }
         let mut x = MARGIN;
         for ((cell, kind), width) in cells.iter().zip(kinds).zip(widths) {
@@ -257,20 +259,24 @@ impl<M: Metrics> Layout<'_, M> {
         let (left, top) = (MARGIN, self.y);
         let place = |(x, y): (f32, f32)| (left + x * scale, top + y * scale);
         for shape in shapes {
-            let item = match shape {
-                Shape::Line { points, ink, width, dashed } => Item::Line {
+            match shape {
+                Shape::Line { points, ink, width, dashed } => self.put(Item::Line {
                     points: points.iter().map(|point| place(*point)).collect(),
                     width: width * scale,
                     dashed: *dashed,
                     ink: *ink,
-                },
-                Shape::Text { at, anchor, text, ink } => {
+                }),
+                Shape::Fill { rects, ink } => rects.iter().for_each(|[x, y, width, height]| {
+                    let (x, y) = place((*x, *y));
+                    self.put(Item::Fill([x, y, width * scale, height * scale], *ink));
+                }),
+                Shape::Text { at, anchor, text, ink, look } => {
                     let (size, (x, y)) = (TEXT.0 * 0.8 * scale, place(*at));
-                    let before = self.metrics.width(text, size, false) * anchor.before();
-                    Item::Text { at: (x - before, y + size * 0.35), size, bold: false, text: text.clone(), ink: *ink }
+                    let before = self.metrics.width(text, size, look.bold) * anchor.before();
+                    let at = (x - before, y + size * 0.35);
+                    self.put(Item::Text { at, size, bold: look.bold, text: text.clone(), ink: *ink });
                 }
-            };
-            self.put(item);
+            }
         }
     }
 

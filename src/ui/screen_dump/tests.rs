@@ -10,6 +10,7 @@ use ratatui::{
 use super::*;
 use crate::{
     access::Durability,
+    report::typeface::has_letter,
     ui::{
         Msg,
         fixture::Fixture,
@@ -35,8 +36,12 @@ fn saved(effects: &[Effect]) -> Option<(PathBuf, String)> {
     })
 }
 
+fn svg(buffer: &Buffer) -> String {
+    String::from_utf8(drawing(buffer).svg()).expect("SVG is text")
+}
+
 #[test]
-fn a_screen_is_put_on_record_and_then_saved_twice() {
+fn a_screen_is_put_on_record_and_saved_thrice() {
     let mut model = model(&Fixture::alarm(), Theme::FULL);
     let shown = screen(&mut model, 80, 24);
     let effects = type_keys(&mut model, "P");
@@ -50,6 +55,11 @@ fn a_screen_is_put_on_record_and_then_saved_twice() {
     let (path, picture) = saved(&effects).expect("the picture");
     assert!(file.ends_with("-mimic.svg") && path.ends_with(&file) && picture.starts_with("<svg "));
     assert!(picture.contains(">TK-1 control</text>") && picture.ends_with("</svg>\n"), "{picture}");
+    let (id, file) = request(&effects).expect("a third request");
+    let effects = update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
+    let (path, picture) = saved(&effects).expect("the picture in pixels");
+    assert!(file.ends_with("-mimic.png") && path.ends_with(&file) && picture.contains("PNG"));
+    assert_eq!(request(&effects), None);
     update(&mut model, Msg::Saved(None, Ok(path)));
     assert!(screen(&mut model, 80, 24).contains("Screen saved: "), "its place is shown");
 }
@@ -79,16 +89,19 @@ fn a_picture_has_shapes_for_lines_and_text_for_words() {
     let mut buffer = Buffer::empty(Rect::new(0, 0, 6, 2));
     buffer.set_string(0, 0, "┌─ A&B", Style::new());
     buffer.set_string(0, 1, "█⣿ ◆", Style::new().fg(Color::Rgb(255, 96, 96)).bg(Color::Indexed(16)));
-    insta::assert_snapshot!(svg::svg(&buffer));
+    insta::assert_snapshot!(svg(&buffer));
 }
 
 #[test]
-fn no_line_of_any_screen_is_left_to_a_font() {
+fn no_sign_of_any_screen_is_left_to_the_font_of_a_viewer() {
     let mut model = model(&Fixture::alarm(), Theme::FULL);
     for tab in "1234567".chars() {
         type_keys(&mut model, &tab.to_string());
         screen(&mut model, 160, 50);
-        let picture = svg::svg(&drawn(&model));
+        let buffer = drawn(&model);
+        let unknown: String = text(&buffer).chars().filter(|c| !c.is_whitespace() && !has_letter(*c)).collect();
+        assert_eq!(unknown, "", "question marks in the picture of tab {tab}");
+        let picture = svg(&buffer);
         let texts = picture.lines().filter(|line| line.starts_with("<text"));
         let left: String = texts
             .flat_map(str::chars)

@@ -9,7 +9,7 @@ use crate::{
     ui::{
         Effect, Model, Msg,
         fixture::Fixture,
-        screen_dump::picture,
+        screen_dump::drawing,
         tabs::Tab,
         tests::{draw, model, type_keys},
         theme::Theme,
@@ -59,7 +59,7 @@ fn shown(fixture: &Fixture, tab: Tab, keys: &str) -> String {
         };
         update(&mut model, Msg::Answer(id, Ok(answer)));
     }
-    picture(&draw(&mut model, 120, 40))
+    String::from_utf8(drawing(&draw(&mut model, 120, 40)).svg()).expect("SVG is text")
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn made() -> Document {
 fn texts(page: &Page) -> Vec<(f32, f32, &str)> {
     let text = |item: &'_ Item| match item {
         Item::Text { at, text, .. } => Some((at.0, at.1, text.clone())),
-        Item::Line { .. } | Item::Ground(..) => None,
+        Item::Line { .. } | Item::Fill(..) => None,
     };
     let found: Vec<(f32, f32, String)> = page.items.iter().filter_map(text).collect();
     found.into_iter().map(|(x, y, text)| (x, y, &*text.leak())).collect()

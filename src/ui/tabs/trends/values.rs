@@ -68,11 +68,14 @@ pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas
     }
     let wide = canvas.width().saturating_sub(80);
     let name = 15 + wide / 5;
-    let label = name + 18 + wide / 4;
+    // The label gives way: a number whose end is cut off would be another number.
+    let label = (name + 18 + wide / 4).min(canvas.width().saturating_sub(32)).max(name + 2);
     let (value, low, high) = (label + 15, label + 23, label + 31);
+    let has_room = high <= canvas.width();
     canvas.text(2, 1, t!("tag"), theme.dim());
     let now = if cx.is_past() { t!("then") } else { t!("now") };
-    for (end, text) in [(value, now), (low, t!("1 h min")), (high, t!("1 h max"))] {
+    canvas.text_right(value, 1, now, theme.dim());
+    for (end, text) in [(low, t!("1 h min")), (high, t!("1 h max"))].into_iter().filter(|_| has_room) {
         canvas.text_right(end, 1, text, theme.dim());
     }
     canvas.text(high + 2, 1, t!("last hour"), theme.dim());
@@ -93,9 +96,10 @@ pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas
         canvas.text(2 + name, y, &fit(&def.label, label - name - 2), theme.dim());
         canvas.text_right(value, y, &shown.within(value - label), shown.style);
         let Some(series) = hour(trends, *tag) else { continue };
-        if let Some((min, _, max)) = series.summary.filter(|_| def.enum_labels.is_empty()) {
-            canvas.text_right(low, y, &cx.snapshot.format(*tag, min), theme.dim());
-            canvas.text_right(high, y, &cx.snapshot.format(*tag, max), theme.dim());
+        if let Some((min, _, max)) = series.summary.filter(|_| has_room && def.enum_labels.is_empty()) {
+            for (end, value) in [(low, min), (high, max)] {
+                canvas.text_right(end, y, &fit(&cx.snapshot.format(*tag, value), 7), theme.dim());
+            }
         }
         let cells = usize::from(canvas.width().saturating_sub(high + 3)).min(series.buckets.len());
         canvas.text(high + 2, y, &spark(series, cells, resolution(cx, *tag), theme.glyphs), style);

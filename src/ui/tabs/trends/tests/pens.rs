@@ -133,3 +133,16 @@ fn no_number_of_the_legend_is_cut() {
         assert!(row.contains(" ##      ##") && row.contains("100 %"), "{width}: {row}");
     }
 }
+
+#[test]
+fn no_number_of_the_list_of_values_is_cut_at_60_columns() {
+    let mut stand = Stand::new(Theme::FULL, 60, 20);
+    stand.press("v");
+    stand.answer();
+    let values = &stand.model.tabs.trends.hours.value;
+    let (_, _, max) = values.iter().flatten().find_map(|series| series.summary).expect("answered");
+    let (screen, max) = (stand.screen(), stand.model.snapshot.format(TagId(0), max));
+    let row = screen.lines().find(|line| line.contains("▸ TIC-1.PV")).expect("the first value");
+    assert!(row.split_whitespace().filter(|word| *word == max).count() >= 1, "{max} in {row}");
+    assert!(screen.contains("1 h max"), "{screen}");
+}
