@@ -57,8 +57,9 @@ def compute(begin, end, sv, ended):
             way = (pv - start) / (sv - start)
             passed = [now if mark is None and way >= part else mark for mark, part in zip(passed, (0.1, 0.9))]
         over = max(over or 0.0, beyond)
-        in_band = (time if in_band is None or gap else in_band) if inside else None
-        since = in_band - begin if in_band is not None and time - in_band >= STEADY_FOR else None
+        # Seen at SV since, and when it came there: unknown after a gap.
+        in_band = ((time, now) if in_band is None or gap else in_band) if inside else None
+        since = in_band[1] if in_band is not None and time - in_band[0] >= STEADY_FOR else None
     rise = None
     if passed[1] is not None:
         rise = "unknown" if "unknown" in passed else passed[1] - passed[0]
