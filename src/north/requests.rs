@@ -83,15 +83,19 @@ pub struct PassOn {
     tag: TagId,
     value: f64,
     expected: Option<f64>,
+    expires: Timestamp,
     note: String,
 }
 
 impl PassOn {
-    /// The command, on the plant as it is now.
-    pub fn command(self, snapshot: &Snapshot, terminal: u32) -> Command {
-        let PassOn { number, tag, value, expected, note } = self;
+    /// The command, on the plant as it is now. `Err`: writing the list took so long that it has expired.
+    pub fn command(self, snapshot: &Snapshot, terminal: u32, now: Now) -> Result<Command, MqttRefusal> {
+        let PassOn { number, tag, value, expected, expires, note } = self;
+        if expires <= now.utc {
+            return Err(MqttRefusal::Expired);
+        }
         let command = Command::on(snapshot, CommandId { terminal, number }, CommandKind::Write { tag, value });
-        Command { expected_value: expected.or(command.expected_value), note: Some(note.into()), ..command }
+        Ok(Command { expected_value: expected.or(command.expected_value), note: Some(note.into()), ..command })
     }
 }
 
@@ -134,12 +138,18 @@ impl Requests {
     /// The broker has delivered a message.
     pub fn on_received(&mut self, plant: &PlantDef, received: &Received, now: Now) -> Decision {
         let (reply, is_permitted) = request::reply_to(&self.mqtt, received);
-        let read = request::read(received);
-        if let Ok(request) = &read
-            && let Some(entry) = self.log.find(&request.id)
-        {
-            if !entry.is(request) {
-                return self.refuse(received, reply, MqttRefusal::IdReused, now);
+        let request = match request::read(received) {
+            Ok(request) => request,
+            Err(why) => {
+                let id = request::id_of(received);
+                let shown = id.clone().unwrap_or(UNREADABLE.into());
+                return self.refuse((id.as_deref(), shown), &reply, why, now);
+            }
+        };
+        let named = (Some(&*request.id), what(&request));
+        if let Some(entry) = self.log.find(&request.id) {
+            if !entry.is(&request) {
+                return self.refuse(named, &reply, MqttRefusal::IdReused, now);
             }
             if is_permitted {
                 entry.reply = reply;
@@ -147,42 +157,36 @@ impl Requests {
             let answer = entry.answer();
             return self.limited(answer, now);
         }
-        let checked = read.and_then(|request| {
-            let is_closed = self.closed_until.filter(|until| now.utc < *until);
-            match is_closed {
-                Some(until) => Err(MqttRefusal::ListDamaged(until)),
-                None if !is_permitted => Err(MqttRefusal::ResponseTopic),
-                None => Ok((request::check(plant, &self.mqtt, &received.topic, &request, now.utc)?, request)),
-            }
-        });
-        match checked {
-            Err(why) => self.refuse(received, reply, why, now),
-            Ok((tag, request)) => self.pass_on(received, request, tag, reply, now),
-        }
-    }
-
-    fn pass_on(&mut self, received: &Received, request: Request, tag: TagId, reply: ReplyTo, now: Now) -> Decision {
+        let checked = match self.closed_until.filter(|until| now.utc < *until) {
+            Some(until) => Err(MqttRefusal::ListDamaged(until)),
+            None if !is_permitted => Err(MqttRefusal::ResponseTopic),
+            None => request::check(plant, &self.mqtt, &received.topic, &request, now.utc),
+        };
         let number = self.last_number + 1;
-        let has_room = self.log.pending().count() < PENDING_MAX && self.rate.try_acquire(steady(now));
-        if !has_room || !self.log.add(&request, reply.clone(), number, now.utc) {
-            return self.refuse(received, reply, MqttRefusal::TooMany, now);
-        }
+        let tag = match checked {
+            Ok(tag) if self.has_room(now) && self.log.add(&request, reply.clone(), number, now.utc) => tag,
+            Ok(_) => return self.refuse(named, &reply, MqttRefusal::TooMany, now),
+            Err(why) => return self.refuse(named, &reply, why, now),
+        };
         self.last_number = number;
         self.sent.push((number, now.plant));
         self.status.accepted += 1;
-        self.show(what(&request), MqttResult::Outcome(Outcome::Pending), now);
-        let reason = request.reason.map(|reason| format!(": {reason}")).unwrap_or_default();
-        let note = format!("request {}{reason}", request.id);
-        Decision::PassOn(PassOn { number, tag, value: request.value, expected: request.expected, note })
+        self.show(named.1, MqttResult::Outcome(Outcome::Pending), now);
+        let Request { id, reason, value, expected, expires, .. } = request;
+        let reason = reason.map(|reason| format!(": {reason}")).unwrap_or_default();
+        let note = format!("request {id}{reason}");
+        Decision::PassOn(PassOn { number, tag, value, expected, expires, note })
     }
 
-    fn refuse(&mut self, received: &Received, reply: ReplyTo, why: MqttRefusal, now: Now) -> Decision {
-        let id = request::id_of(received);
+    fn has_room(&mut self, now: Now) -> bool {
+        self.log.pending().count() < PENDING_MAX && self.rate.try_acquire(steady(now))
+    }
+
+    /// `named`: its id, if it can be sent back, and what is shown of it.
+    fn refuse(&mut self, (id, shown): (Option<&str>, String), reply: &ReplyTo, why: MqttRefusal, now: Now) -> Decision {
         self.status.refused += 1;
-        let shown =
-            request::read(received).map_or_else(|_| id.clone().unwrap_or(UNREADABLE.into()), |request| what(&request));
         self.show(shown, MqttResult::Refused(why.clone()), now);
-        self.limited(refusal(id.as_deref(), &reply, &why, now), now)
+        self.limited(refusal(id, reply, &why, now), now)
     }
 
     fn limited(&mut self, answer: Message, now: Now) -> Decision {

@@ -70,6 +70,19 @@ fn a_request_is_accepted_once_and_its_outcome_answered_once() {
 }
 
 #[test]
+fn a_request_that_expires_while_the_list_is_written_is_not_sent() {
+    let passed_on = |second| {
+        let mut requests = requests(Ok(RequestLog::default()));
+        let received = message(&json("a", "50"));
+        let decision = requests.on_received(&fixture::shared(), &received, now(0));
+        let Decision::PassOn(request) = decision else { panic!("{decision:?}") };
+        request.command(&Snapshot::blank(fixture::shared()), TERMINAL, now(second)).map(|command| command.id.number)
+    };
+    assert_eq!(passed_on(29), Ok(1));
+    assert_eq!(passed_on(30), Err(MqttRefusal::Expired), "the disk took half a minute");
+}
+
+#[test]
 fn what_the_plant_refuses_is_answered_with_its_reason() {
     let mut requests = requests(Ok(RequestLog::default()));
     decide(&mut requests, &message(&json("a", "50")), 0);

@@ -123,16 +123,12 @@ impl RequestTask {
     /// The list is on disk before the command is sent: no restart makes it be sent twice.
     async fn pass_on(&mut self, request: PassOn) {
         let number = request.number;
-        let why = match self.save().await {
-            Err(why) => MqttRefusal::NotRecorded(why),
-            Ok(()) => {
-                let command = request.command(&self.session.snapshots.borrow(), self.session.terminal);
-                match self.session.send(Request::Command(command, None)) {
-                    Ok(()) => return,
-                    Err(why) => MqttRefusal::NotDelivered(why.to_owned()),
-                }
-            }
-        };
+        let passed_on = self.save().await.map_err(MqttRefusal::NotRecorded).and_then(|()| {
+            let command = request.command(&self.session.snapshots.borrow(), self.session.terminal, self.now())?;
+            let sent = self.session.send(Request::Command(command, None));
+            sent.map_err(|why| MqttRefusal::NotDelivered(why.to_owned()))
+        });
+        let Err(why) = passed_on else { return };
         let refusal = self.requests.on_not_passed_on(number, why, self.now());
         self.answer(refusal).await;
     }
