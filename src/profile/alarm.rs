@@ -158,87 +158,48 @@ fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
     }
 }
 
-/// The name of the alarm that every device or line has.
-fn message(condition: Condition) -> &'static str {
-    match condition {
-        Condition::Overloaded => "line overloaded",
-        Condition::SlowerThanStated => "slower than its profile states",
-        Condition::Limit { .. }
-        | Condition::Deviation { .. }
-        | Condition::State { .. }
-        | Condition::Bit { .. }
-        | Condition::Rate { .. }
-        | Condition::NoChange { .. }
-        | Condition::NoUpdate { .. }
-        | Condition::Changes { .. }
-        | Condition::NotResponding
-        | Condition::Health { .. }
-        | Condition::NotConnected
-        | Condition::Station(_) => "not responding",
-    }
-}
-
-/// Its likely cause, effect and action.
-fn guidance(condition: Condition) -> [&'static str; 3] {
-    match condition {
-        Condition::Overloaded => [
-            "the line is polled more often than it can carry, or its devices answer more slowly",
-            "alarm inputs are polled on time, other values less often; no device is faulty",
-            "see the Bus tab; poll less often, increase the baud rate, or split the line",
-        ],
-        Condition::SlowerThanStated => [
-            "the device takes longer than `response_time_ms` of its profile, or adapter, gateway or computer delay it",
-            "its values are right; the worst case of its polls was too low, so polls of its line may be late",
-            "raise `response_time_ms` of the device ([device.limits] in the plant file), or poll it less often; Bus tab",
-        ],
-        Condition::Limit { .. }
-        | Condition::Deviation { .. }
-        | Condition::State { .. }
-        | Condition::Bit { .. }
-        | Condition::Rate { .. }
-        | Condition::NoChange { .. }
-        | Condition::NoUpdate { .. }
-        | Condition::Changes { .. }
-        | Condition::NotResponding
-        | Condition::Health { .. }
-        | Condition::NotConnected
-        | Condition::Station(_) => [
-            "the device has no power, its cable is open, or its unit address or serial parameters differ",
-            "its values are unknown and it cannot be operated",
-            "check the device; then supply, cable, terminator and the Bus tab",
-        ],
-    }
-}
-
 fn not_responding(device: &DeviceDef) -> AlarmDef {
-    let condition = Condition::NotResponding;
+    let guidance = [
+        "the device has no power, its cable is open, or its unit address or serial parameters differ",
+        "its values are unknown and it cannot be operated",
+        "check the device; then supply, cable, terminator and the Bus tab",
+    ];
     AlarmDef {
         class: AlarmClass::System,
         // The link has already asked more than once; the delay keeps a single lost frame quiet.
         on_delay: Duration::from_secs(3),
-        guidance: Guidance::new(guidance(condition), Some(Duration::from_secs(600))),
-        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), condition, message(condition))
+        guidance: Guidance::new(guidance, Some(Duration::from_secs(600))),
+        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), Condition::NotResponding, "not responding")
     }
 }
 
 fn slower_than_stated(device: &DeviceDef) -> AlarmDef {
-    let condition = Condition::SlowerThanStated;
+    let guidance = [
+        "the device takes longer than `response_time_ms` of its profile, or adapter, gateway or computer delay it",
+        "its values are right; the worst case of its polls was too low, so polls of its line may be late",
+        "raise `response_time_ms` of the device ([device.limits] in the plant file), or poll it less often; Bus tab",
+    ];
+    let (subject, condition) = (Subject::Device(device.id), Condition::SlowerThanStated);
     AlarmDef {
         priority: Priority::Low,
         class: AlarmClass::System,
-        guidance: Guidance::new(guidance(condition), None),
-        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), condition, message(condition))
+        guidance: Guidance::new(guidance, None),
+        ..AlarmDef::new(AlarmId(0), subject, condition, "slower than its profile states")
     }
 }
 
 fn overloaded(line: &LineDef) -> AlarmDef {
-    let condition = Condition::Overloaded;
+    let guidance = [
+        "the line is polled more often than it can carry, or its devices answer more slowly",
+        "alarm inputs are polled on time, other values less often; no device is faulty",
+        "see the Bus tab; poll less often, increase the baud rate, or split the line",
+    ];
     AlarmDef {
         priority: Priority::Low,
         class: AlarmClass::System,
         // The schedule has already seen more than a short peak.
         on_delay: Duration::from_secs(10),
-        guidance: Guidance::new(guidance(condition), None),
-        ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), condition, message(condition))
+        guidance: Guidance::new(guidance, None),
+        ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), Condition::Overloaded, "line overloaded")
     }
 }
