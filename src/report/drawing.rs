@@ -5,7 +5,8 @@ use std::fmt::{self, Write};
 use tiny_skia::{Color, FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, StrokeDash, Transform};
 use unicode_width::UnicodeWidthStr;
 
-use super::typeface::{CELL, Letters};
+pub use super::typeface::CELL;
+use super::typeface::Letters;
 
 /// Height of a line of text, and room of a letter, in pixels.
 pub const TEXT: (f32, f32) = (16.0, 8.0);
@@ -130,6 +131,15 @@ impl Drawing {
     /// What stands on it.
     pub fn shapes(&self) -> &[Shape] {
         &self.shapes
+    }
+
+    /// The same page with inks of other colours.
+    pub fn recoloured(mut self, colour: impl Fn(Ink) -> Rgb) -> Drawing {
+        for shape in &mut self.shapes {
+            let (Shape::Line { ink, .. } | Shape::Fill { ink, .. } | Shape::Text { ink, .. }) = shape;
+            *ink = Ink::Own(colour(*ink));
+        }
+        self
     }
 
     /// A line through these points.

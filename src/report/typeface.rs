@@ -16,7 +16,7 @@ pub(super) const BOLD: &[u8] = include_bytes!("fonts/Sarabun-Bold.ttf");
 /// Letters and signs of pictures, all of one width.
 const MONO: &[u8] = include_bytes!("fonts/DejaVuSansMono-subset.ttf");
 /// Width of a letter of pictures in sizes: 1233 of 2048 units.
-pub(super) const CELL: f32 = 0.602;
+pub const CELL: f32 = 0.602;
 
 /// A font that shapes and outlines.
 pub(super) struct Typeface(Face<'static>);

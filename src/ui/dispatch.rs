@@ -10,6 +10,9 @@ const RECENT_MAX: usize = 8;
 pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     model.note = None;
     model.replay.dismiss();
+    if close_picture(model) && [keys::code(KeyCode::Esc), keys::char('i')].iter().any(|chord| chord.is(event)) {
+        return Vec::new();
+    }
     if let Some(actions) = on_key_of_every_window(model, event) {
         return actions;
     }
@@ -270,6 +273,24 @@ pub(super) fn fit_screen(model: &mut Model) {
         }
     }
     close_unseen(model);
+}
+
+/// Takes the terminal's own picture away: `true` if there was one.
+pub(super) fn close_picture(model: &mut Model) -> bool {
+    std::mem::take(&mut model.tabs.trends.pictured)
+}
+
+/// A picture lies over everything: whatever opens above the chart, or takes its place, closes it.
+pub(super) fn close_covering_picture(model: &mut Model) {
+    let covers = model.modal.is_some()
+        || model.tabs.shown != Tab::Trends
+        || model.small()
+        || model.replay.page().is_some()
+        || session_lock::is_closed(&model.session)
+        || model.tabs.trends.pictured && model.tabs.trends.picture(&model.cx()).is_none();
+    if covers {
+        close_picture(model);
+    }
 }
 
 /// A window that cannot be seen must not take keys, and none that gives commands opens where it may not be seen whole;

@@ -70,6 +70,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
             }
             UiAction::Bookmark(at, name) => effects.push(bookmark(model, at, name)),
             UiAction::SetLocale(locale) => model.set_locale(locale),
+            UiAction::Note(words) => model.note = Some(words.into()),
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),
         }

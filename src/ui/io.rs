@@ -2,7 +2,9 @@
 
 mod append;
 mod files;
+mod paint;
 mod preferences;
+mod question;
 mod screen;
 mod wire;
 #[cfg(test)]
@@ -23,11 +25,12 @@ use tokio::{
 use super::{
     Effect, Leaving, Model, Msg, QueryId, TICK,
     extension::{Extension, ExtensionMessage},
+    graphics::Graphics,
     mouse::Pointer,
     preferences::{Kept, PreferencesFile},
     tabs::{Tab, registers::Start},
     theme::Theme,
-    update, view,
+    update,
 };
 use crate::{
     access::SessionRequest,
@@ -128,13 +131,18 @@ pub async fn run(session: Session, options: Options) -> Result<(), UiError> {
     if let Some(port) = &mut extension {
         model.extension = port.states.next().await;
     }
-    let screen = Screen::raise()?;
+    let env = |name: &str| std::env::var(name).ok();
+    let unasked = Graphics::unasked(env, model.preferences_file.of(None).pictures);
+    model.limits.graphics = Graphics { unasked, cell: question::cell_of_line(), ..Graphics::NONE };
+    let screen = Screen::raise(unasked.is_none())?;
     let heard_at = Instant::now();
     let appender = append::Appender::new(outbox.clone());
     Loop {
         session,
         model,
         screen,
+        painter: paint::Painter::default(),
+        late: None,
         extension,
         outbox,
         appender,
@@ -151,6 +159,9 @@ struct Loop {
     session: Session,
     model: Model,
     screen: Screen,
+    painter: paint::Painter,
+    /// The answer to the question of the start may still come.
+    late: Option<question::LateAnswer>,
     extension: Option<ExtensionPort>,
     /// For answers and saved reports, which come from other tasks, with the plant (its count) that they were asked of.
     outbox: mpsc::Sender<(u32, Msg)>,
@@ -167,7 +178,6 @@ struct Loop {
 
 impl Loop {
     async fn run(mut self, mut inbox: mpsc::Receiver<(u32, Msg)>, start: Start) -> Result<(), UiError> {
-        let mut events = EventStream::new();
         let mut hangup = signal(SignalKind::hangup())?;
         let mut terminate = signal(SignalKind::terminate())?;
         let mut interrupt = signal(SignalKind::interrupt())?;
@@ -178,6 +188,10 @@ impl Loop {
         if start != Start::default() {
             self.handle(Msg::Begin(start), Duration::ZERO)?;
         }
+        if self.hear_answers()? {
+            return Ok(());
+        }
+        let mut events = EventStream::new();
         loop {
             let due = self.redraw_at.unwrap_or_else(|| Instant::now() + FRAME);
             let leave = tokio::select! {
@@ -222,11 +236,17 @@ impl Loop {
     }
 
     fn on_event(&mut self, event: Event) -> Result<bool, UiError> {
+        if self.late.as_mut().is_some_and(|late| late.holds(&event, std::time::Instant::now())) {
+            return Ok(false);
+        }
         match event {
             Event::Key(key) => self.handle(Msg::Key(key), ECHO),
             Event::Paste(text) => self.handle(Msg::Paste(text), ECHO),
             Event::Resize(_, _) => {
+                self.painter.forget();
                 self.screen.renew()?;
+                let cell = question::cell_of_line().or(self.model.limits.graphics.cell);
+                self.model.limits.graphics.cell = cell;
                 let (width, height) = self.screen.size();
                 self.handle(Msg::Resize(width, height), ECHO)
             }
@@ -262,7 +282,10 @@ impl Loop {
                 Effect::KeepPreferences(user, chosen) => self.keep_preferences(user, chosen),
                 Effect::Copy(text) => self.screen.copy(&text)?,
                 Effect::Bell => self.screen.ring()?,
-                Effect::Redraw => self.screen.renew()?,
+                Effect::Redraw => {
+                    self.painter.forget();
+                    self.screen.renew()?;
+                }
                 Effect::Quit => return Ok(true),
             }
         }
@@ -337,14 +360,6 @@ impl Loop {
             let kept = preferences::keep(user.as_deref(), kept);
             let _ = outbox.blocking_send((plants, Msg::Preferences(kept)));
         });
-    }
-
-    fn draw(&mut self) -> Result<(), UiError> {
-        self.redraw_at = None;
-        self.screen.draw(|frame| view(&self.model, frame))?;
-        own(|| update(&mut self.model, Msg::Drawn));
-        self.drawn_at = Some(Instant::now());
-        Ok(())
     }
 }
 

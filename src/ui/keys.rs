@@ -183,7 +183,7 @@ pub enum Global {
     Silence,
     /// Save the screen as text and as a picture.
     Dump,
-    /// Choose theme, characters, motion, bell, mouse and language.
+    /// Choose theme, characters, pictures, motion, bell, mouse and language.
     Settings,
     /// Copy what is selected.
     Copy,
@@ -236,7 +236,12 @@ const GLOBAL: &[Key<Global>] = &[
     Key::new(ctrl('t'), "", "change the language, in every window too", Global::Language),
     Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
     Key::new(char('P'), "", "save this screen as text, SVG and PNG in the folder of the reports", Global::Dump),
-    Key::new(code(KeyCode::F(2)), "", "settings: theme, characters, motion, bell, mouse, language", Global::Settings),
+    Key::new(
+        code(KeyCode::F(2)),
+        "",
+        "settings: theme, characters, pictures, motion, bell, mouse, language",
+        Global::Settings,
+    ),
     Key::new(char('y'), "", "copy what is selected, with its unit, quality and time", Global::Copy),
     Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),
     Key::new(ctrl('c'), "", "quit (asks first)", Global::Quit),

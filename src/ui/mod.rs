@@ -9,6 +9,7 @@ pub(crate) mod chrome;
 pub(crate) mod last_frame;
 pub(crate) mod extension;
 pub(crate) mod glyph_filter;
+pub(crate) mod graphics;
 pub(crate) mod io;
 pub(crate) mod interlock;
 pub(crate) mod keys;
@@ -52,6 +53,7 @@ use crate::{
     text::Locale,
 };
 use extension::Extension;
+use graphics::Picture;
 use keys::Global;
 pub use last_command::LastCommand;
 use last_frame::LastFrame;
@@ -239,6 +241,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Key(event) => on_input(model, |model| on_key(model, event)),
         Msg::Pointer(pointer) => on_input(model, |model| mouse::on_pointer(model, pointer)),
         Msg::Paste(text) => {
+            dispatch::close_picture(model);
             on_paste(model, &text);
             Vec::new()
         }
@@ -289,6 +292,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let actions = tour::follow(model, event);
     effects.extend(perform(model, actions));
     dispatch::close_unseen(model);
+    dispatch::close_covering_picture(model);
     model.close_confirmation();
     model.apply_preferences();
     if keyed {
@@ -308,6 +312,11 @@ pub fn view(model: &Model, frame: &mut Frame) {
     model.locale().within(|| chrome::view(model, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
     model.theme.paint_ground(frame.buffer_mut());
+}
+
+/// The terminal's own picture over the cells, while one is wanted.
+pub fn picture(model: &Model) -> Option<Picture> {
+    model.locale().within(|| model.tabs.trends.picture(&model.cx()))
 }
 
 fn on_paste(model: &mut Model, text: &str) {

@@ -164,6 +164,8 @@ pub enum UiAction {
     KeepPreferences(Preferences),
     /// Show all texts in this language.
     SetLocale(Locale),
+    /// Say this until the next key.
+    Note(&'static str),
     /// Ask whether to leave.
     Leave,
     /// Pass on an effect as it is.
@@ -226,6 +228,7 @@ impl UiAction {
             | UiAction::EventPage(_)
             | UiAction::ReplayStep(_)
             | UiAction::SetLocale(_)
+            | UiAction::Note(_)
             | UiAction::Leave => Scope::View,
             UiAction::SessionRequest(..) | UiAction::Do(_) => Scope::Station,
         }

@@ -9,6 +9,7 @@ use jiff::Timestamp;
 
 use super::{
     Model,
+    graphics::Pictures,
     modal::Modal,
     theme::{Glyphs, Theme, ThemeName},
 };
@@ -57,6 +58,8 @@ pub struct Preferences {
     pub theme: ThemeName,
     /// Characters.
     pub characters: Characters,
+    /// The terminal's own pictures.
+    pub pictures: Pictures,
     /// Agitators turn and flow arrows travel.
     pub motion: bool,
     /// The bell.
@@ -72,6 +75,7 @@ impl Default for Preferences {
         Preferences {
             theme: ThemeName::default(),
             characters: Characters::default(),
+            pictures: Pictures::default(),
             motion: true,
             bell: Bell::default(),
             mouse: false,
@@ -88,7 +92,7 @@ impl Preferences {
             (Characters::Blocks, _) | (_, Glyphs::Block) => Glyphs::Block,
             (Characters::Automatic, Glyphs::Braille) => Glyphs::Braille,
         };
-        Theme { name: self.theme, colours: limits.colours, glyphs, motion: self.motion && limits.motion }
+        Theme { name: self.theme, glyphs, motion: self.motion && limits.motion, ..*limits }
     }
 }
 
@@ -148,6 +152,7 @@ toml_tables! {
     SectionTable, "the preferences of a user" {
         opt "theme" theme: ThemeName,
         opt "characters" characters: Characters,
+        opt "pictures" pictures: Pictures,
         opt "motion" motion: bool,
         opt "bell" bell: Bell,
         opt "mouse" mouse: bool,
@@ -264,6 +269,7 @@ fn of_section(section: &SectionTable) -> Preferences {
     Preferences {
         theme: section.theme.value_or(usual.theme),
         characters: section.characters.value_or(usual.characters),
+        pictures: section.pictures.value_or(usual.pictures),
         motion: section.motion.value_or(usual.motion),
         bell: section.bell.value_or(usual.bell),
         mouse: section.mouse.value_or(usual.mouse),
@@ -275,6 +281,7 @@ fn section(chosen: &Preferences) -> toml::Value {
     let keys = [
         ("theme", Some(chosen.theme.word().into())),
         ("characters", Some(chosen.characters.word().into())),
+        ("pictures", Some(chosen.pictures.word().into())),
         ("motion", Some(chosen.motion.into())),
         ("bell", Some(chosen.bell.word().into())),
         ("mouse", Some(chosen.mouse.into())),

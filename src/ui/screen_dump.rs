@@ -13,7 +13,7 @@ use ratatui::{
 };
 use unicode_width::UnicodeWidthStr;
 
-pub(crate) use self::cells::drawing;
+pub(crate) use self::cells::{GROUND, INK, drawing, rgb};
 use super::{Effect, Model, QueryId, UiAction};
 use crate::{
     access::{SessionRequest, audit_log::sha256},

@@ -7,6 +7,7 @@ use ratatui::{
     style::{Color, Modifier, Style},
 };
 
+use super::graphics::Graphics;
 use crate::plant::{
     alarm::AlarmState,
     def::Priority,
@@ -26,6 +27,8 @@ pub struct Theme {
     pub glyphs: Glyphs,
     /// Agitators turn and flow arrows travel.
     pub motion: bool,
+    /// What the terminal has announced beside characters.
+    pub graphics: Graphics,
 }
 
 keyword_enum! {
@@ -72,8 +75,13 @@ pub enum Glyphs {
 
 impl Theme {
     /// Full looks, for tests and modern terminals.
-    pub const FULL: Theme =
-        Theme { name: ThemeName::Grey, colours: Colours::True, glyphs: Glyphs::Braille, motion: true };
+    pub const FULL: Theme = Theme {
+        name: ThemeName::Grey,
+        colours: Colours::True,
+        glyphs: Glyphs::Braille,
+        motion: true,
+        graphics: Graphics::NONE,
+    };
     /// Attributes and seven bits only.
     pub const PLAIN: Theme = Theme { colours: Colours::None, glyphs: Glyphs::Ascii, ..Theme::FULL };
 
@@ -242,6 +250,11 @@ impl Theme {
                 cell.fg = normal;
             }
         }
+    }
+
+    /// What everything stands on.
+    pub fn ground(&self) -> Option<Color> {
+        self.colour(Role::Ground)
     }
 
     fn colour(&self, role: Role) -> Option<Color> {

@@ -2,25 +2,29 @@
 
 use std::{
     cell::Cell as Flag,
-    io::{self, IsTerminal},
+    io::{self, IsTerminal, Write},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
+    time::Instant,
 };
 
 use crossterm::{
     clipboard::CopyToClipboard,
     cursor, event,
-    style::{Attribute, SetAttribute},
+    style::{Attribute, Print, SetAttribute},
     terminal,
 };
 use ratatui::{Frame, Terminal, backend::Backend};
 
-use super::wire::Wire;
+use super::{question, wire::Wire};
+use crate::ui::graphics::{Graphics, Picture, Protocol, kitty};
 
 /// The terminal is in raw mode and shows our screen.
 static RAISED: AtomicBool = AtomicBool::new(false);
+/// It holds a picture of ours.
+static PICTURED: AtomicBool = AtomicBool::new(false);
 
 thread_local! {
     /// This thread is inside the terminal's own code: a panic now is the terminal's.
@@ -32,6 +36,8 @@ pub struct Screen {
     terminal: Terminal<Wire>,
     /// The terminal reports the mouse.
     mouse: bool,
+    /// When it was asked about pictures, if it was.
+    pub asked_at: Option<Instant>,
 }
 
 impl Screen {
@@ -42,21 +48,26 @@ impl Screen {
     }
 
     /// Raw mode, own screen, no cursor, pastes marked as such; from now on a panic restores the terminal first.
-    pub fn raise() -> io::Result<Screen> {
+    /// What a terminal prints of a question that it does not know is cleared with the rest.
+    pub fn raise(asks: bool) -> io::Result<Screen> {
         hook_panics();
         // The theme decides about colour. Left to itself crossterm answers NO_COLOR with sequences that switch attributes off.
         crossterm::style::force_color_output(true);
         terminal::enable_raw_mode()?;
         RAISED.store(true, Ordering::SeqCst);
+        let asked_at = asks.then(Instant::now);
+        let question = if asks { question::question() } else { Vec::new() };
         let raised = crossterm::execute!(
             io::stdout(),
             terminal::EnterAlternateScreen,
+            Print(String::from_utf8_lossy(&question)),
             // A console without an alternate screen keeps what was there.
             terminal::Clear(terminal::ClearType::All),
             cursor::Hide,
             event::EnableBracketedPaste
         );
-        let screen = raised.and_then(|()| Ok(Screen { terminal: Terminal::new(Wire::new()?)?, mouse: false }));
+        let screen =
+            raised.and_then(|()| Ok(Screen { terminal: Terminal::new(Wire::new()?)?, mouse: false, asked_at }));
         if screen.is_err() {
             restore();
         }
@@ -74,6 +85,24 @@ impl Screen {
         self.terminal.backend_mut().measure()?;
         let area = self.terminal.backend().size()?;
         self.terminal.resize(ratatui::layout::Rect::new(0, 0, area.width, area.height))
+    }
+
+    /// Shows a picture over the cells, in place of the one before.
+    pub fn paint(&mut self, graphics: &Graphics, picture: &Picture) -> io::Result<()> {
+        let Some(bytes) = own(|| graphics.encode(picture)) else { return Ok(()) };
+        PICTURED.store(picture.protocol == Protocol::Kitty, Ordering::SeqCst);
+        let wire = self.terminal.backend_mut();
+        crossterm::queue!(wire.bytes, cursor::MoveTo(picture.area.x, picture.area.y))?;
+        wire.bytes.extend(bytes);
+        wire.send()
+    }
+
+    /// Takes the picture away: the next frame is drawn from nothing.
+    pub fn clear_picture(&mut self) -> io::Result<()> {
+        if PICTURED.swap(false, Ordering::SeqCst) {
+            self.terminal.backend_mut().bytes.extend(kitty::DELETE);
+        }
+        self.renew()
     }
 
     /// Rings the bell of the terminal.
@@ -131,6 +160,9 @@ pub fn own<T>(work: impl FnOnce() -> T) -> T {
 /// Puts everything back, the first time it is called. Errors are of no use to anyone: the terminal may be gone.
 fn restore() {
     if RAISED.swap(false, Ordering::SeqCst) {
+        if PICTURED.swap(false, Ordering::SeqCst) {
+            let _ = io::stdout().write_all(kitty::DELETE);
+        }
         let _ = crossterm::execute!(
             io::stdout(),
             event::DisableMouseCapture,

@@ -1,5 +1,7 @@
 //! The loop on a real terminal: this test program runs itself on a pty, once for every way out.
 
+mod pictures;
+
 use std::{
     io::{Read, Write},
     sync::mpsc as plain,
@@ -71,12 +73,21 @@ struct Pty {
 }
 
 impl Pty {
+    /// A terminal that announces nothing.
     fn start() -> Pty {
+        let mut pty = Pty::open();
+        pty.wait_for("Water tank");
+        pty
+    }
+
+    fn open() -> Pty {
         let size = PtySize { rows: 24, cols: 80, pixel_width: 0, pixel_height: 0 };
         let pair = native_pty_system().openpty(size).expect("a pty");
         let mut command = CommandBuilder::new(std::env::current_exe().expect("this program"));
         command.args(["--exact", "ui::io::tests::on_the_pty", "--nocapture"]);
         command.env(CHILD, "1");
+        command.env_remove("TMUX");
+        command.env_remove("STY");
         command.env("TERM", "xterm-256color");
         command.env("RUST_BACKTRACE", "0");
         let child = pair.slave.spawn_command(command).expect("the program starts");
@@ -92,9 +103,7 @@ impl Pty {
                 }
             }
         });
-        let mut pty = Pty { child, keys, sent, seen: Vec::new(), _master: pair.master };
-        pty.wait_for("Water tank");
-        pty
+        Pty { child, keys, sent, seen: Vec::new(), _master: pair.master }
     }
     /// Waits until the words stand on the screen, or were sent as they are.
     fn wait_for(&mut self, words: &str) {

@@ -84,7 +84,7 @@ pub enum Modal {
     UserForm(Box<UserForm>),
     /// One audit entry.
     AuditEntry(Box<AuditEntryDialog>),
-    /// Theme, characters, motion, bell, mouse and language.
+    /// Theme, characters, pictures, motion, bell, mouse and language.
     TerminalSettings(TerminalSettings),
 }
 

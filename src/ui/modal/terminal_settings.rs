@@ -12,7 +12,9 @@ use crate::{
     t,
     text::{Language, translate},
     ui::{
-        Model, UiAction, ViewContext, keys,
+        Model, UiAction, ViewContext,
+        graphics::{Pictures, Protocol},
+        keys,
         keys::Hint,
         preferences::{Bell, Characters, Preferences},
         theme::{Colours, Glyphs, ThemeName},
@@ -39,13 +41,15 @@ pub struct TerminalSettings {
 enum Field {
     Theme,
     Characters,
+    Pictures,
     Motion,
     Bell,
     Mouse,
     Language,
 }
 
-const FIELDS: [Field; 6] = [Field::Theme, Field::Characters, Field::Motion, Field::Bell, Field::Mouse, Field::Language];
+const FIELDS: [Field; 7] =
+    [Field::Theme, Field::Characters, Field::Pictures, Field::Motion, Field::Bell, Field::Mouse, Field::Language];
 
 impl TerminalSettings {
     /// What is in use, to be changed.
@@ -94,6 +98,7 @@ impl TerminalSettings {
         match field {
             Field::Theme => chosen.theme = stepped(&ThemeName::ALL, chosen.theme, by),
             Field::Characters => chosen.characters = stepped(&Characters::ALL, chosen.characters, by),
+            Field::Pictures => chosen.pictures = stepped(&Pictures::ALL, chosen.pictures, by),
             Field::Motion => chosen.motion = !chosen.motion,
             Field::Bell => chosen.bell = stepped(&Bell::ALL, chosen.bell, by),
             Field::Mouse => chosen.mouse = !chosen.mouse,
@@ -109,6 +114,7 @@ impl TerminalSettings {
         match field {
             Field::Theme => translate(self.chosen.theme.word()),
             Field::Characters => translate(self.chosen.characters.word()),
+            Field::Pictures => translate(self.chosen.pictures.word()),
             Field::Motion => on(self.chosen.motion),
             Field::Bell => translate(self.chosen.bell.word()),
             Field::Mouse => on(self.chosen.mouse),
@@ -131,6 +137,11 @@ impl TerminalSettings {
                 Glyphs::Braille => t!("shown with braille dots"),
                 Glyphs::Block => t!("shown with blocks"),
                 Glyphs::Ascii => t!("shown with ASCII characters"),
+            },
+            Field::Pictures => match cx.theme.graphics.protocol(self.chosen.pictures) {
+                Ok((Protocol::Kitty, _)) => t!("i in Trends, as Kitty graphics"),
+                Ok((Protocol::Sixel, _)) => t!("i in Trends, as Sixel"),
+                Err(_) => t!("trends are drawn with characters only"),
             },
             Field::Motion => t!("moving agitators and flow arrows"),
             Field::Bell => match self.chosen.bell {
@@ -181,6 +192,7 @@ impl Field {
         match self {
             Field::Theme => t!("theme"),
             Field::Characters => t!("characters"),
+            Field::Pictures => t!("pictures"),
             Field::Motion => t!("motion"),
             Field::Bell => t!("bell"),
             Field::Mouse => t!("mouse"),

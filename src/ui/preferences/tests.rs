@@ -7,6 +7,7 @@ fn light() -> Preferences {
     Preferences {
         theme: ThemeName::Light,
         characters: Characters::Blocks,
+        pictures: Pictures::Sixel,
         motion: false,
         bell: Bell::Repeated,
         mouse: true,

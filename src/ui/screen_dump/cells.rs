@@ -21,8 +21,8 @@ const HEIGHT: f32 = 20.0;
 const LETTERS: f32 = 16.6;
 const MARGIN: f32 = 12.0;
 /// What a terminal shows where a program asks for no colour.
-const GROUND: Rgb = Rgb(18, 20, 22);
-const INK: Rgb = Rgb(200, 200, 196);
+pub(crate) const GROUND: Rgb = Rgb(18, 20, 22);
+pub(crate) const INK: Rgb = Rgb(200, 200, 196);
 
 /// Rectangles by colour: left, top, width and height.
 type Rects = BTreeMap<Rgb, Vec<[f32; 4]>>;
@@ -235,7 +235,7 @@ fn colours(cell: &Cell) -> (Rgb, Rgb) {
 }
 
 /// A colour as a usual terminal shows it; `None` for the terminal's own.
-fn rgb(colour: Color) -> Option<Rgb> {
+pub(crate) fn rgb(colour: Color) -> Option<Rgb> {
     const SIXTEEN: [Rgb; 16] = [
         Rgb(0, 0, 0),
         Rgb(205, 49, 49),

@@ -49,7 +49,8 @@ use crate::{
         record::AlarmRecord,
     },
     ui::{
-        keys::{find, hints},
+        graphics::Picture,
+        keys::{find, hide, hints},
         widgets::chart::{self, stroke::Stroke, trace::Trace},
     },
 };
@@ -76,6 +77,8 @@ pub struct Trends {
     /// How pens are drawn that were given another look.
     strokes: BTreeMap<TagId, Stroke>,
     plot: Plot,
+    /// The terminal's own picture lies over the chart.
+    pub pictured: bool,
     response: Response,
     /// Periods over each other in place of the curves, and what was typed for them last.
     overlay: Option<Overlay>,
@@ -251,7 +254,11 @@ impl TabView for Trends {
             return back.into_iter().chain(hints(LIST)).collect();
         }
         let keys = KEYS.iter().filter(|key| !cx.is_past() || !key.action.is_of_present());
-        hints(&keys.copied().collect::<Vec<_>>())
+        let mut keys: Vec<_> = keys.copied().collect();
+        let lacks = cx.theme.graphics.protocol(cx.preferences.pictures).is_err() || self.plot != Plot::Time;
+        hide(&mut keys, &[(Action::Image, lacks)]);
+        let close = self.pictured.then(|| Hint::new("Esc", t!("close"), t!("close the picture, as every key does")));
+        close.into_iter().chain(hints(&keys)).collect()
     }
 
     #[cfg(test)]
@@ -312,6 +319,7 @@ impl Trends {
             (None, Action::Numbers) => {
                 self.plot = if self.plot == Plot::Numbers { Plot::Time } else { Plot::Numbers };
             }
+            (None, Action::Image) => return self.show_picture(cx),
             (None, Action::Stroke) => self.next_stroke(cx),
             (None, Action::Scale) => return self.ask_scale(cx),
             (None, Action::Overlay) => return self.ask_overlay(),
@@ -323,6 +331,22 @@ impl Trends {
             (None, Action::Live) => self.go_live(),
         }
         self.ask(cx)
+    }
+
+    /// Has the chart drawn as the terminal's own picture, or says why not.
+    fn show_picture(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let why = match cx.theme.graphics.protocol(cx.preferences.pictures) {
+            Ok(_) if self.plot == Plot::Time => None,
+            Ok(_) => Some(t!("Only the chart over time is shown as a picture")),
+            Err(why) => Some(why.words()),
+        };
+        self.pictured = why.is_none();
+        why.map(UiAction::Note).into_iter().collect()
+    }
+
+    /// The picture over the chart, while one is wanted.
+    pub fn picture(&self, cx: &ViewContext) -> Option<Picture> {
+        self.pictured.then(|| picture::on_screen(self, cx)).flatten()
     }
 
     /// Trends of values of which no plant file says what they are, in a window of so much time, as far as one can be;

@@ -22,6 +22,8 @@ pub enum Action {
     Plot,
     /// The pens as large numbers, or the curves.
     Numbers,
+    /// The chart as the terminal's own picture.
+    Image,
     /// The next look of the selected pen.
     Stroke,
     /// Ask for the scale of the selected pen.
@@ -86,6 +88,7 @@ impl Action {
                 | Action::Event(_)
                 | Action::Csv
                 | Action::Picture
+                | Action::Image
         )
     }
 }
@@ -106,6 +109,7 @@ pub const KEYS: &[Key<Action>] = &[
     Key::new(char('-'), "", "longer window", Action::Zoom(1)),
     Key::new(char('z'), "", "back to the window before the last zoom, step or jump", Action::Revisit(Direction::Back)),
     Key::new(char('Z'), "", "forward to the later window again", Action::Revisit(Direction::Forward)),
+    Key::new(char('i'), "picture", "the chart as a picture of the terminal; any key closes it", Action::Image),
     Key::new(char('c'), "cursor", "cursor on or off: reads every pen at one time", Action::Cursor),
     Key::new(
         char('b'),

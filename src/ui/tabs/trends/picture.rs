@@ -1,6 +1,8 @@
-//! The chart as a page to print: what is on the screen, at the resolution of the page.
+//! The chart as a page to print, or as the terminal's own picture: what is on the screen, in pixels.
 
 use ratatui::layout::Rect;
+
+use unicode_width::UnicodeWidthStr;
 
 use super::{
     events::EventKind,
@@ -10,12 +12,17 @@ use super::{
 };
 use crate::{
     plant::number::to_f32,
-    report::drawing::{Anchor, Drawing, Ink, TEXT},
-    ui::widgets::chart::{
-        Axis, Chart,
-        axis::{Scale, time_ticks},
-        stroke::straight,
-        trace::Span,
+    report::drawing::{Anchor, CELL, Drawing, Ink, Rgb, TEXT},
+    ui::{
+        graphics::Picture,
+        screen_dump::{GROUND, INK, rgb},
+        widgets::chart::{
+            Axis, Chart,
+            axis::{Scale, time_ticks},
+            mark,
+            stroke::straight,
+            trace::Span,
+        },
     },
 };
 
@@ -28,17 +35,41 @@ const PLOT: (f32, f32, f32) = (80.0, 64.0, 1_200.0);
 struct Frame {
     from: Timestamp,
     to: Timestamp,
+    left: f32,
+    top: f32,
+    right: f32,
     bottom: f32,
+    /// Height and width of a letter.
+    text: (f32, f32),
+    /// The units stand so much above the plot.
+    unit: f32,
+    /// Labels of time have so many letters from the left to the right.
+    letters: usize,
 }
 
 impl Frame {
     fn x(&self, at: Timestamp) -> f32 {
         let share = at.duration_since(self.from).as_secs_f64() / self.to.duration_since(self.from).as_secs_f64();
-        PLOT.0 + (PLOT.2 - PLOT.0) * to_f32(share.clamp(0.0, 1.0))
+        self.share(to_f32(share.clamp(0.0, 1.0)))
+    }
+
+    /// A share of the way from the left to the right.
+    fn share(&self, share: f32) -> f32 {
+        self.left + (self.right - self.left) * share
+    }
+
+    /// The n-th of so many columns.
+    fn column(&self, n: usize, count: usize) -> f32 {
+        self.share(n as f32 / count.max(1) as f32)
+    }
+
+    /// A line so many times as thick as a thin one.
+    fn thick(&self, times: f32) -> f32 {
+        times * self.text.0 / TEXT.0
     }
 
     fn y(&self, scale: Scale, value: f64) -> f32 {
-        self.bottom - (self.bottom - PLOT.1) * to_f32(scale.share(value))
+        self.bottom - (self.bottom - self.top) * to_f32(scale.share(value))
     }
 }
 
@@ -48,7 +79,17 @@ pub(super) fn picture(trends: &Trends, cx: &ViewContext) -> Drawing {
     let (view, chart) = (trends.span(cx), view::chart(trends, cx, false));
     let (lanes, pens) = (trends.lanes(cx), trends.drawn(cx));
     let rows = (lanes.len() + pens.len() + 4) as f32;
-    let frame = Frame { from: view.from, to: view.to, bottom: f32::from(PAGE.1) - rows * (TEXT.0 + 2.0) };
+    let frame = Frame {
+        from: view.from,
+        to: view.to,
+        left: PLOT.0,
+        top: PLOT.1,
+        right: PLOT.2,
+        bottom: f32::from(PAGE.1) - rows * (TEXT.0 + 2.0),
+        text: TEXT,
+        unit: 18.0,
+        letters: 140,
+    };
     let head = format!(
         "{}   {}   {} – {}",
         cx.def().name,
@@ -58,24 +99,7 @@ pub(super) fn picture(trends: &Trends, cx: &ViewContext) -> Drawing {
     );
     page.text((PLOT.0, 20.0), Anchor::Start, head, Ink::Text);
     let scales = chart.plan(Rect::new(0, 0, 120, 40)).scales;
-    axes(&mut page, cx, &chart, &scales, &frame);
-    // As many as on the screen: finer ones would only smear those of the history.
-    let count = view.columns;
-    for (curve, (_, scale)) in chart.curves.iter().zip(&scales) {
-        let columns = curve.trace.columns(view.from, view.to, cx.present(), count);
-        let ink = Ink::Pen(curve.pen);
-        for points in paths(&inside(&columns, *scale), curve.stroke, |value| frame.y(*scale, value)) {
-            page.line(points, ink, 1.5, curve.dashed);
-        }
-        for (n, sign, y) in outside(&columns, *scale) {
-            let x = PLOT.0 + (PLOT.2 - PLOT.0) * n as f32 / columns.len() as f32;
-            page.text((x, frame.y(*scale, y) + if sign == "^" { 8.0 } else { -8.0 }), Anchor::Start, sign, ink);
-        }
-    }
-    for (at, words) in &chart_cursors(trends, cx) {
-        page.line(vec![(frame.x(*at), PLOT.1), (frame.x(*at), frame.bottom)], Ink::Text, 1.0, true);
-        page.text((frame.x(*at), PLOT.1 - 8.0), Anchor::Middle, words.as_str(), Ink::Text);
-    }
+    plot(&mut page, (trends, cx), &chart, &scales, &frame);
     let mut y = frame.bottom + 2.2 * TEXT.0;
     for (n, pen) in lanes {
         lane(&mut page, trends, cx, (n, pen), y, &frame);
@@ -94,6 +118,93 @@ pub(super) fn picture(trends: &Trends, cx: &ViewContext) -> Drawing {
     page
 }
 
+/// The picture of the chart in place of its cells, in the colours of the theme; `None` while something else is shown, or
+/// where the terminal takes no picture.
+pub(super) fn on_screen(trends: &Trends, cx: &ViewContext) -> Option<Picture> {
+    let (protocol, (wide, high)) = cx.theme.graphics.protocol(cx.preferences.pictures).ok()?;
+    let (columns_max, rows_max) = cx.theme.graphics.cells_max(protocol, (wide, high));
+    let (chart, area) = view::placed_chart(trends, cx)?;
+    let area = Rect { width: area.width.min(columns_max), height: area.height.min(rows_max), ..area };
+    if area.is_empty() {
+        return None;
+    }
+    let (plan, view) = (chart.plan(area), trends.span(cx));
+    let x = |column: u16| f32::from(column.saturating_sub(area.x)) * f32::from(wide);
+    let y = |row: u16| f32::from(row.saturating_sub(area.y)) * f32::from(high);
+    let frame = Frame {
+        from: view.from,
+        to: view.to,
+        left: x(plan.plot.x),
+        // The greatest value lies in the middle of its row, as among the cells.
+        top: y(plan.plot.y) + f32::from(high) / 2.0,
+        right: x(plan.plot.right()),
+        bottom: y(plan.plot.bottom()),
+        text: (f32::from(high), f32::from(wide)),
+        unit: f32::from(high),
+        letters: plan.plot.width.into(),
+    };
+    let ground = cx.theme.ground().and_then(rgb).unwrap_or(GROUND);
+    let mut page = Drawing::on(area.width * wide, area.height * high, ground, f32::from(wide) / CELL);
+    plot(&mut page, (trends, cx), &chart, &plan.scales, &frame);
+    ends(&mut page, cx, &chart, &plan.scales, &frame);
+    let of = |style: Style| style.fg.and_then(rgb).unwrap_or(INK);
+    let drawing = page.recoloured(|ink| match ink {
+        Ink::Text => of(cx.theme.normal()),
+        Ink::Grid => between(ground, of(cx.theme.dim())),
+        Ink::Pen(n) => of(cx.theme.pen(n)),
+        Ink::Own(own) => own,
+    });
+    Some(Picture { protocol, area, drawing })
+}
+
+/// A quarter of the way from one colour to the other.
+fn between(Rgb(r, g, b): Rgb, to: Rgb) -> Rgb {
+    let mix = |a: u8, b: u8| u8::midpoint(a, u8::midpoint(a, b));
+    Rgb(mix(r, to.0), mix(g, to.1), mix(b, to.2))
+}
+
+/// Axes, curves and cursors.
+fn plot(
+    page: &mut Drawing,
+    (trends, cx): (&Trends, &ViewContext),
+    chart: &Chart,
+    scales: &[(Axis, Scale)],
+    frame: &Frame,
+) {
+    axes(page, cx, chart, scales, frame);
+    // As many as on the screen: finer ones would only smear those of the history.
+    let count = trends.span(cx).columns;
+    let half = frame.text.0 / 2.0;
+    for (curve, (_, scale)) in chart.curves.iter().zip(scales) {
+        let columns = curve.trace.columns(frame.from, frame.to, cx.present(), count);
+        let ink = Ink::Pen(curve.pen);
+        for points in paths(&inside(&columns, *scale), curve.stroke, frame, |value| frame.y(*scale, value)) {
+            page.line(points, ink, frame.thick(1.5), curve.dashed);
+        }
+        for (n, sign, y) in outside(&columns, *scale) {
+            let y = frame.y(*scale, y) + if sign == "^" { half } else { -half };
+            page.text((frame.column(n, columns.len()), y), Anchor::Start, sign, ink);
+        }
+    }
+    for (at, words) in &chart_cursors(trends, cx) {
+        page.line(vec![(frame.x(*at), frame.top), (frame.x(*at), frame.bottom)], Ink::Text, frame.thick(1.0), true);
+        page.text((frame.x(*at), frame.top - half), Anchor::Middle, words.as_str(), Ink::Text);
+    }
+}
+
+/// The mark of each pen at the end of its curve: colour alone tells nothing.
+fn ends(page: &mut Drawing, cx: &ViewContext, chart: &Chart, scales: &[(Axis, Scale)], frame: &Frame) {
+    let count = frame.letters.max(1);
+    for (curve, (_, scale)) in chart.curves.iter().zip(scales) {
+        let columns = curve.trace.columns(frame.from, frame.to, cx.present(), count);
+        let last = columns.iter().enumerate().rev().find_map(|(n, span)| Some((n, (*span)?.last)));
+        if let Some((n, value)) = last.filter(|(_, value)| (scale.low..=scale.high).contains(value)) {
+            let at = (frame.column(n, count), frame.y(*scale, value));
+            page.text(at, Anchor::Start, mark(cx.theme, curve.pen), Ink::Pen(curve.pen));
+        }
+    }
+}
+
 /// The cursors with their times.
 fn chart_cursors(trends: &Trends, cx: &ViewContext) -> Vec<(Timestamp, String)> {
     let word = |letter: &str, at| (at, format!("{letter} {}", clock(at, &cx.def().time_zone)));
@@ -105,31 +216,36 @@ fn chart_cursors(trends: &Trends, cx: &ViewContext) -> Vec<(Timestamp, String)> 
 
 /// Frame, grid, ticks and units.
 fn axes(page: &mut Drawing, cx: &ViewContext, chart: &Chart, scales: &[(Axis, Scale)], frame: &Frame) {
-    let corners = [(PLOT.0, PLOT.1), (PLOT.0, frame.bottom), (PLOT.2, frame.bottom), (PLOT.2, PLOT.1)];
-    for (at, label) in time_ticks(frame.from, frame.to, &cx.def().time_zone, 140, 12) {
-        page.line(vec![(frame.x(at), PLOT.1), (frame.x(at), frame.bottom + 4.0)], Ink::Grid, 1.0, false);
-        page.text((frame.x(at), frame.bottom + TEXT.0), Anchor::Middle, label, Ink::Text);
+    let Frame { left, top, right, bottom, .. } = *frame;
+    let thin = frame.thick(1.0);
+    let corners = [(left, top), (left, bottom), (right, bottom), (right, top)];
+    for (at, label) in time_ticks(frame.from, frame.to, &cx.def().time_zone, frame.letters, 12) {
+        page.line(vec![(frame.x(at), top), (frame.x(at), bottom + 4.0)], Ink::Grid, thin, false);
+        // A label at an end must not stand beyond it.
+        let half = label.width() as f32 * frame.text.1 / 2.0;
+        let x = frame.x(at).min(f32::from(page.size().0) - half);
+        page.text((x, bottom + frame.text.0), Anchor::Middle, label, Ink::Text);
     }
-    let sides = [(Axis::Left, PLOT.0 - 6.0, Anchor::End), (Axis::Right, PLOT.2 + 6.0, Anchor::Start)];
+    let sides = [(Axis::Left, left - 6.0, Anchor::End), (Axis::Right, right + 6.0, Anchor::Start)];
     for (side, x, anchor) in sides {
         let first = chart.curves.iter().zip(scales).find(|(_, (axis, _))| *axis == side);
         let Some((curve, (_, scale))) = first else { continue };
-        page.text((x, PLOT.1 - 18.0), anchor, curve.unit, Ink::Text);
+        page.text((x, top - frame.unit), anchor, curve.unit, Ink::Text);
         for tick in scale.ticks() {
             let y = frame.y(*scale, tick);
             if side == Axis::Left {
-                page.line(vec![(PLOT.0, y), (PLOT.2, y)], Ink::Grid, 1.0, false);
+                page.line(vec![(left, y), (right, y)], Ink::Grid, thin, false);
             }
             page.text((x, y), anchor, scale.label(tick), Ink::Text);
         }
     }
-    page.line(corners.to_vec(), Ink::Text, 1.0, false);
+    page.line(corners.to_vec(), Ink::Text, thin, false);
     for limit in &chart.limits {
         let Some((_, scale)) = scales.get(limit.curve) else { continue };
         if (scale.low..=scale.high).contains(&limit.value) {
             let y = frame.y(*scale, limit.value);
-            page.line(vec![(PLOT.0, y), (PLOT.2, y)], Ink::Text, 0.7, true);
-            page.text((PLOT.2 - 4.0, y - 8.0), Anchor::End, limit.text.as_str(), Ink::Text);
+            page.line(vec![(left, y), (right, y)], Ink::Text, frame.thick(0.7), true);
+            page.text((right - 4.0, y - frame.text.0 / 2.0), Anchor::End, limit.text.as_str(), Ink::Text);
         }
     }
 }
@@ -157,12 +273,12 @@ fn outside(columns: &[Option<Span>], scale: Scale) -> Vec<(usize, &'static str, 
 
 /// The lines of a curve, a column of pixels each: from the value that held to the least, the greatest and the last, or as
 /// the look of the pen has it. A gap ends a line.
-fn paths(columns: &[Option<Span>], stroke: Stroke, y: impl Fn(f64) -> f32) -> Vec<Vec<(f32, f32)>> {
-    let width = (PLOT.2 - PLOT.0) / columns.len().max(1) as f32;
-    let place = |n: usize| PLOT.0 + width * n as f32;
+fn paths(columns: &[Option<Span>], stroke: Stroke, frame: &Frame, y: impl Fn(f64) -> f32) -> Vec<Vec<(f32, f32)>> {
+    let width = (frame.right - frame.left) / columns.len().max(1) as f32;
+    let place = |n: usize| frame.column(n, columns.len());
     let known = || columns.iter().enumerate().filter_map(|(n, span)| Some((place(n), (*span)?)));
     match stroke {
-        Stroke::Step => steps(columns, width, y),
+        Stroke::Step => steps(columns, width, place, y),
         Stroke::Line => {
             let lines = straight(columns);
             let point = |(n, span): (usize, &Option<Span>)| span.map(|span| (place(n) + width / 2.0, y(span.last)));
@@ -178,10 +294,15 @@ fn paths(columns: &[Option<Span>], stroke: Stroke, y: impl Fn(f64) -> f32) -> Ve
 }
 
 /// The lines of [`Stroke::Step`].
-fn steps(columns: &[Option<Span>], width: f32, y: impl Fn(f64) -> f32) -> Vec<Vec<(f32, f32)>> {
+fn steps(
+    columns: &[Option<Span>],
+    width: f32,
+    place: impl Fn(usize) -> f32,
+    y: impl Fn(f64) -> f32,
+) -> Vec<Vec<(f32, f32)>> {
     let mut paths: Vec<Vec<(f32, f32)>> = vec![Vec::new()];
     for (n, span) in columns.iter().enumerate() {
-        let (x, path) = (PLOT.0 + width * n as f32, paths.last_mut());
+        let (x, path) = (place(n), paths.last_mut());
         match (span, path) {
             (Some(span), Some(path)) => {
                 let spike = if span.min == span.max { vec![span.last] } else { vec![span.min, span.max, span.last] };
@@ -243,8 +364,11 @@ mod tests {
     fn a_line_ends_at_a_gap() {
         let at = |value: f64| Some(Span { min: value, max: value, last: value });
         let columns = [at(1.0), at(2.0), None, None, at(3.0)];
+        let (from, to) = (Timestamp::UNIX_EPOCH, Timestamp::MAX);
+        let (left, top, right, bottom) = (0.0, 0.0, 50.0, 10.0);
+        let frame = Frame { from, to, left, top, right, bottom, text: TEXT, unit: 0.0, letters: 5 };
         let check = |stroke, expect: &[usize]| {
-            let paths = paths(&columns, stroke, to_f32);
+            let paths = paths(&columns, stroke, &frame, to_f32);
             let ends: Vec<usize> = paths.iter().map(Vec::len).filter(|len| *len > 0).collect();
             assert_eq!(ends, expect, "{stroke:?}");
         };

@@ -5,6 +5,7 @@ mod events;
 mod export;
 mod overlay;
 mod pens;
+mod picture;
 mod queries;
 mod window;
 
@@ -99,6 +100,7 @@ impl Stand {
                 '→' => KeyCode::Right,
                 '↓' => KeyCode::Down,
                 '⏎' => KeyCode::Enter,
+                '⎋' => KeyCode::Esc,
                 key => KeyCode::Char(key),
             };
             self.send(Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)));

@@ -77,7 +77,10 @@ fn draw_curves(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
     let plan = (!area.is_empty()).then(|| chart.plan(area));
     if let Some(plan) = &plan {
         chart.cursors = cursors(trends, cx, plan.plot.width);
-        chart.render(area, canvas.buffer());
+        // Under a picture the cells stay as they are: what is written there would cover it.
+        if !trends.pictured {
+            chart.render(area, canvas.buffer());
+        }
         if trends.drawn(cx).is_empty() {
             let words = t!("no pen is switched on: select one below, space switches it on");
             canvas.text_centred(1 + area.height / 2, words, cx.theme.dim());
