@@ -3,7 +3,7 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    process::{Command, Output},
+    process::Command,
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -11,63 +11,56 @@ use std::{
     thread::JoinHandle,
 };
 
-use serde_json::Value;
-use sightglass::access::io::own_user;
+use sightglass::{
+    access::io::own_user,
+    attach::io::connect::connect,
+    plant::{Snapshot, event::LineState},
+    station::session::Session,
+};
 
 use crate::{
+    guarded,
     listen::{Tapped, access},
     support::{Process, folder, have, python, sightglass, sockets},
 };
 
-/// The status is asked for so often: each takes some time, and it is enough for a line to fall silent on a busy machine.
-const LOOKS_MAX: usize = 3_000;
-
-/// A station of a plant file, and the folder of its socket.
+/// A station of a plant file, and a terminal at its socket.
 struct Station {
     folder: PathBuf,
     sockets: PathBuf,
     process: Process,
+    session: Session,
 }
 
 impl Station {
-    fn start(folder: &Path) -> Station {
+    async fn start(folder: &Path) -> Station {
         let sockets = sockets();
-        let process = Process::start(Station::command(folder, &sockets).args(["run", "heard.toml", "--log", "-"]));
-        let mut station = Station { folder: folder.to_owned(), sockets, process };
-        station.process.wait_for("line L1: listening");
-        station
+        let mut process = Process::start(command(folder, &sockets).args(["run", "heard.toml", "--log", "-"]));
+        process.wait_for("line L1: listening");
+        let session = connect(&sockets.join("sightglass/heard.sock")).await.unwrap();
+        Station { folder: folder.to_owned(), sockets, process, session }
     }
 
-    fn command(folder: &Path, sockets: &Path) -> Command {
-        let mut command = sightglass();
-        command.current_dir(folder).env("XDG_RUNTIME_DIR", sockets).env("XDG_STATE_HOME", folder.join("state"));
-        command
+    /// What a command says, and whether it was done.
+    fn call(&self, args: &[&str]) -> (bool, String) {
+        let output = command(&self.folder, &self.sockets).args(args).output().unwrap();
+        let said = [output.stdout, output.stderr].concat();
+        (output.status.success(), String::from_utf8_lossy(&said).into_owned())
     }
 
-    fn call(&self, args: &[&str]) -> Output {
-        Station::command(&self.folder, &self.sockets).args(args).output().unwrap()
-    }
-
-    /// Asks for the status until it is `so`; gives it.
-    fn until(&self, what: &str, so: impl Fn(&Value) -> bool) -> Value {
-        let mut status = Value::Null;
-        for _ in 0..LOOKS_MAX {
-            status = serde_json::from_slice(&self.call(&["status", "--json"]).stdout).unwrap_or_default();
-            if so(&status) {
-                return status;
-            }
-        }
-        panic!("{what}: never so, but\n{status:#}")
+    async fn until(&mut self, what: &str, so: impl Fn(&Snapshot) -> bool) -> Arc<Snapshot> {
+        guarded::until(&mut self.session.snapshots, what, |snapshot| so(snapshot)).await
     }
 }
 
-fn tag<'a>(status: &'a Value, name: &str) -> &'a Value {
-    let tags = status["tags"].as_array().into_iter().flatten();
-    tags.into_iter().find(|tag| tag["name"] == name).unwrap_or(&Value::Null)
+fn command(folder: &Path, sockets: &Path) -> Command {
+    let mut command = sightglass();
+    command.current_dir(folder).env("XDG_RUNTIME_DIR", sockets).env("XDG_STATE_HOME", folder.join("state"));
+    command
 }
 
-fn is_good(status: &Value, name: &str, value: f64) -> bool {
-    tag(status, name)["value"] == value && tag(status, name)["quality"] == "good"
+fn value(snapshot: &Snapshot, tag: &str) -> Option<f64> {
+    snapshot.sample(snapshot.def.tag_named(tag).unwrap()).good_value()
 }
 
 /// mbpoll, which asks for the same again and again until it is dropped.
@@ -121,46 +114,49 @@ fn write_plant(folder: &Path, port: &Path) {
     fs::write(folder.join("heard.toml"), text).unwrap();
 }
 
-#[test]
-fn a_station_follows_the_line_of_mbpoll_and_sends_nothing() {
+#[tokio::test]
+async fn a_station_follows_the_line_of_mbpoll_and_sends_nothing() {
     let Some(python) = python().filter(|_| have("socat", "socat") && have("mbpoll", "mbpoll")) else { return };
     let folder = folder();
     let line = Tapped::new(folder.path(), &python);
     write_plant(folder.path(), &line.tap.ends[0]);
-    let station = Station::start(folder.path());
+    let mut station = Station::start(folder.path()).await;
     let access = access(station.process.child.id(), &line.tap.ends[0]);
     assert!(!access.is_empty() && access.iter().all(|mode| *mode == 0), "it is opened for reading only: {access:?}");
     let place = line.master.ends[0].to_str().unwrap();
     let polls = Master::start(place);
     // What pymodbus holds: 700 with one decimal, which the master reads too.
-    station.until("values as in the slave", |status| {
-        is_good(status, "TIC-1.PV", 70.0) && is_good(status, "TIC-1.SV", 70.0)
-    });
-    let status = station.until("its counters", |status| status["lines"][0]["ok"].as_u64() > Some(9));
-    assert_eq!(status["lines"][0]["state"], "listening", "{status:#}");
+    let as_held = |now: &Snapshot| value(now, "TIC-1.PV") == Some(70.0) && value(now, "TIC-1.SV") == Some(70.0);
+    station.until("values as in the slave", as_held).await;
+    let now = station.until("its counters", |now| 9 < now.lines[0].counters.ok).await;
+    assert_eq!((&now.lines[0].state, now.lines[0].counters.sent_bytes), (&LineState::Connected, 0));
 
     // Nothing is written here: another master polls.
-    let refused = station.call(&["write", "TIC-1.SV", "65"]);
-    let said = String::from_utf8_lossy(&[refused.stdout, refused.stderr].concat()).into_owned();
-    assert!(!refused.status.success() && said.contains("this line only listens: another master polls it"), "{said}");
+    let (done, said) = station.call(&["write", "TIC-1.SV", "65"]);
+    assert!(!done && said.contains("this line only listens: another master polls it"), "{said}");
+    let (_, said) = station.call(&["status"]);
+    assert!(said.contains("L1           listening; load") && said.contains(" pairs, "), "{said}");
 
     // What the other master writes is seen when it reads it.
     drop(polls);
     assert!(mbpoll(place, &["-t", "4", "-r", "1002", "655"]));
     let polls = Master::start(place);
-    station.until("the setpoint of the other master", |status| is_good(status, "TIC-1.SV", 65.5));
+    station.until("the setpoint of the other master", |now| value(now, "TIC-1.SV") == Some(65.5)).await;
 
     drop(polls);
-    let status = station.until("a silent line", |status| status["lines"][0]["state"] == "no traffic heard");
-    assert_ne!(tag(&status, "TIC-1.PV")["quality"], "good", "{status:#}");
-    station.until("its alarm", |status| status["alarms"].to_string().contains("no traffic heard"));
-    station.until("no value", |status| tag(status, "TIC-1.PV")["value"].is_null());
+    let now = station.until("a silent line", |now| now.lines[0].state == LineState::NoTraffic).await;
+    assert_eq!(value(&now, "TIC-1.PV"), None, "it still stands as good");
+    let raised =
+        |now: &Snapshot| now.alarms.iter().any(|alarm| &*now.def.alarm(alarm.id).message == "no traffic heard");
+    station.until("its alarm", raised).await;
+    let pv = now.def.tag_named("TIC-1.PV").unwrap();
+    station.until("no value", |now| now.sample(pv).value.is_none()).await;
 
     let _polls = Master::start(place);
-    let status = station.until("values again", |status| is_good(status, "TIC-1.PV", 70.0));
-    assert_eq!(status["lines"][0]["state"], "listening");
+    let now = station.until("values again", |now| value(now, "TIC-1.PV") == Some(70.0)).await;
+    assert_eq!(now.lines[0].state, LineState::Connected);
     drop(station);
-    let station = Station::start(folder.path());
-    station.until("values after a restart", |status| is_good(status, "TIC-1.PV", 70.0));
+    let mut station = Station::start(folder.path()).await;
+    station.until("values after a restart", |now| value(now, "TIC-1.PV") == Some(70.0)).await;
     assert!(line.sent.try_recv().is_err(), "it has sent something");
 }
