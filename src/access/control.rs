@@ -37,7 +37,7 @@ use crate::{
     history::Query,
     plant::{
         PlantDef,
-        command::CommandStatus,
+        command::{CommandStatus, Refusal},
         record::{ActionRecord, BACKUP, IMPORT},
         role::Role,
     },
@@ -228,7 +228,14 @@ impl AccessControl {
         let needed = right::needs_for_query(query);
         let may =
             if needed == Role::Viewer { self.may_look(terminal) } else { self.may(terminal, Some(needed)).map(drop) };
-        let Err(why) = may else { return Ok(()) };
+        let Err(why) = may else {
+            return match query {
+                Query::Registers(read) if self.def.listens_on(read.line) => {
+                    Err((Refusal::OnlyListens.to_string(), Vec::new()))
+                }
+                _ => Ok(()),
+            };
+        };
         // Only a refused read of the audit log is recorded.
         let is_audit = matches!(query, Query::Audit { .. });
         let entry = if is_audit { self.refused(terminal, "read audit log", "", &why, at) } else { None };

@@ -136,6 +136,9 @@ pub fn admit_as(
     blocks: &[Block],
     time_of: &dyn Fn(&DeviceDef) -> DeviceTime,
 ) -> Admission {
+    if line.listens {
+        return Admission::of_nothing(line.id);
+    }
     let loads = loads(def, line, blocks, time_of);
     let all: Vec<&Load> = loads.iter().collect();
     let critical: Vec<&Load> = loads.iter().filter(|load| load.class == PollClass::Critical).collect();

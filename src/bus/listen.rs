@@ -41,7 +41,7 @@ use crate::plant::{
     traffic::{Frame, FrameResult},
 };
 
-pub use follow::Follower;
+pub use follow::{Ending, Follower, Losses, ending, events, silent_after};
 
 /// Bytes in a row that are no frame are recorded in runs of at most this.
 const NOISE_MAX: usize = ascii::FRAME_MAX;
@@ -59,6 +59,8 @@ pub enum Heard {
     Lost {
         /// When that was known: with the next request.
         at: Timestamp,
+        /// How the line frames its messages.
+        framing: Framing,
         /// The request message.
         request: Vec<u8>,
         /// What came in its place.
@@ -319,7 +321,7 @@ impl Listener {
         let fault = self.left_over(&open.message, &open.noise);
         self.units.entry(open.message[0]).or_default().count(Err(fault), None);
         self.replies.failed(&open.message, self.age(at));
-        heard.push(Heard::Lost { at, request: open.message, fault });
+        heard.push(Heard::Lost { at, framing: self.framing, request: open.message, fault });
     }
 
     /// Names what came in place of a response.

@@ -84,7 +84,9 @@ pub fn blocks_with_unpolled(
     unreadable: &UnreadableRanges,
     requested: &[DeviceId],
 ) -> Vec<Block> {
-    let on_line = def.devices.iter().filter(|device| device.line == line);
+    // Nothing is ever asked where another master polls.
+    let polled = |device: &&DeviceDef| device.line == line && !def.line(line).listens;
+    let on_line = def.devices.iter().filter(polled);
     on_line.flat_map(|device| blocks_of(def, device, unreadable, requested.contains(&device.id))).collect()
 }
 

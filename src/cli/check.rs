@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::{
     bus::{
-        admission,
+        admission, listen,
         plan::{self, Block, UnreadableRanges},
     },
     plant::{
@@ -50,6 +50,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
 fn describe(def: &PlantDef, line: LineId) -> Vec<String> {
     let blocks = plan::blocks(def, line, &UnreadableRanges::default());
     let line = def.line(line);
+    if line.listens {
+        return describe_listening(def, line);
+    }
     let mut text = vec![
         String::new(),
         format!("line {}: {}, timeout {} ms", line.name, line.transport, line.timeout.as_millis()),
@@ -70,6 +73,22 @@ fn describe(def: &PlantDef, line: LineId) -> Vec<String> {
     text.extend(verdict_words(&admission));
     text.extend(admission.dead.iter().map(dead_words));
     text.extend(admission.warnings.iter().map(|warning| format!("  warning: {warning}")));
+    text
+}
+
+/// Of the line of another master: what is followed there.
+fn describe_listening(def: &PlantDef, line: &LineDef) -> Vec<String> {
+    let silence = listen::silent_after(def, line.id).as_secs_f64();
+    let mut text = vec![
+        String::new(),
+        format!("line {}: listens on {}, another master polls it and nothing is sent", line.name, line.transport),
+        format!("  no traffic heard: an alarm after {silence} s"),
+    ];
+    let devices = def.devices.iter().filter(|device| device.line == line.id);
+    text.extend(devices.map(|device| {
+        let tags = def.tags_of(device.id).filter(|tag| tag.calculation.is_none()).count();
+        format!("  {:10}  unit {:3}  {tags} tags, as far as the other master reads them", device.name, device.unit)
+    }));
     text
 }
 
@@ -149,6 +168,19 @@ mod tests {
             "warning: no parity and one stop bit",
         ] {
             assert!(text.contains(part), "no {part} in\n{text}");
+        }
+    }
+
+    #[test]
+    fn a_line_that_listens_has_no_plan_and_says_so() {
+        let mut def = fixture::plant();
+        def.lines[0].listens = true;
+        let text = describe(&def, LineId(0)).join("\n");
+        for part in ["listens on RTU", "nothing is sent", "an alarm after 10 s", "TIC-1       unit   1"] {
+            assert!(text.contains(part), "no {part} in\n{text}");
+        }
+        for part in ["worst case", "utilisation", "meets its period", "timeout"] {
+            assert!(!text.contains(part), "{part} in\n{text}");
         }
     }
 

@@ -10,7 +10,7 @@ use crate::{
     plant::{
         PlantDef, Snapshot,
         alarm::manager::subject_name,
-        event::LineState,
+        event::{LineCounters, LineState},
         line::LineDef,
         line_minute::LineMinute,
         line_report::{LineReport, PollReport},
@@ -96,7 +96,7 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
     let mut lines = vec![format!("plant    {} ({}) at {time}", def.title, def.name)];
     for (line, status) in def.lines.iter().zip(&snapshot.lines) {
         let scan = status.report.as_ref().map_or(String::new(), |report| scan_words(report));
-        lines.push(format!("line     {:12} {}{scan}", line.name, line_words(&status.state)));
+        lines.push(format!("line     {:12} {}{scan}", line.name, line_words(line, &status.state)));
     }
     for (device, status) in def.devices.iter().zip(&snapshot.devices) {
         let why = status.diagnosis.map(|reason| format!(": {reason}")).unwrap_or_default();
@@ -157,10 +157,12 @@ fn suppressed_words(snapshot: &Snapshot, alarm: &SuppressedAlarm) -> String {
     format!("{} {:10} {subject} {}{until}{active}", def.priority.number(), alarm.state.word(), def.message)
 }
 
-fn line_words(state: &LineState) -> String {
+fn line_words(line: &LineDef, state: &LineState) -> String {
     match state {
         LineState::Connecting => "connecting".to_owned(),
+        LineState::Connected if line.listens => "listening".to_owned(),
         LineState::Connected => "connected".to_owned(),
+        LineState::NoTraffic => "no traffic heard".to_owned(),
         LineState::Disconnected => "disconnected by an operator".to_owned(),
         LineState::Testing => "in use by a test".to_owned(),
         LineState::Waiting { why, .. } => format!("not connected: {why}"),
@@ -170,6 +172,11 @@ fn line_words(state: &LineState) -> String {
 /// `; load 12 %, scan at worst 664 ms, measured 511 ms; dispatch p99 1.1 ms`
 fn scan_words(report: &LineReport) -> String {
     let (scan, load) = (report.scan(), report.counters.utilisation_minute * 100.0);
+    if report.settings.listens {
+        let LineCounters { frames, ok, exceptions, timeouts, corrupt, unexpected, .. } = report.counters;
+        let (pairs, errors) = (ok + exceptions, timeouts + corrupt + unexpected);
+        return format!("; load {load:.0} %, {frames} frames heard, {pairs} pairs, {errors} errors");
+    }
     let span = |span: Option<Duration>| span.map_or("-".to_owned(), |span| format!("{:.1} ms", in_ms(span)));
     let (worst, measured, late) = (span(Some(scan.worst)), span(scan.measured), span(report.dispatch.p99()));
     format!("; load {load:.0} %, scan at worst {worst}, measured {measured}; dispatch p99 {late}")
@@ -194,7 +201,7 @@ fn line_json(def: &PlantDef, line: &LineDef, status: &LineStatus, visible: bool)
     let (counters, report) = (&status.counters, status.report.as_ref());
     let count = |count: u64| visible.then_some(count);
     json!({
-        "name": line.name, "connected": status.state == LineState::Connected, "state": line_words(&status.state),
+        "name": line.name, "connected": status.state == LineState::Connected, "state": line_words(line, &status.state),
         "requests": count(counters.requests), "ok": count(counters.ok), "timeouts": count(counters.timeouts),
         "corrupt": count(counters.corrupt), "exceptions": count(counters.exceptions),
         "polls": report.map(|report| report.polls.iter().map(|poll| poll_json(def, poll)).collect::<Vec<_>>()),

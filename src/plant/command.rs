@@ -243,6 +243,9 @@ pub enum Refusal {
     /// The profile says read-only.
     #[error("{}", t!("read only"))]
     ReadOnly,
+    /// Its line is only listened to.
+    #[error("{}", t!("this line only listens: another master polls it"))]
+    OnlyListens,
     /// Not a number, or outside the permitted range.
     #[error("{}", t!("outside {min} … {max}", min = .min, max = .max))]
     OutOfRange {

@@ -117,6 +117,14 @@ impl PlantDef {
     pub fn line(&self, id: LineId) -> &LineDef {
         &self.lines[id.index()]
     }
+    /// Is a tag of a line that another master polls?
+    pub fn listens_to(&self, tag: TagId) -> bool {
+        self.listens_on(self.device(self.tag(tag).device).line)
+    }
+    /// Does another master poll on a line? Not on one that is not there.
+    pub fn listens_on(&self, line: LineId) -> bool {
+        self.lines.get(line.index()).is_some_and(|line| line.listens)
+    }
     /// The device of an id.
     pub fn device(&self, id: DeviceId) -> &DeviceDef {
         &self.devices[id.index()]

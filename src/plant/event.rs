@@ -48,6 +48,15 @@ pub enum Event {
         /// The exchange, if anything was sent.
         exchange: Option<Arc<Exchange>>,
     },
+    /// Another master has written these tags, or tried to: they are uncertain until they are read.
+    ForeignWrite {
+        /// When.
+        at: Timestamp,
+        /// The tags.
+        tags: Vec<TagId>,
+        /// Why it is not known to have taken effect.
+        fault: Option<Fault>,
+    },
     /// A line changed its state.
     Line {
         /// When.
@@ -317,6 +326,8 @@ pub enum LineState {
     Disconnected,
     /// An exclusive diagnostic: no device is polled.
     Testing,
+    /// The line of another master is open, and no frame is heard on it.
+    NoTraffic,
 }
 
 /// Errors that the driver of a serial port has counted since the port was opened.

@@ -24,6 +24,8 @@ pub struct LineDef {
     pub frame_timeout: Duration,
     /// Time after a broadcast in which devices act on it (serial lines; Modbus over serial line V1.02, 2.4.1: 100–200 ms).
     pub turnaround: Duration,
+    /// Another master polls it: it is heard, and nothing is ever sent.
+    pub listens: bool,
 }
 
 impl LineDef {
@@ -37,6 +39,7 @@ impl LineDef {
             gap: Duration::ZERO,
             frame_timeout: Duration::from_millis(50),
             turnaround: Duration::from_millis(100),
+            listens: false,
         }
     }
 }

@@ -65,6 +65,7 @@ pub(crate) mod totalizer;
 pub(crate) mod delay;
 pub(crate) mod calculation;
 pub(crate) mod clock_step;
+pub(crate) mod heard;
 pub(crate) mod process_image;
 pub(crate) mod commands;
 pub(crate) mod reducer;

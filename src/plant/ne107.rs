@@ -49,6 +49,8 @@ pub enum Reason {
     LineTesting,
     /// The port or connection is gone.
     NotConnected,
+    /// The master of its line, which is only listened to, is silent.
+    NoTraffic,
     /// It has stopped answering.
     Down,
     /// It is left alone after an action that takes it some time.
@@ -98,7 +100,7 @@ impl Reason {
     /// Which signal it gives.
     pub fn signal(self) -> Signal {
         match self {
-            Reason::NotConnected | Reason::Down | Reason::NoValues => Signal::Failure,
+            Reason::NotConnected | Reason::NoTraffic | Reason::Down | Reason::NoValues => Signal::Failure,
             Reason::LineClosed | Reason::LineTesting | Reason::Settling => Signal::FunctionCheck,
             Reason::Slow { .. } | Reason::AboveStated { .. } | Reason::Failing { .. } => Signal::OutOfSpecification,
             Reason::Corrupt { .. } | Reason::Late(_) | Reason::MemoryParity(_) => Signal::Maintenance,
@@ -112,6 +114,7 @@ impl fmt::Display for Reason {
             Reason::LineClosed => f.write_str(t!("line disconnected by an operator")),
             Reason::LineTesting => f.write_str(t!("line in use by a test")),
             Reason::NotConnected => f.write_str(t!("line not connected")),
+            Reason::NoTraffic => f.write_str(t!("no traffic heard")),
             Reason::Down => f.write_str(t!("not responding")),
             Reason::Settling => f.write_str(t!("pause after an action")),
             Reason::Slow { p99, timeout } => f.write_str(&t!(
@@ -169,6 +172,7 @@ pub fn evaluate(input: DiagnosisInput) -> Option<Reason> {
         LineState::Disconnected => return Some(Reason::LineClosed),
         LineState::Testing => return Some(Reason::LineTesting),
         LineState::Waiting { .. } => return Some(Reason::NotConnected),
+        LineState::NoTraffic => return Some(Reason::NoTraffic),
         LineState::Connecting | LineState::Connected => {}
     }
     // A device that is busy with a command has not failed.

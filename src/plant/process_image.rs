@@ -8,6 +8,7 @@ use super::{
     calculation::Calculator,
     def::{DeviceId, PlantDef, TagId},
     event::{ExceptionCode, Fault, FaultKind},
+    heard::Heard,
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
@@ -34,6 +35,8 @@ pub struct ProcessImage {
     pub texts: Arc<Vec<Option<Arc<str>>>>,
     /// Decimals that the device last announced, by tag: for showing what was, while it does not answer.
     decimals_seen: Vec<u8>,
+    /// How often each tag comes, by tag.
+    heard: Vec<Heard>,
     /// What the history last got, by tag.
     stored: Vec<Option<Sample>>,
     /// Tags whose sample was set since records were last taken; a tag may be here twice.
@@ -66,6 +69,7 @@ impl ProcessImage {
             samples: vec![Sample::bad(Cause::NotRead, at); count],
             texts: Arc::new(vec![None; count]),
             decimals_seen: vec![0; count],
+            heard: vec![Heard::default(); count],
             stored: vec![None; count],
             // That nothing is known is a fact to store too.
             touched: def.tags.iter().map(|tag| tag.id).collect(),
@@ -90,6 +94,7 @@ impl ProcessImage {
     pub fn read(&mut self, values: &[(TagId, f64)], at: Timestamp) {
         for (tag, raw) in values {
             self.raw[tag.index()] = Some(Reading { raw: *raw, at, uncertain: None });
+            self.heard[tag.index()].hear(at);
         }
         for (tag, _) in values {
             self.recompute_sample(*tag);
@@ -107,6 +112,7 @@ impl ProcessImage {
             if self.texts[tag.index()].as_ref() != Some(text) {
                 Arc::make_mut(&mut self.texts)[tag.index()] = Some(text.clone());
             }
+            self.heard[tag.index()].hear(at);
             self.set(*tag, Sample { value: None, quality: Quality::Good, at });
         }
     }
@@ -156,6 +162,17 @@ impl ProcessImage {
         }
     }
 
+    /// Nothing is heard of a device any more: its values may be others by now.
+    pub fn not_heard(&mut self, device: DeviceId) {
+        let def = self.def.clone();
+        let good = |image: &ProcessImage, tag| image.sample(tag).quality.is_good();
+        for tag in def.tags_of(device).filter(|tag| tag.calculation.is_none()) {
+            if good(self, tag.id) {
+                self.mark_uncertain(tag.id, Cause::NotHeard);
+            }
+        }
+    }
+
     /// Lets values age: uncertain after three missed periods, bad after ten.
     pub fn age(&mut self, at: Timestamp) {
         let def = self.def.clone();
@@ -169,20 +186,22 @@ impl ProcessImage {
             if tag.calculation.is_some() {
                 continue;
             }
-            let period = match tag.poll {
-                Poll::Every(period) => period,
+            let listens = def.listens_to(tag.id);
+            let (period, cause) = match tag.poll {
+                poll if listens => (self.heard[tag.id.index()].period(poll), Cause::NotHeard),
+                Poll::Every(period) => (period, Cause::Stale),
                 Poll::Once => continue,
                 // Known from a write or a look; it may have changed since.
-                Poll::Never if sample.quality.is_good() => NEVER_READ_AGAIN / PERIODS_UNCERTAIN,
+                Poll::Never if sample.quality.is_good() => (NEVER_READ_AGAIN / PERIODS_UNCERTAIN, Cause::Stale),
                 Poll::Never => continue,
             };
             let age = elapsed(sample.at, at);
             if sample.quality.is_bad() {
                 continue;
             } else if period * PERIODS_BAD < age {
-                self.drop_value(tag.id, Cause::Stale, at);
+                self.drop_value(tag.id, cause, at);
             } else if period * PERIODS_UNCERTAIN < age && sample.quality.is_good() {
-                self.mark_uncertain(tag.id, Cause::Stale);
+                self.mark_uncertain(tag.id, cause);
             }
         }
     }

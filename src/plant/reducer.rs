@@ -24,7 +24,8 @@ use super::{
     commands::CommandTracker,
     control_run::RunTracker,
     def::{LineDef, LineId, PlantDef, TagId},
-    event::{Event, Fault, LineState, WriteResult},
+    event::{Event, LineState, WriteResult},
+    heard,
     interlock::ActuatorTracker,
     line_minute::LineMinuteTracker,
     north_def::NorthStatus,
@@ -171,6 +172,10 @@ impl Plant {
                 self.failed(device, &tags, fault, at);
                 (at, None)
             }
+            Event::ForeignWrite { at, tags, fault } => {
+                tags.iter().for_each(|tag| self.image.written(*tag, fault, at));
+                (at, None)
+            }
             Event::Line { at, line, state } => (at, self.line_changed(line, state, at)),
             Event::Report { at, line, report } => {
                 let status = &mut self.lines[line.index()];
@@ -207,12 +212,6 @@ impl Plant {
         effects
     }
 
-    /// Another master has written these tags, or tried to: they are uncertain until they are read.
-    pub fn on_foreign_write(&mut self, tags: &[TagId], fault: Option<Fault>, at: Timestamp) {
-        tags.iter().for_each(|tag| self.image.written(*tag, fault, at));
-        self.evaluate(at);
-    }
-
     /// Accepts a command of an operator.
     pub fn on_command(&mut self, status: CommandStatus, at: Timestamp) -> Effects {
         let status = CommandStatus { at, outcome_at: at, ..status };
@@ -222,6 +221,13 @@ impl Plant {
             effects.records.push(Record::Action(refused));
             self.at = self.at.max(at);
             return effects;
+        }
+        // A read is not an operator action: it is shown, but not recorded.
+        let is_recorded = !matches!(status.command.kind, CommandKind::Refresh(_) | CommandKind::ReadSets);
+        if let Some(refusal) = heard::refusal(&self.def, &status.command.kind) {
+            let refused = self.commands.complete_at_once(&status, Outcome::Refused(refusal), &self.image);
+            effects.records.extend(Some(Record::Action(refused)).filter(|_| is_recorded));
+            return self.after_command(effects, at);
         }
         let outcome = match status.command.kind.clone() {
             CommandKind::Write { tag, value } => {
@@ -255,8 +261,6 @@ impl Plant {
                 Some(check_note(status.command.note.as_ref()).map_err(Refusal::Alarm).into())
             }
         };
-        // A read is not an operator action: it is shown, but not recorded.
-        let is_recorded = !matches!(status.command.kind, CommandKind::Refresh(_) | CommandKind::ReadSets);
         match outcome {
             None => self.commands.accept(&status),
             Some(outcome) => {

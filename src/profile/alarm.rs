@@ -1,5 +1,5 @@
 //! Alarms: one condition each, on a tag, device or line; "not responding" for every device, "slower than its profile states"
-//! where that states a time, "line overloaded" for every line; the faults of the station.
+//! where that states a time, "line overloaded" for every line that is polled, "no traffic heard" for one that is listened to; the faults of the station.
 
 use std::{collections::HashMap, time::Duration};
 
@@ -37,7 +37,8 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     let of_devices = defs.devices.iter().map(|device| (&device.name, not_responding(device)));
     let timed = defs.devices.iter().filter(|device| device.response_time.is_some());
     let of_timed = timed.map(|device| (&device.name, slower_than_stated(device)));
-    let of_lines = defs.lines.iter().map(|line| (&line.name, overloaded(line)));
+    let of_lines =
+        defs.lines.iter().map(|line| (&line.name, if line.listens { no_traffic(line) } else { overloaded(line) }));
     for (name, alarm) in of_devices.chain(of_timed).chain(of_lines) {
         if !alarms.iter().any(|own| (own.subject, own.condition) == (alarm.subject, alarm.condition)) {
             check_generated(tables, name, &alarm.message, problems);
@@ -185,6 +186,20 @@ fn slower_than_stated(device: &DeviceDef) -> AlarmDef {
         class: AlarmClass::System,
         guidance: Guidance::new(guidance, None),
         ..AlarmDef::new(AlarmId(0), subject, condition, "slower than its profile states")
+    }
+}
+
+/// The line of another master: nothing is known of its devices while it is silent.
+fn no_traffic(line: &LineDef) -> AlarmDef {
+    let guidance = [
+        "the other master has stopped or is off, or the wire to this port is broken",
+        "none of the values of this line is known",
+        "see whether the other master runs, then the wires and the settings of the port; Bus tab",
+    ];
+    AlarmDef {
+        class: AlarmClass::System,
+        guidance: Guidance::new(guidance, Some(Duration::from_secs(600))),
+        ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), Condition::NotConnected, "no traffic heard")
     }
 }
 

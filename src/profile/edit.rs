@@ -67,6 +67,9 @@ const SERIAL: [&str; 7] = ["port", "baud", "data_bits", "parity", "stop_bits", "
 const TCP: [&str; 2] = ["host", "tcp_port"];
 
 fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
+    if settings.listens {
+        return None;
+    }
     let usual = LineDef::new(settings.id, "", settings.transport.clone());
     let ms = |span: std::time::Duration| i64::try_from(span.as_millis()).unwrap_or(i64::MAX);
     let mut entries = vec![entry("mode", line::mode_word(&settings.transport)?)];

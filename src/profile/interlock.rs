@@ -29,6 +29,10 @@ fn interlock(
     problems: &mut Problems,
 ) -> Option<InterlockDef> {
     let tag = commanded(table.tag.as_ref()?, defs, problems)?;
+    if let Some(name) = table.tag.as_ref().filter(|_| defs.listens_to(tag)) {
+        let problem = problems.warn(name.at, format!("{} is on a line that only listens", tag.name));
+        problem.label("another master polls it: this interlock never acts");
+    }
     let of = defs.tag(table.of.as_ref()?, problems)?;
     let value = held_number_of(table.value.as_ref()?, tag, problems)?;
     let when = blocking(table, of, problems)?;

@@ -6,7 +6,7 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Unique, check_name},
     reader::{At, Node, OptionalKey, Raw, kind_of, text},
-    schema::{SerialTable, TcpTable},
+    schema::{DeviceTable, ListenFraming, ListenSerialTable, ListenTcpTable, SerialTable, TcpTable},
 };
 use crate::plant::{
     def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
@@ -23,7 +23,10 @@ pub(super) fn lines(tables: &[At<Raw>], problems: &mut Problems) -> Vec<LineDef>
         let raw = table.value.clone();
         let Some(mode) = kind_of::<Mode>(&raw, "a line", "mode", problems) else { continue };
         let id = LineId(to_u16(index));
-        let (is_tcp, framing) = mode.transport();
+        let Some((is_tcp, framing)) = mode.transport() else {
+            lines.extend(listening(raw, id, &mut seen, problems));
+            continue;
+        };
         let read = if is_tcp { tcp } else { serial };
         lines.extend(read(raw, framing, id, &mut seen, problems));
     }
@@ -38,17 +41,31 @@ keyword_enum! {
         Ascii => "ascii",
         Tcp => "tcp",
         RtuOverTcp => "rtu-over-tcp",
+        // Another master polls.
+        Listen => "listen",
+    }
+}
+
+impl ListenFraming {
+    fn transport(self) -> (bool, Framing) {
+        match self {
+            ListenFraming::Rtu => (false, Framing::Rtu),
+            ListenFraming::Ascii => (false, Framing::Ascii),
+            ListenFraming::Tcp => (true, Framing::Mbap),
+            ListenFraming::RtuOverTcp => (true, Framing::Rtu),
+        }
     }
 }
 
 impl Mode {
-    /// Whether it goes over TCP, and its framing.
-    fn transport(self) -> (bool, Framing) {
+    /// Whether it goes over TCP, and its framing; other keys say so of a listening line.
+    fn transport(self) -> Option<(bool, Framing)> {
         match self {
-            Mode::Rtu => (false, Framing::Rtu),
-            Mode::Ascii => (false, Framing::Ascii),
-            Mode::Tcp => (true, Framing::Mbap),
-            Mode::RtuOverTcp => (true, Framing::Rtu),
+            Mode::Rtu => Some((false, Framing::Rtu)),
+            Mode::Ascii => Some((false, Framing::Ascii)),
+            Mode::Tcp => Some((true, Framing::Mbap)),
+            Mode::RtuOverTcp => Some((true, Framing::Rtu)),
+            Mode::Listen => None,
         }
     }
 }
@@ -92,6 +109,64 @@ fn tcp(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut
     Some(line)
 }
 
+/// The line of another master: a serial port, or a host that forwards the bytes of both sides.
+fn listening(raw: Raw, id: LineId, seen: &mut Unique, problems: &mut Problems) -> Option<LineDef> {
+    let is_tcp = raw.table.contains_key("host");
+    let line = if is_tcp {
+        let table = ListenTcpTable::of(&[raw], problems);
+        let (host, port) = (text(&table.host), table.tcp_port.value_or(TCP_PORT));
+        let framing = listen_framing(&table.framing, true, problems);
+        let name = checked_name(&table.name, seen, problems)?;
+        let usual = LineDef::new(id, &name, Transport::Tcp { host, port, framing });
+        let line =
+            LineDef { frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout), listens: true, ..usual };
+        report_wrong(&line, |key| table.span_of(key), problems);
+        line
+    } else {
+        let table = ListenSerialTable::of(&[raw], problems);
+        let framing = listen_framing(&table.framing, false, problems);
+        let serial = Serial {
+            baud: table.baud.value_or(Serial::USUAL.baud),
+            data_bits: table.data_bits.value_or(usual_data_bits(framing == Framing::Ascii)),
+            parity: table.parity.value_or(Parity::None),
+            stop_bits: table.stop_bits.value_or(1),
+        };
+        let transport = Transport::Serial { port: text(&table.port), serial, framing, rs485: Rs485::Off };
+        let name = checked_name(&table.name, seen, problems)?;
+        let usual = LineDef::new(id, &name, transport);
+        let line =
+            LineDef { frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout), listens: true, ..usual };
+        report_wrong(&line, |key| table.span_of(key), problems);
+        line
+    };
+    Some(line)
+}
+
+/// Limits are those of requests, and a device on a listening line gets none.
+pub(super) fn warn_of_limits(devices: &[At<DeviceTable>], lines: &[LineDef], problems: &mut Problems) {
+    for device in devices.iter().map(|table| &table.value) {
+        let (Some(limits), Some(name)) = (&device.limits, &device.line) else { continue };
+        if lines.iter().any(|line| line.name == name.value && line.listens) {
+            let problem = problems.warn(limits.at, format!("{} is on a line that only listens", text(&device.name)));
+            problem.label("another master polls it: its limits have no effect");
+        }
+    }
+}
+
+/// RTU on a serial port and Modbus TCP over TCP, unless written otherwise.
+fn listen_framing(written: &Option<At<ListenFraming>>, is_tcp: bool, problems: &mut Problems) -> Framing {
+    let usual = if is_tcp { Framing::Mbap } else { Framing::Rtu };
+    let Some(written) = written else { return usual };
+    let (needs_tcp, framing) = written.value.transport();
+    if needs_tcp == is_tcp {
+        return framing;
+    }
+    let word = written.value.word();
+    let (found, expected) = if is_tcp { ("a host", "tcp or rtu-over-tcp") } else { ("a serial port", "rtu or ascii") };
+    problems.add(written.at, format!("framing `{word}` on {found}")).label(format!("expected {expected}"));
+    usual
+}
+
 fn checked_name(name: &Option<At<String>>, seen: &mut Unique, problems: &mut Problems) -> Option<String> {
     let name = name.as_ref()?;
     check_name(name, "line", problems);
@@ -123,7 +198,7 @@ pub fn usual_data_bits(ascii: bool) -> u8 {
 /// The word of a mode in the plant file: `rtu`, `ascii`, `tcp`, `rtu-over-tcp`; `None` for a mode that has none.
 pub(super) fn mode_word(transport: &Transport) -> Option<&'static str> {
     let written = (matches!(transport, Transport::Tcp { .. }), transport.framing());
-    Mode::ALL.into_iter().find(|mode| mode.transport() == written).map(Mode::word)
+    Mode::ALL.into_iter().find(|mode| mode.transport() == Some(written)).map(Mode::word)
 }
 
 /// The name of a line even if the rest of it is wrong, so that one mistake is reported once.

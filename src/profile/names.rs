@@ -64,6 +64,11 @@ impl Defs<'_> {
     pub fn tag_id(&self, name: &Option<At<String>>, problems: &mut Problems) -> Option<TagId> {
         name.as_ref().and_then(|name| self.tag(name, problems)).map(|tag| tag.id)
     }
+    /// Is a tag on a line that another master polls?
+    pub fn listens_to(&self, tag: &TagDef) -> bool {
+        let device = self.devices.iter().find(|device| device.id == tag.device);
+        device.and_then(|device| self.lines.get(device.line.index())).is_some_and(|line| line.listens)
+    }
     /// A line by its name.
     pub fn line(&self, name: &At<String>, problems: &mut Problems) -> Option<LineId> {
         let found = self.lines.iter().find(|line| line.name == name.value).map(|line| line.id);

@@ -64,6 +64,7 @@ pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(Plan
 
 fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> Option<PlantDef> {
     let lines = line::lines(&file.lines, problems);
+    line::warn_of_limits(&file.devices, &lines, problems);
     let Devices { devices, mut tags, names, classes, exprs } = devices(file, &lines, library, problems)?;
     calculated::calculate(
         exprs,

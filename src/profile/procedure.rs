@@ -229,6 +229,10 @@ fn write(name: &At<String>, value: &At<Choice>, defs: &Defs, problems: &mut Prob
         let problem = problems.add(name.at, format!("{} cannot be written and read back", tag.name));
         problem.label("expected access = \"rw\"");
     }
+    if defs.listens_to(tag) {
+        let problem = problems.add(name.at, format!("{} is on a line that only listens", tag.name));
+        problem.label("another master polls it: nothing can be written");
+    }
     let held = held_number_of(value, tag, problems)?;
     check_limits(value, held, tag, problems);
     Some((tag.id, held))

@@ -5,6 +5,7 @@ mod alarms;
 mod batches;
 mod calculated;
 mod inline;
+mod listening;
 mod interlocks;
 mod messages;
 mod new_plants;
@@ -390,10 +391,6 @@ fn a_program_names_tags_that_take_commands() {
 #[test]
 fn a_setting_can_be_written_and_a_default_be_held() {
     check("min = 0\nmax = 100\n", "min = 0\nmax = 100\nset = true\n", &["D1.T cannot be part of a parameter set"]);
-    let enumeration = "enum = { 0 = \"off\", 1 = \"on\" }\n";
-    check(
-        enumeration,
-        &format!("{enumeration}default = \"of\"\n"),
-        &["`of` is not a state of D1.MODE", "did you mean"],
-    );
+    let labels = "enum = { 0 = \"off\", 1 = \"on\" }\n";
+    check(labels, &format!("{labels}default = \"of\"\n"), &["`of` is not a state of D1.MODE", "did you mean"]);
 }

@@ -40,7 +40,9 @@ fn line_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
         let (old, new) = (&before.lines[index].state, &after.lines[index].state);
         let words = match new {
             LineState::Connecting => return None,
+            LineState::Connected if after.def.lines[index].listens => "listening".into(),
             LineState::Connected => "connected".into(),
+            LineState::NoTraffic => "no traffic heard".into(),
             LineState::Disconnected => "disconnected by an operator".into(),
             LineState::Testing => "not polled: used by a test".into(),
             // Every failed try would be a line; the first says it all.

@@ -13,6 +13,7 @@ use crate::{
         backoff::Backoff,
         io::{
             clock::Clock,
+            listening,
             live_reads::{LiveReads, LiveRequest},
             requests::Requests,
             task,
@@ -48,7 +49,11 @@ pub(super) async fn run(
     loop {
         let started = Instant::now();
         let stop = stopped.clone();
-        let link = task::run(def.clone(), line, clock, &mut connector, events.clone(), &mut requests, &mut live, stop);
+        let (plant, connector, requests, live) = (def.clone(), &mut connector, &mut requests, &mut live);
+        let link = match def.line(line).listens {
+            false => task::run(plant, line, clock, connector, events.clone(), requests, live, stop).left_future(),
+            true => listening::run(plant, line, clock, connector, events.clone(), requests, live, stop).right_future(),
+        };
         // Nothing outlives the panic but the port's description and the requests, which it cannot leave half changed.
         if AssertUnwindSafe(link).catch_unwind().await.is_ok() || *stopped.borrow() {
             return;

@@ -160,6 +160,7 @@ fn gone(cx: &ViewContext, fact: Fact, facts: &BTreeMap<Fact, (String, Option<Qua
 fn line_label(state: &LineState) -> String {
     match state {
         LineState::Connecting => t!("connecting").to_owned(),
+        LineState::NoTraffic => t!("no traffic heard").to_owned(),
         LineState::Connected => t!("connected").to_owned(),
         LineState::Disconnected => t!("disconnected by an operator").to_owned(),
         LineState::Testing => t!("in use by a test").to_owned(),

@@ -4,7 +4,7 @@ use super::ViewContext;
 use crate::t;
 use crate::{
     access::right,
-    plant::{command::CommandKind, def::TagId, interlock, role::Role},
+    plant::{command::CommandKind, def::TagId, heard, interlock, role::Role},
 };
 
 /// `Technician`.
@@ -25,9 +25,10 @@ pub fn words(role: Role) -> &'static str {
     }
 }
 
-/// Why the user may not give this command: `needs Technician; tom is Viewer`.
+/// Why the user may not give this command: `needs Technician; tom is Viewer`, or that its line only listens.
 pub fn missing(cx: &ViewContext, kind: &CommandKind) -> Option<String> {
     lacks(cx, right::needs(cx.def(), kind))
+        .or_else(|| heard::refusal(cx.def(), kind).map(|refusal| refusal.to_string()))
 }
 
 /// The least role that may write anything to a tag, or the least of all.

@@ -44,6 +44,41 @@ impl Master {
     }
 }
 
+/// A serial line between a master and pymodbus, with a tap.
+pub struct Tapped {
+    /// The master takes the first end.
+    pub master: Cable,
+    /// A listener takes the first end.
+    pub tap: Cable,
+    /// Puts bytes on the tap alone.
+    pub to_tap: Arc<Mutex<dyn Write + Send>>,
+    /// What the listener has sent.
+    pub sent: Receiver<Vec<u8>>,
+    /// With its cable.
+    pub slave: (Process, Cable),
+}
+
+impl Tapped {
+    pub fn new(folder: &Path, python: &Path) -> Tapped {
+        let cable = |name: &str| {
+            let place = folder.join(name);
+            fs::create_dir(&place).unwrap();
+            Cable::plug(&place)
+        };
+        let [master, slave, tap] = ["master", "slave", "tap"].map(cable);
+        let open = |path: &Path| OpenOptions::new().read(true).write(true).open(path).unwrap();
+        let twice = |file: File| (file.try_clone().unwrap(), file);
+        let [(from_master, to_master), (from_slave, to_slave), (from_tap, to_tap)] =
+            [&master, &slave, &tap].map(|cable| twice(open(&cable.ends[1])));
+        let to_tap: Arc<Mutex<dyn Write + Send>> = Arc::new(Mutex::new(to_tap));
+        pump(from_master, to_slave, to_tap.clone());
+        pump(from_slave, to_master, to_tap.clone());
+        let sent = collect(from_tap);
+        let process = pymodbus(python, "rtu", slave.ends[0].to_str().unwrap());
+        Tapped { master, tap, to_tap, sent, slave: (process, slave) }
+    }
+}
+
 /// Gives on what comes, to its side and to the tap, until its end closes.
 fn pump(mut from: impl Read + Send + 'static, mut to: impl Write + Send + 'static, tap: Arc<Mutex<dyn Write + Send>>) {
     std::thread::spawn(move || {
@@ -98,7 +133,7 @@ fn end(listen: &mut Process) -> String {
 }
 
 /// The mode in which a process has opened a port: 0 is for reading only.
-fn access(process: u32, port: &Path) -> Vec<u32> {
+pub fn access(process: u32, port: &Path) -> Vec<u32> {
     let port = fs::canonicalize(port).unwrap();
     let handles = fs::read_dir(format!("/proc/{process}/fd")).unwrap().flatten();
     let here = handles.filter(|handle| fs::read_link(handle.path()).is_ok_and(|target| target == port));
@@ -114,21 +149,7 @@ fn access(process: u32, port: &Path) -> Vec<u32> {
 fn mbpoll_and_pymodbus_are_heard_over_a_serial_tap() {
     let Some(python) = python().filter(|_| have("socat", "socat") && have("mbpoll", "mbpoll")) else { return };
     let folder = folder();
-    let cable = |name: &str| {
-        let place = folder.path().join(name);
-        fs::create_dir(&place).unwrap();
-        Cable::plug(&place)
-    };
-    let [master, slave, tap] = ["master", "slave", "tap"].map(cable);
-    let open = |path: &Path| OpenOptions::new().read(true).write(true).open(path).unwrap();
-    let twice = |file: File| (file.try_clone().unwrap(), file);
-    let [(from_master, to_master), (from_slave, to_slave), (from_tap, to_tap)] =
-        [&master, &slave, &tap].map(|cable| twice(open(&cable.ends[1])));
-    let to_tap: Arc<Mutex<dyn Write + Send>> = Arc::new(Mutex::new(to_tap));
-    pump(from_master, to_slave, to_tap.clone());
-    pump(from_slave, to_master, to_tap.clone());
-    let sent = collect(from_tap);
-    let _slave = pymodbus(&python, "rtu", slave.ends[0].to_str().unwrap());
+    let Tapped { master, tap, to_tap, sent, slave: _slave } = Tapped::new(folder.path(), &python);
 
     let capture = folder.path().join("heard.pcapng");
     let port = tap.ends[0].to_str().unwrap();

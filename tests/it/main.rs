@@ -11,6 +11,7 @@
 //! | `peers` | our master against slaves that we did not write: pymodbus, libmodbus |
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `listen` | the line of a master and a slave that we did not write, heard over a tap: frames, values, capture; nothing is sent |
+//! | `listening` | a station that only listens to such a line: its values, its refusals, a master that stops; nothing is sent |
 //! | `mqtt` | data out to a broker that is stopped and killed, as the station is; TLS and passwords |
 //! | `mqtt_requests` | requests from outside: written once, refused, repeated, before and after a kill |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
@@ -52,6 +53,7 @@ mod guarded;
 mod hostile;
 mod kills;
 mod listen;
+mod listening;
 mod logs;
 mod masters;
 mod mqtt;

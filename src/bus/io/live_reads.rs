@@ -33,6 +33,12 @@ impl LiveReads {
         LiveReads { queue, waiting: Vec::new(), job: None, known: KnownHoles::default() }
     }
 
+    /// Answers none of them: the line only listens.
+    pub fn drop_all(&mut self) {
+        while self.queue.try_recv().is_ok() {}
+        self.waiting.clear();
+    }
+
     /// Begins the read that is due longest, unless one is at work. `true`: one is at work.
     pub fn begin(&mut self, clock: Clock) -> bool {
         while let Ok(request) = self.queue.try_recv() {

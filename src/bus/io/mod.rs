@@ -6,6 +6,7 @@ pub mod ports;
 pub mod network;
 pub mod transport;
 pub mod tap;
+pub mod hearing;
 pub mod signals;
 pub mod pause;
 pub mod wire;
@@ -14,6 +15,7 @@ pub mod testing;
 pub mod live_reads;
 pub mod requests;
 pub mod task;
+pub mod listening;
 
 #[cfg(test)]
 mod tests;

@@ -14,7 +14,7 @@ use tokio::{io::AsyncRead, net::unix::pipe};
 
 use super::{
     ports,
-    transport::connect,
+    transport::{Opened, connect},
     uart::{self, PortWatch},
 };
 use crate::plant::{
@@ -38,6 +38,11 @@ impl Tap {
             Transport::Serial { port, serial, .. } => open_serial(port, *serial, rts),
             Transport::Tcp { host, port, .. } => Ok(Tap { bytes: Box::new(connect(host, *port).await?), watch: None }),
         }
+    }
+
+    /// The receiving side of what is open already.
+    pub fn of(opened: Opened) -> Tap {
+        Tap { bytes: Box::new(opened.stream), watch: opened.watch }
     }
 
     /// What the driver of a serial port has counted since then; `None` where it does not count.

@@ -5,14 +5,13 @@ mod words;
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
-use jiff::{Timestamp, tz::TimeZone};
-use tokio::io::AsyncReadExt;
+use jiff::tz::TimeZone;
 
 use self::{capture_file::CaptureFile, words::Words};
 use super::PortArgs;
 use crate::{
     bus::{
-        io::{clock::Clock, tap::Tap},
+        io::{clock::Clock, hearing::Hearing, tap::Tap},
         listen::{Follower, Heard, Listener},
     },
     cli::{CliError, in_runtime, say, span},
@@ -62,12 +61,12 @@ pub fn main(args: Args) -> Result<(), CliError> {
         let mut session = Session {
             follower: def.map(|def| Follower::new(def, began)),
             words: Words::new(TimeZone::system(), args.verbose),
-            listener: Listener::new(&line),
             capture,
             args: &args,
         };
-        let ended = session.listen(tap, clock).await;
-        session.summary(&line, elapsed(began, clock.utc())).iter().for_each(|line| say(line));
+        let mut hearing = Hearing::new(tap, &line, clock);
+        let ended = session.listen(&mut hearing).await;
+        session.summary(hearing.listener(), &line, elapsed(began, clock.utc())).iter().for_each(|line| say(line));
         let saved = session.capture.map_or(Ok(()), CaptureFile::end);
         ended.and(saved)
     })
@@ -91,7 +90,6 @@ fn followed(args: &Args) -> Result<Arc<PlantDef>, CliError> {
 }
 
 struct Session<'a> {
-    listener: Listener,
     follower: Option<Follower>,
     capture: Option<CaptureFile>,
     words: Words,
@@ -99,30 +97,25 @@ struct Session<'a> {
 }
 
 impl Session<'_> {
-    async fn listen(&mut self, mut tap: Tap, clock: Clock) -> Result<(), CliError> {
+    async fn listen(&mut self, hearing: &mut Hearing) -> Result<(), CliError> {
         let end = self.args.time.map(|time| tokio::time::Instant::now() + time);
-        let mut buffer = [0; 4096];
         let stopped = tokio::signal::ctrl_c();
         tokio::pin!(stopped);
         let result = loop {
-            let silence = self.listener.silent_at().map(|at| elapsed(clock.utc(), at));
             let heard = tokio::select! {
-                // The end comes also where bytes never end; what has come is heard before a silence is.
+                // The end comes also where bytes never end.
                 biased;
                 _ = &mut stopped => break Ok(()),
                 () = tokio::time::sleep_until(end.unwrap_or_else(tokio::time::Instant::now)), if end.is_some() => break Ok(()),
-                read = tap.bytes.read(&mut buffer) => match read {
-                    Ok(count @ 1..) => self.listener.hear(clock.utc(), &buffer[..count]),
-                    Ok(0) => break Err(CliError::Failed("the port was closed by the other side".to_owned())),
-                    Err(error) => break Err(CliError::Failed(format!("the port is gone: {error}"))),
-                },
-                () = tokio::time::sleep(silence.unwrap_or_default()), if silence.is_some() => self.listener.rest(clock.utc()),
+                heard = hearing.next() => heard,
             };
-            heard.iter().for_each(|heard| self.on_heard(heard));
+            match heard {
+                Ok(heard) => heard.iter().for_each(|heard| self.on_heard(heard)),
+                Err(why) => break Err(CliError::Failed(why)),
+            }
         };
-        let last = self.listener.rest(Timestamp::MAX);
-        last.iter().for_each(|heard| self.on_heard(heard));
-        if let Some(uart) = tap.uart() {
+        hearing.end().iter().for_each(|heard| self.on_heard(heard));
+        if let Some(uart) = hearing.tap().uart() {
             say(&words::uart(uart));
         }
         result
@@ -147,8 +140,8 @@ impl Session<'_> {
         }
     }
 
-    fn summary(&self, line: &LineDef, time: Duration) -> Vec<String> {
-        let mut lines = words::summary(&self.listener, line, time);
+    fn summary(&self, listener: &Listener, line: &LineDef, time: Duration) -> Vec<String> {
+        let mut lines = words::summary(listener, line, time);
         if let Some(follower) = &self.follower {
             lines.extend(self.words.value_table(&follower.snapshot()));
         }

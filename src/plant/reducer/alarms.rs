@@ -169,7 +169,7 @@ fn has_signal(status: &DeviceStatus, signal: Signal) -> Option<bool> {
 fn is_lost(line: &LineStatus) -> Option<bool> {
     match line.state {
         LineState::Connected | LineState::Disconnected | LineState::Testing => Some(false),
-        LineState::Waiting { .. } => Some(true),
+        LineState::Waiting { .. } | LineState::NoTraffic => Some(true),
         LineState::Connecting => line.lost_since.is_some().then_some(true),
     }
 }

@@ -47,12 +47,13 @@ impl Plant {
     /// Applies a new state of a line to its devices.
     pub(super) fn line_changed(&mut self, line: LineId, state: LineState, at: Timestamp) -> Option<ActionRecord> {
         let status = &mut self.lines[line.index()];
+        let before = std::mem::take(&mut status.state);
         status.lost_since = match &state {
-            LineState::Waiting { .. } => status.lost_since.or(Some(at)),
+            LineState::Waiting { .. } | LineState::NoTraffic => status.lost_since.or(Some(at)),
             LineState::Connecting => status.lost_since,
             LineState::Connected | LineState::Disconnected | LineState::Testing => None,
         };
-        if status.since.is_none() || discriminant(&status.state) != discriminant(&state) {
+        if status.since.is_none() || discriminant(&before) != discriminant(&state) {
             status.since = Some(at);
         }
         let open = state != LineState::Disconnected;
@@ -61,13 +62,18 @@ impl Plant {
             LineState::Waiting { .. } => Some(DeviceState::Down { since: at }),
             LineState::Disconnected | LineState::Testing => Some(DeviceState::Unknown),
             // Reopened at once, perhaps with other settings: the values may be of another device.
-            LineState::Connecting if self.lines[line.index()].state == LineState::Connected => {
+            LineState::Connecting if matches!(before, LineState::Connected | LineState::NoTraffic) => {
                 Some(DeviceState::Unknown)
             }
-            LineState::Connecting | LineState::Connected => None,
+            LineState::Connecting | LineState::Connected | LineState::NoTraffic => None,
         };
         self.lines[line.index()].state = state;
         let action = self.commands.connected(line, open, &self.image, at);
+        let silent = self.lines[line.index()].state == LineState::NoTraffic;
+        for device in self.def.devices.iter().filter(|device| silent && device.line == line) {
+            self.devices[device.id.index()].state = DeviceState::Unknown;
+            self.image.not_heard(device.id);
+        }
         let Some(device_state) = gone else { return action };
         for device in self.def.devices.iter().filter(|device| device.line == line) {
             let status = &mut self.devices[device.id.index()];

@@ -117,6 +117,7 @@ fn blind_text(model: &Model, cx: &ViewContext) -> Option<String> {
     let lines = cx.def().lines.iter().filter_map(|line| match snapshot.line(line.id).state {
         LineState::Connected => None,
         LineState::Disconnected => Some(t!("{name} disconnected", name = line.name)),
+        LineState::NoTraffic => Some(t!("{name} no traffic heard", name = line.name)),
         LineState::Testing => Some(t!("{name} in use by a test", name = line.name)),
         LineState::Connecting | LineState::Waiting { .. } => Some(t!("{name} not connected", name = line.name)),
     });

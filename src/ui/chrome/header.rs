@@ -135,17 +135,11 @@ pub(super) fn line_words(cx: &ViewContext, line: &LineDef) -> (String, Style) {
             let style = if replies && !overloaded { cx.theme.normal() } else { cx.theme.trouble() };
             let overload = if overloaded { t!(" OVERLOADED") } else { "" };
             let silent = if replies { "" } else { t!("no reply, ") };
-            (
-                t!(
-                    "{name} {silent}load {busy} %{overload}",
-                    name = line.name,
-                    silent,
-                    busy = format!("{busy:.0}"),
-                    overload
-                ),
-                style,
-            )
+            let listens = if line.listens { t!(" listening,") } else { "" };
+            let name = format!("{}{listens}", line.name);
+            (t!("{name} {silent}load {busy} %{overload}", name, silent, busy = format!("{busy:.0}"), overload), style)
         }
+        LineState::NoTraffic => (t!("{name} NO TRAFFIC", name = line.name), cx.theme.trouble()),
         LineState::Connecting => (t!("{name} connecting", name = line.name), cx.theme.trouble()),
         LineState::Waiting { retry_at, .. } => {
             let left = elapsed(cx.now, *retry_at).as_secs();

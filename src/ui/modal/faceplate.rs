@@ -280,6 +280,7 @@ pub fn retry_text(cx: &ViewContext, device: DeviceId) -> String {
 pub fn line_state_text(cx: &ViewContext, line: crate::plant::def::LineId) -> String {
     let status = cx.snapshot.line(line);
     match &status.state {
+        LineState::NoTraffic => t!("no traffic heard").to_owned(),
         LineState::Connecting => t!("connecting").to_owned(),
         LineState::Connected => match status.report.as_ref().and_then(|report| report.strain.as_deref()) {
             Some(strain) => strain.trim_start_matches("line overloaded: ").to_owned(),

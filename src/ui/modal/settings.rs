@@ -305,6 +305,7 @@ fn answers(cx: &ViewContext, line: LineId) -> (String, bool) {
     match &cx.snapshot.line(line).state {
         LineState::Connecting => (t!("{name} is connecting", name), true),
         LineState::Disconnected => (t!("{name} is disconnected: connect it with D on tab 4", name), false),
+        LineState::NoTraffic => (t!("{name}: no traffic heard", name), false),
         LineState::Testing => (t!("{name} is in use by a test", name), true),
         LineState::Waiting { why, .. } => (t!("{name} is not connected: {why}", name, why), false),
         LineState::Connected => {

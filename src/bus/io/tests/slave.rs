@@ -14,6 +14,7 @@ use crate::{
         frame::{self, Mbap},
         io::{
             clock::Clock,
+            listening,
             live_reads::{LiveReads, LiveRequest},
             requests::Requests,
             task,
@@ -225,6 +226,8 @@ pub struct Line {
     pub requests: mpsc::Sender<BusRequest>,
     pub live: mpsc::Sender<LiveRequest>,
     pub ports: mpsc::Sender<DuplexStream>,
+    /// When its plant time began.
+    pub since: Instant,
     task: tokio::task::JoinHandle<()>,
     _stop: watch::Sender<bool>,
 }
@@ -240,9 +243,14 @@ pub fn line(def: PlantDef) -> Line {
         let mut connector = Connector::Memory(streams);
         let (mut requests, mut live) = (Requests::new(queue), LiveReads::new(live_queue));
         let def = Arc::new(def);
-        task::run(def, LineId(0), clock, &mut connector, sender, &mut requests, &mut live, stopped).await;
+        match def.lines[0].listens {
+            false => task::run(def, LineId(0), clock, &mut connector, sender, &mut requests, &mut live, stopped).await,
+            true => {
+                listening::run(def, LineId(0), clock, &mut connector, sender, &mut requests, &mut live, stopped).await
+            }
+        }
     });
-    Line { events, requests, live, ports, task, _stop: stop }
+    Line { events, requests, live, ports, since: Instant::now(), task, _stop: stop }
 }
 
 impl Line {

@@ -44,7 +44,7 @@ impl Words {
     /// `12:01:05.135 response  1 register: 0032, after 12.1 ms`, and its bytes.
     pub fn frame_lines(&self, heard: &Heard) -> Vec<String> {
         match heard {
-            Heard::Lost { at, request, fault } => {
+            Heard::Lost { at, request, fault, .. } => {
                 let asked = frame::with_crc(request);
                 let asked = dissect::dissect(&asked, Some(Framing::Rtu), Some(Direction::Request), None).summary;
                 vec![self.line(*at, "lost", &format!("{asked}: {fault}"))]

@@ -98,6 +98,7 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
 pub(super) fn line_words(cx: &ViewContext, state: &LineState) -> Option<String> {
     match state {
         LineState::Connected => None,
+        LineState::NoTraffic => Some(t!("no traffic heard").to_owned()),
         LineState::Connecting => Some(t!("connecting").to_owned()),
         LineState::Disconnected => Some(t!("disconnected by an operator").to_owned()),
         LineState::Testing => Some(t!("in use by a test").to_owned()),

@@ -101,6 +101,10 @@ fn because(
             }
             Poll::Once | Poll::Never => Some(t!("it is read on request only").to_owned()),
         },
+        Cause::NotHeard => {
+            let heard = exchange.map_or(cx.snapshot.sample(def.id).at, |exchange| exchange.at);
+            Some(t!("not heard for {seconds} s", seconds = crate::plant::time::elapsed(heard, cx.now).as_secs()))
+        }
         // The verdict on the last answer says it all.
         Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown | Cause::Undefined => None,
         Cause::NotRead
@@ -122,13 +126,16 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
         Cause::NotConnected => match cx.snapshot.line(device.line).state {
             LineState::Disconnected => Some(t!("connect the line again: tab 4, D").to_owned()),
             LineState::Testing => Some(t!("wait for the end of the test, or stop it").to_owned()),
-            LineState::Waiting { .. } | LineState::Connecting | LineState::Connected => of(Fault::NotConnected),
+            LineState::Waiting { .. } | LineState::Connecting | LineState::Connected | LineState::NoTraffic => {
+                of(Fault::NotConnected)
+            }
         },
         Cause::Timeout | Cause::DeviceDown => of(fault.or(last).unwrap_or(Fault::Timeout)),
         Cause::Corrupt => of(fault.unwrap_or(Fault::Crc { got: 0, computed: 0 })),
         Cause::Exception => fault.or(last).and_then(of),
         Cause::SensorFault if fault == Some(Fault::NotANumber) => of(Fault::NotANumber),
         Cause::SensorFault => Some(t!("check the sensor, its wires and the input range of the device").to_owned()),
+        Cause::NotHeard => Some(t!("see whether the other master still reads it").to_owned()),
         Cause::Unscaled => Some(t!("correct the other value first: press w on it for the cause").to_owned()),
         Cause::Stale => match def.poll {
             Poll::Every(_) => {

@@ -104,6 +104,8 @@ pub(super) fn never_asked(cx: &ViewContext, def: &TagDef) -> &'static str {
         _ if cx.is_past() => t!("requests are not kept in the history"),
         (Access::Write, ..) => t!("never: write only"),
         (_, Poll::Never, _) => t!("never: read on request only"),
+        (_, _, LineState::NoTraffic) => t!("not yet: not heard so far"),
+        (_, _, LineState::Connected) if cx.def().listens_to(def.id) => t!("not yet: not heard so far"),
         (_, _, LineState::Connected) => t!("not yet: not polled so far"),
         (_, _, LineState::Connecting | LineState::Waiting { .. } | LineState::Disconnected | LineState::Testing) => {
             t!("not yet: nothing could be sent")

@@ -226,6 +226,9 @@ fn unusual(cx: &ViewContext) -> Vec<String> {
             LineState::Waiting { .. } | LineState::Connecting => {
                 status.lost_since.map(|since| t!("not connected since {clock}", clock = clock(since, zone)))
             }
+            LineState::NoTraffic => {
+                status.lost_since.map(|since| t!("no traffic heard since {clock}", clock = clock(since, zone)))
+            }
             LineState::Connected => None,
         };
         let tried = status.settings_before.as_ref().map(|_| t!("settings under test, not saved").to_owned());

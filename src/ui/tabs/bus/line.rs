@@ -38,7 +38,9 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     rows.push(Row::new());
     rows.extend(devices(cx, at, report, width));
     rows.push(Row::new());
-    rows.extend(cycle(cx, report, width));
+    if !at.settings.listens {
+        rows.extend(cycle(cx, report, width));
+    }
     rows.extend(counters(cx, at, report, width));
     if let Some(north) = &cx.snapshot.north {
         let until = moment(north.sent_until, cx.now, &cx.def().time_zone);
@@ -82,8 +84,11 @@ fn sentence(cx: &ViewContext, words: &str, width: u16) -> Vec<Row> {
 
 fn settings(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     let (theme, line) = (cx.theme, at.settings);
-    let mut parts =
-        vec![plain(line.transport.to_string(), theme.strong()), value(cx, t!("timeout"), &ms(line.timeout))];
+    let mut parts = vec![plain(line.transport.to_string(), theme.strong())];
+    parts.push(match line.listens {
+        true => plain(t!("nothing is sent").to_owned(), theme.normal()),
+        false => value(cx, t!("timeout"), &ms(line.timeout)),
+    });
     if let Some(serial) = line.transport.serial() {
         parts.push(value(cx, t!("silence"), &ms(serial.silent_interval().max(line.gap))));
         parts.push(value(cx, t!("end of response"), &ms(line.frame_timeout)));
@@ -133,7 +138,7 @@ fn missed_lately(report: &LineReport) -> bool {
 
 fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> Vec<Row> {
     let (dim, counters) = (cx.theme.dim(), &report.counters);
-    let sum = DeviceStats::new(report);
+    let (sum, listens) = (DeviceStats::new(report), at.settings.listens);
     let count = |name: &str, times| count(cx, name, times, sum.lately);
     let mut parts = vec![
         plain(grouped(counters.requests), cx.theme.normal()),
@@ -147,9 +152,13 @@ fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) ->
     for (code, times) in &sum.exceptions {
         parts.push(count(&format!("{:02X} {}", code.0, translate(code.label())), *times));
     }
-    parts.push(value(cx, t!("retries"), &grouped(sum.retries)));
+    if listens {
+        parts.push(value(cx, t!("pairs"), &grouped(counters.ok + counters.exceptions)));
+    } else {
+        parts.push(value(cx, t!("retries"), &grouped(sum.retries)));
+    }
     parts.extend([count(t!("late"), counters.late), count(t!("unexpected"), counters.unexpected)]);
-    let mut rows = flow(t!("requests"), dim, width, parts);
+    let mut rows = flow(if listens { t!("heard") } else { t!("requests") }, dim, width, parts);
     let lost = at.status.state != LineState::Connected;
     let parts = [
         value(cx, t!("bytes out"), &grouped(counters.sent_bytes)),
@@ -229,7 +238,8 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
     for device in cx.def().devices.iter().filter(|device| device.line == at.id) {
         let Some(stats) = report.device(device.id) else { continue };
         let diagnosed = cx.snapshot.device(device.id).diagnosis.is_some();
-        let ill = diagnosed || is_ill(cx, device) || near(stats, report.settings.timeout).is_some();
+        let ill =
+            diagnosed || is_ill(cx, device) || (!at.settings.listens && near(stats, report.settings.timeout).is_some());
         let mark = match cx.snapshot.device(device.id).diagnosis {
             Some(reason) => signal_mark(reason.signal()),
             None => if ill { "!" } else { "✓" }.to_owned(),
@@ -237,7 +247,9 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
         styles.push(if ill { cx.theme.trouble() } else { cx.theme.normal() });
         let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
         let (failed, of) = stats.recent();
-        let share = stats.response_time.p99().map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
+        // How long the other master waits is not known.
+        let p99 = stats.response_time.p99().filter(|_| !at.settings.listens);
+        let share = p99.map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
         lines.push([
             mark,
             device.name.clone(),

@@ -59,7 +59,11 @@ impl Plan {
     pub fn view(&self, cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
         let theme = cx.theme;
         let Some(report) = at.report.filter(|report| !report.polls.is_empty()) else {
-            canvas.text(1, 0, t!("nothing is polled on this line yet"), theme.normal());
+            let words = match at.settings.listens {
+                true => t!("this line only listens: another master polls it"),
+                false => t!("nothing is polled on this line yet"),
+            };
+            canvas.text(1, 0, words, theme.normal());
             return;
         };
         let (width, height) = (canvas.width(), canvas.height());

@@ -20,7 +20,7 @@ use crate::{
         frame::{self, Mbap, hex},
         hex_input, meaning, names, request_lint,
     },
-    plant::{def::Framing, diagnostics::Diagnostic, event::LineState},
+    plant::{command::Refusal, def::Framing, diagnostics::Diagnostic, event::LineState},
     ui::modal::{Next, line::Line},
 };
 
@@ -191,8 +191,11 @@ const TOP: u16 = Tried::ALL.len() as u16 + 2;
 /// Why nothing can be sent on a line; `None` if it is open.
 pub fn closed(at: &LineView) -> Option<String> {
     let name = &at.settings.name;
+    if at.settings.listens {
+        return Some(Refusal::OnlyListens.to_string());
+    }
     match &at.status.state {
-        LineState::Connected | LineState::Testing => None,
+        LineState::Connected | LineState::Testing | LineState::NoTraffic => None,
         LineState::Connecting => Some(t!("line {name} is connecting: nothing can be sent yet", name)),
         LineState::Waiting { why, .. } => Some(t!("line {name} is not connected: {why}", name, why)),
         LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (page Line, D)", name)),
@@ -201,7 +204,7 @@ pub fn closed(at: &LineView) -> Option<String> {
 
 /// Starts a test, or asks first; `Err` says why it cannot be started.
 pub fn start(cx: &ViewContext, at: &LineView, diagnostic: Diagnostic) -> Result<UiAction, String> {
-    if let Some(why) = closed(at).filter(|_| !diagnostic.is_exclusive()) {
+    if let Some(why) = closed(at).filter(|_| at.settings.listens || !diagnostic.is_exclusive()) {
         return Err(why);
     }
     diagnostic.check_on(at.settings)?;

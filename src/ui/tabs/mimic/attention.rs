@@ -30,7 +30,7 @@ pub fn needs_action(cx: &ViewContext) -> Vec<Row> {
     let (def, snapshot, trouble) = (cx.def(), cx.snapshot, cx.theme.trouble());
     let has_alarm = |subject| snapshot.alarms.iter().any(|alarm| def.alarm(alarm.id).subject == subject);
     let is_lost = |line: &LineDef| match snapshot.line(line.id).state {
-        LineState::Connecting | LineState::Waiting { .. } => true,
+        LineState::Connecting | LineState::Waiting { .. } | LineState::NoTraffic => true,
         LineState::Connected | LineState::Disconnected | LineState::Testing => false,
     };
     let lines = def.lines.iter().filter(|line| is_lost(line) && !has_alarm(Subject::Line(line.id)));
@@ -107,7 +107,7 @@ pub fn not_normal(cx: &ViewContext) -> Vec<Row> {
     });
     let lines = def.lines.iter().filter(|line| match snapshot.line(line.id).state {
         LineState::Disconnected | LineState::Testing => true,
-        LineState::Connected | LineState::Connecting | LineState::Waiting { .. } => false,
+        LineState::Connected | LineState::Connecting | LineState::Waiting { .. } | LineState::NoTraffic => false,
     });
     let lines = lines.map(|line| (format!("{}  {}", line.name, line_state_text(cx, line.id)), cx.theme.strong()));
     let suppressed = snapshot.suppressed.iter().filter(|alarm| alarm.state != AlarmState::SuppressedByDesign);
@@ -138,6 +138,7 @@ fn is_trouble(cause: Cause) -> bool {
         | Cause::Corrupt
         | Cause::Exception
         | Cause::Stale
+        | Cause::NotHeard
         | Cause::SensorFault
         | Cause::Unscaled
         | Cause::Undefined

@@ -42,7 +42,7 @@ pub(super) fn of_device(
     stats: &RequestStats,
 ) -> Vec<String> {
     let mut worries = Vec::new();
-    if let Some(p99) = near(stats, line.timeout) {
+    if let Some(p99) = near(stats, line.timeout).filter(|_| !line.listens) {
         worries.push(t!(
             "replies take {p99} of {timeout} ms: increase the timeout",
             p99 = p99.as_millis(),

@@ -1,0 +1,58 @@
+//! A line on which another master polls: its keys, and what makes no sense there.
+
+use super::*;
+
+const HEARD: &str = r#"title = "Heard"
+time_zone = "UTC"
+
+[[line]]
+name = "L1"
+mode = "listen"
+port = "/dev/ttyUSB0"
+baud = 9600
+parity = "N"
+
+[[device]]
+name = "M1"
+profile = "meter"
+line = "L1"
+unit = 1
+"#;
+
+fn heard(from: &str, to: &str) -> Result<PlantDef, Errors> {
+    assert!(HEARD.contains(from), "no `{from}`");
+    load(HEARD.replacen(from, to, 1).as_bytes(), METER, PLC)
+}
+
+#[test]
+fn a_listening_line_is_a_serial_port_or_a_mirror() {
+    let tcp = "host = \"mirror\"\ntcp_port = 1502";
+    let serial = "port = \"/dev/ttyUSB0\"\nbaud = 9600\nparity = \"N\"";
+    for (to, mode) in [
+        (serial.to_owned(), "RTU /dev/ttyUSB0 9600 8N1"),
+        (format!("{serial}\nframing = \"ascii\""), "ASCII /dev/ttyUSB0 9600 7N1"),
+        (tcp.to_owned(), "TCP mirror:1502"),
+        (format!("{tcp}\nframing = \"rtu-over-tcp\""), "RTU over TCP mirror:1502"),
+    ] {
+        let plant = heard(serial, &to).unwrap_or_else(|errors| panic!("{errors}"));
+        let line = &plant.lines[0];
+        assert!(line.listens && line.transport.to_string() == mode, "{to}: {}", line.transport);
+        let own: Vec<&str> = plant.alarms.iter().map(|alarm| &*alarm.message).collect();
+        assert!(own.contains(&"no traffic heard") && !own.contains(&"line overloaded"), "{own:?}");
+    }
+}
+
+#[test]
+fn what_makes_no_sense_on_a_listening_line_has_a_place() {
+    for (to, expect) in [
+        ("parity = \"N\"\ntimeout_ms = 500", &["small.toml:10:1", "unknown key `timeout_ms`", "a listening line"][..]),
+        ("parity = \"N\"\nturnaround_ms = 500", &["small.toml:10:1", "unknown key `turnaround_ms`"]),
+        ("parity = \"N\"\nframing = \"tcp\"", &["small.toml:10:11", "framing `tcp` on a serial port", "rtu or ascii"]),
+        ("parity = \"N\"\nframe_timeout_ms = 1", &["small.toml:10:", "too short"]),
+    ] {
+        let errors = heard("parity = \"N\"", to).expect_err(to).to_string();
+        for piece in expect {
+            assert!(errors.contains(piece), "no `{piece}` in\n{errors}");
+        }
+    }
+}
