@@ -106,16 +106,14 @@ impl<'a> Visit<'a> for Found {
         visit::visit_expr_struct(self, row);
     }
     fn visit_expr_call(&mut self, call: &'a syn::ExprCall) {
-        // Rows of the tables of keys and of alarm metrics, headings of columns.
+        // Rows of the tables of keys, of alarm metrics and of the layout of frames; headings of columns.
         let name = match &*call.func {
             syn::Expr::Path(path) => path.path.segments.iter().map(|part| part.ident.to_string()).collect(),
             _ => Vec::new(),
         };
-        if [vec!["row"], vec!["goal"], vec!["Key", "new"], vec!["rows", "words"], vec!["rows", "number"], vec!["fact"]]
-            .iter()
-            .any(|row| *row == name)
-            || name.first().is_some_and(|name| name == "Column")
-        {
+        let rows =
+            ["row", "echo", "goal", "Key new", "rows words", "rows number", "fact", "Address", "count", "Byte", "Word"];
+        if rows.contains(&name.join(" ").as_str()) || name.first().is_some_and(|name| name == "Column") {
             for argument in &call.args {
                 if let syn::Expr::Lit(literal) = argument
                     && let syn::Lit::Str(text) = &literal.lit

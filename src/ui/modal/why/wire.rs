@@ -20,7 +20,7 @@ use crate::{
     },
     ui::{
         ViewContext,
-        widgets::text::{clock, running},
+        widgets::text::{clock, fit, pad, running},
     },
 };
 
@@ -89,11 +89,10 @@ pub(super) fn every_byte(
         for field in &dissection.fields {
             let own = marked.is_some_and(|marked| field.range.start < marked.end && marked.start < field.range.end);
             let mark = if own { "▸" } else { " " };
-            let text = format!("{mark} {:<12} {:<16} {}", field.hex, field.name, field.words);
+            let text = format!("{mark} {} {} {}", pad(&field.hex, 12), pad(&field.name, 16), field.words);
             let style = if own { cx.theme.strong() } else { cx.theme.normal() };
             // Long fields (a text) are cut: the frame itself stands above.
-            let text = text.chars().take(usize::from(room)).collect();
-            rows.push(Row { label: "", text, style, wraps: false });
+            rows.push(Row { label: "", text: fit(&text, room), style, wraps: false });
         }
     }
     rows
