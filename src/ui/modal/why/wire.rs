@@ -48,7 +48,7 @@ pub(super) fn exchange_rows(
     let at = clock(exchange.at, &cx.def().time_zone);
     // What was good then says nothing of now.
     let old = !cx.snapshot.sample(def.id).quality.is_good() && exchange.outcome.is_ok();
-    rows.push(Row::new("", format!("{}, at {at}", request.summary), theme.dim()));
+    rows.push(Row::new("", t!("{summary}, at {at}", summary = request.summary, at), theme.dim()));
     if exchange.answer.is_empty() {
         let timeout = settings(cx, def).timeout;
         rows.push(Row::new(t!("response"), t!("none within {span}", span = span(timeout)), theme.trouble()));

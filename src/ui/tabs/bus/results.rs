@@ -65,8 +65,7 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
                 rows.push(plain(t!("● unit {unit}{serial}: {words}", unit, serial, words = reply), theme.strong()));
             }
             Finding::Object { id, text } => {
-                let name = pad(&names::identity(*id), 20) + " ";
-                rows.push(vec![(name, theme.dim()), (text.clone(), theme.strong())]);
+                rows.push(vec![(pad(&names::identity(*id), 21), theme.dim()), (text.clone(), theme.strong())]);
             }
             Finding::Values { table, address, words } => {
                 let from = format!("{} / 0x{address:04X}", table.modicon(*address));
@@ -130,7 +129,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
     };
     let mut rows = vec![vec![(t!("{at} {what} by {by}   ", at, what, by = run.by), theme.normal()), (state, style)]];
     if let DiagnosticState::Failed(why) = &run.state {
-        rows.extend(wrap(why, room).into_iter().map(|line| plain(line, theme.trouble())));
+        rows.extend(wrap(&said(why), room).into_iter().map(|line| plain(line, theme.trouble())));
     }
     if run.state == DiagnosticState::Running && 1 < run.total {
         let share = f64::from(run.done) / f64::from(run.total);
