@@ -5,10 +5,12 @@
 //! `text/en.toml` lists all of them, by the file they stand in: a copy of it with other values is another language. A test keeps it complete.
 //! In the values U+200B is where a line may break; it takes no column and is dropped where a text is drawn or searched.
 
+mod answers;
 mod date;
 
 use std::{cell::Cell, collections::HashMap, fmt::Display, sync::LazyLock};
 
+pub use answers::said;
 pub use date::{date, weekday};
 
 thread_local! {

@@ -115,7 +115,7 @@ fn packet_block(frame: &Frame, interface: u32, packet: &[u8]) -> Vec<u8> {
     let direction: u32 = if frame.sent { 2 } else { 1 };
     let mut options = option(2, &direction.to_le_bytes());
     if let FrameResult::Wrong(why) = &frame.result {
-        options.extend(option(1, why.as_bytes()));
+        options.extend(option(1, why.to_string().as_bytes()));
     }
     options.extend(option(0, &[]));
     block(6, &[head, padded(packet), options].concat())
@@ -196,6 +196,7 @@ fn checksum(bytes: &[u8]) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::traffic::FrameFault;
 
     fn frame(sent: bool, framing: Framing, bytes: Vec<u8>, result: FrameResult) -> Frame {
         let at = Timestamp::UNIX_EPOCH + jiff::SignedDuration::from_micros(1_700_000_000_123_456);
@@ -221,7 +222,7 @@ mod tests {
         let frames = [
             frame(true, Framing::Mbap, request.clone(), FrameResult::Sent),
             frame(true, Framing::Rtu, frame::with_crc(&[1, 3, 0, 10, 0, 1]), FrameResult::Sent),
-            frame(false, Framing::Rtu, vec![0xFF, 0, 0x55], FrameResult::wrong("noise before the answer")),
+            frame(false, Framing::Rtu, vec![0xFF, 0, 0x55], FrameResult::Wrong(FrameFault::NoFrame)),
         ];
         let file = pcapng(&frames);
         let blocks = blocks(&file);
@@ -235,12 +236,13 @@ mod tests {
         assert_eq!(checksum(&packet[20 + 14..20 + 34]), 0);
         let said = |packet: &[u8], words: &[u8]| packet.windows(words.len()).any(|part| part == words);
         assert!(said(blocks[4].1, b"mbrtu") && !said(blocks[5].1, b"mbrtu"));
-        assert!(said(blocks[5].1, b"noise before the answer"));
+        assert!(said(blocks[5].1, b"no frame"));
     }
 
     #[test]
     fn a_corrupt_ascii_frame_does_not_become_a_good_one() {
-        let corrupt = frame(false, Framing::Ascii, b":01030200010A\r\n".to_vec(), FrameResult::wrong("LRC error"));
+        let corrupt =
+            frame(false, Framing::Ascii, b":01030200010A\r\n".to_vec(), FrameResult::Wrong(FrameFault::CutShort));
         assert!(upper_pdu(&corrupt).ends_with(b":01030200010A\r\n"));
         let good = frame(false, Framing::Ascii, ascii::encode(&[1, 3, 2, 0, 1]), FrameResult::Good);
         assert!(upper_pdu(&good).ends_with(&frame::with_crc(&[1, 3, 2, 0, 1])));

@@ -11,11 +11,13 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{names, pdu};
+use super::pdu;
 use crate::plant::{
     command::CommandId,
     def::Serial,
-    diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, FINDINGS_MAX, Finding, RegisterWrite},
+    diagnostics::{
+        Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, DiagnosticStep, FINDINGS_MAX, Finding, RegisterWrite,
+    },
     event::Fault,
     live::AddressSpan,
     number::{to_u16, to_u32},
@@ -24,7 +26,7 @@ use crate::plant::{
     traffic::Exchange,
 };
 
-pub use pattern::PatternTally;
+pub use pattern::{tally, tally_of};
 
 /// What is to be sent next.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,7 +97,7 @@ impl Job {
             started: at,
             done: 0,
             total: planned,
-            now: String::new(),
+            now: None,
             state: DiagnosticState::Running,
             findings: Vec::new(),
         };
@@ -219,7 +221,9 @@ impl Job {
         let answer = match answer {
             Ok(answer) => answer,
             Err(fault) => {
-                self.found(Finding::Failed { what: words(request), fault });
+                if let Some(what) = request_step(request, None) {
+                    self.found(Finding::Failed { what, fault });
+                }
                 self.after_failure(request, fault);
                 return;
             }
@@ -228,7 +232,7 @@ impl Job {
             (Some(0x2B), _) => self.on_identification(request, &answer),
             (Some(0x11), _) => {
                 let text = text_of(answer.get(3..).unwrap_or_default());
-                self.found(Finding::Object { name: "ServerId".into(), text });
+                self.found(Finding::Object { id: None, text });
             }
             (Some(0x01..=0x04), _) => {
                 let values = answer.get(1..).and_then(|pdu| pdu::values_read(&request[1..], pdu));
@@ -262,7 +266,7 @@ impl Job {
         let [unit, _, _, code, ..] = *request else { return };
         let [_, _, _, _, _, more, next, _, ..] = *answer else { return };
         for (id, text) in pdu::identification_objects(&answer[1..]) {
-            self.found(Finding::Object { name: object_name(id), text: text_of(text) });
+            self.found(Finding::Object { id: Some(id), text: text_of(text) });
         }
         // A device that always says "more" at the same place would be asked for ever.
         if more == 0xFF && request[4] < next {
@@ -272,28 +276,22 @@ impl Job {
 
     fn conclude(&mut self) {
         self.conclude_corrupt_units();
-        let summary = match &self.run.diagnostic {
-            Diagnostic::Loopback { .. } => loopback::conclusion(&self.run.findings, self.run.done - 1),
+        let conclusion = match &self.run.diagnostic {
+            Diagnostic::Loopback { .. } => Some(loopback::conclusion(&self.run.findings, self.run.done - 1)),
             Diagnostic::Scan(scan) => {
                 let units = self.run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
-                match units {
-                    0 => format!("no unit answers within {} ms", scan.timeout.as_millis()),
-                    1 => "1 answer".into(),
-                    count => format!("{count} answers"),
-                }
+                Some(Conclusion::Units(units, scan.timeout))
             }
-            Diagnostic::Sweep(_) => self.sweep.as_ref().map_or(String::new(), sweep::SweepJob::conclusion),
+            Diagnostic::Sweep(_) => self.sweep.as_ref().map(sweep::SweepJob::conclusion),
             Diagnostic::Pattern { bits, .. } => {
-                let tally = PatternTally::of_run(&self.run, *bits);
-                self.found(Finding::Conclusion(tally.to_string()));
-                tally.conclusion()
+                let tally = pattern::tally_of(&self.run, *bits);
+                self.found(Finding::Conclusion(Conclusion::Patterns(tally)));
+                Some(Conclusion::Plug(tally))
             }
             Diagnostic::Signal(test) => signal::conclusion(test, &self.run.findings),
-            Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_) => {
-                return;
-            }
+            Diagnostic::Send(_) | Diagnostic::Identify { .. } | Diagnostic::Read { .. } | Diagnostic::Write(_) => None,
         };
-        self.found(Finding::Conclusion(summary));
+        conclusion.into_iter().for_each(|conclusion| self.found(Finding::Conclusion(conclusion)));
     }
 
     /// Keeps a finding; the last place is for what is concluded from all of them.
@@ -306,10 +304,9 @@ impl Job {
 
     fn update_now(&mut self) {
         self.run.now = match self.step.as_ref().map(|step| (&step.ask, step.serial)) {
-            Some((Ask::Message(request), Some(serial))) => format!("{} at {serial}", words(request)),
-            Some((Ask::Message(request), None)) => words(request),
-            Some((Ask::Raw(_), _)) => "bytes as they are".into(),
-            Some((Ask::Hold(..) | Ask::PutBack, _)) | None => String::new(),
+            Some((Ask::Message(request), serial)) => request_step(request, serial),
+            Some((Ask::Raw(_), _)) => Some(DiagnosticStep::Bytes),
+            Some((Ask::Hold(..) | Ask::PutBack, _)) | None => None,
         };
     }
 }
@@ -363,20 +360,10 @@ fn read(unit: u8, table: Table, address: u16, count: u16) -> Vec<u8> {
     vec![unit, table.read_fc(), a, b, c, d]
 }
 
-/// `unit 3, 08 / 0x08`.
-fn words(request: &[u8]) -> String {
-    match request {
-        [unit, function, ..] => format!("unit {unit}, function {function} / 0x{function:02X}"),
-        _ => String::new(),
-    }
-}
-
-/// The name of an identification object; those without one by number.
-fn object_name(id: u8) -> String {
-    match id {
-        0..=6 => names::object(id).to_owned(),
-        7.. => format!("{} {id} / 0x{id:02X}", names::object(id)),
-    }
+/// What a request asks; `None` of none.
+fn request_step(request: &[u8], serial: Option<Serial>) -> Option<DiagnosticStep> {
+    let [unit, function, ..] = *request else { return None };
+    Some(DiagnosticStep::Request { unit, function, serial })
 }
 
 /// Text of a device: what cannot be printed is shown as hexadecimal digits.

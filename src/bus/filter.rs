@@ -1,7 +1,7 @@
 //! Picks frames out of traffic by a line of words: `unit 1 fc 3 rx error 03EA`.
 
 use super::{dissect, frame, hex_input};
-use crate::plant::traffic::Frame;
+use crate::{plant::traffic::Frame, t};
 
 /// All of these must hold; an empty filter lets everything through.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -17,13 +17,13 @@ pub struct Filter {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum FilterError {
     /// None of the words.
-    #[error("found `{0}`, expected unit N, fc N, tx, rx, error, or bytes in hex such as 03EA")]
+    #[error("{}", t!("found `{found}`, expected unit N, fc N, tx, rx, error, or bytes in hex such as 03EA", found = .0))]
     Word(String),
     /// `unit` or `fc` twice: no frame has two of them.
-    #[error("{0} is given twice, and no frame has two")]
+    #[error("{}", t!("{word} is given twice, and no frame has two", word = .0))]
     Twice(&'static str),
     /// `unit` or `fc` without its number.
-    #[error("found `{found}` after {word}, expected a number from 0 to 255, or 0x00 to 0xFF")]
+    #[error("{}", t!("found `{found}` after {word}, expected a number from 0 to 255, or 0x00 to 0xFF", found = .found, word = .word))]
     Number {
         /// `unit` or `fc`.
         word: &'static str,
@@ -84,7 +84,7 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
 }
 
 fn number(word: &'static str, text: Option<&str>) -> Result<u8, FilterError> {
-    let found = text.unwrap_or("nothing");
+    let found = text.unwrap_or(t!("nothing"));
     let digits = found.strip_prefix("0x").or_else(|| found.strip_prefix("0X"));
     let value = digits.map_or_else(|| found.parse(), |digits| u8::from_str_radix(digits, 16));
     value.map_err(|_| FilterError::Number { word, found: found.to_owned() })
@@ -112,7 +112,11 @@ mod tests {
     use super::*;
     use crate::{
         bus::ascii,
-        plant::{line::Framing, traffic::FrameResult},
+        plant::{
+            event::Fault,
+            line::Framing,
+            traffic::{FrameFault, FrameResult},
+        },
     };
 
     fn frames() -> Vec<Frame> {
@@ -132,8 +136,14 @@ mod tests {
             frame(1, false, Framing::Rtu, frame::with_crc(&[1, 0x83, 2]), FrameResult::Good),
             frame(2, true, Framing::Mbap, frame::with_mbap(9, &[2, 16, 3, 0xEA, 0, 1, 2, 0, 0]), FrameResult::Sent),
             frame(3, false, Framing::Ascii, ascii::encode(&[1, 3, 2, 3, 0xEA]), FrameResult::Good),
-            frame(4, false, Framing::Rtu, corrupt, FrameResult::wrong("CRC error: got 7BB8, computed 7EB8")),
-            frame(5, false, Framing::Rtu, vec![0xFF], FrameResult::wrong("noise before the answer")),
+            frame(
+                4,
+                false,
+                Framing::Rtu,
+                corrupt,
+                FrameResult::Wrong(FrameFault::NoResponse(Fault::Crc { got: 0x7BB8, computed: 0x7EB8 })),
+            ),
+            frame(5, false, Framing::Rtu, vec![0xFF], FrameResult::Wrong(FrameFault::NoFrame)),
         ]
     }
 

@@ -1,7 +1,10 @@
 //! What a technician types or pastes: hex in any dress, ASCII frames, lines of a log.
 
 use super::{ascii, frame};
-use crate::plant::{line::Framing, number::to_u8};
+use crate::{
+    plant::{line::Framing, number::to_u8},
+    t,
+};
 
 /// Bytes that were typed or pasted, with the framing and direction that their text names.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,12 +21,10 @@ pub struct ParsedInput {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum HexInputError {
     /// There is nothing.
-    #[error(
-        "found nothing, expected bytes in hex such as 01 03 00 00 00 01, or an ASCII frame such as :010300000001FB"
-    )]
+    #[error("{}", t!("found nothing, expected bytes in hex such as 01 03 00 00 00 01, or an ASCII frame such as :010300000001FB"))]
     Empty,
     /// A character that means nothing here.
-    #[error("position {position}: `{found}` is not a hex digit, expected 0–9 or A–F")]
+    #[error("{}", t!("position {position}: `{found}` is not a hex digit, expected 0–9 or A–F", position = .position, found = .found))]
     NotHex {
         /// Where.
         position: usize,
@@ -31,7 +32,7 @@ pub enum HexInputError {
         found: char,
     },
     /// Half a byte.
-    #[error("position {position}: `{found}` has an odd number of hex digits, expected two per byte")]
+    #[error("{}", t!("position {position}: `{found}` has an odd number of hex digits, expected two per byte", position = .position, found = .found))]
     OddDigits {
         /// Where the digits begin.
         position: usize,
@@ -39,7 +40,7 @@ pub enum HexInputError {
         found: String,
     },
     /// No frame is that long.
-    #[error("too long: {got} {what}, expected {longest} at most")]
+    #[error("{}", t!("too long: {got} {what}, expected {longest} at most", got = .got, what = .what, longest = .longest))]
     TooLong {
         /// How long it is.
         got: usize,
@@ -79,7 +80,7 @@ pub fn parse(text: &str, framing: Option<Framing>) -> Result<ParsedInput, HexInp
     };
     match bytes.len() {
         0 => Err(HexInputError::Empty),
-        got if longest < got => Err(HexInputError::TooLong { got, what: "bytes", longest }),
+        got if longest < got => Err(HexInputError::TooLong { got, what: t!("bytes"), longest }),
         _ => Ok(ParsedInput { bytes, framing: None, sent }),
     }
 }
@@ -123,7 +124,7 @@ fn ascii_frame(digits: &str, skipped: usize) -> Result<Vec<u8>, HexInputError> {
     match bytes.len() {
         3 => Err(HexInputError::Empty),
         got if ascii::FRAME_MAX < got => {
-            Err(HexInputError::TooLong { got, what: "characters", longest: ascii::FRAME_MAX })
+            Err(HexInputError::TooLong { got, what: t!("characters"), longest: ascii::FRAME_MAX })
         }
         _ => Ok(bytes),
     }

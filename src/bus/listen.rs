@@ -38,7 +38,7 @@ use crate::plant::{
     line::{Framing, LineDef},
     request_stats::RequestStats,
     time::elapsed,
-    traffic::{Frame, FrameResult},
+    traffic::{Frame, FrameFault, FrameResult},
 };
 
 pub use follow::{Ending, Follower, Losses, ending, events, silent_after};
@@ -255,11 +255,11 @@ impl Listener {
         self.totals.noise_runs += 1;
         let unit = frame::unit_of(self.framing, &bytes);
         let why = match self.open.front().filter(|open| unit == open.message.first().copied()) {
-            Some(open) => self.left_over(&open.message, &bytes).to_string(),
-            None => "no frame".to_owned(),
+            Some(open) => FrameFault::NoResponse(self.left_over(&open.message, &bytes)),
+            None => FrameFault::NoFrame,
         };
         self.open.front_mut().into_iter().for_each(|open| open.add_noise(&bytes));
-        heard.push(self.frame(at, false, bytes, FrameResult::wrong(why), Role::Noise));
+        heard.push(self.frame(at, false, bytes, FrameResult::Wrong(why), Role::Noise));
     }
 
     /// Takes a whole frame from the front of the bytes.
@@ -353,7 +353,7 @@ impl Listener {
         // It may be a wrong response to the open request.
         let asked = self.open.front_mut().filter(|open| open.message[0] == message[0]);
         asked.into_iter().for_each(|open| open.add_noise(&bytes));
-        self.frame(at, false, bytes, FrameResult::wrong("a response without request"), Role::Unmatched)
+        self.frame(at, false, bytes, FrameResult::Wrong(FrameFault::WithoutRequest), Role::Unmatched)
     }
 
     fn frame(&mut self, at: Timestamp, sent: bool, bytes: Vec<u8>, result: FrameResult, role: Role) -> Heard {

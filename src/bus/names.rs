@@ -1,7 +1,7 @@
 //! The names of the standard: functions, sub-functions, identification objects, and what to do about an exception.
 
 use super::pdu;
-use crate::plant::tag::Table;
+use crate::{plant::tag::Table, t};
 
 /// Name of a function; `None` for one that the standard does not know.
 pub fn function(code: u8) -> Option<&'static str> {
@@ -16,22 +16,22 @@ pub fn table(function: u8) -> Table {
 /// Name of a sub-function of diagnostics 08 (V1.1b3, 6.8.1).
 pub fn diagnostic(code: u16) -> &'static str {
     match code {
-        0x00 => "return query data (loopback)",
-        0x01 => "restart communications option",
-        0x02 => "return diagnostic register",
-        0x03 => "change ASCII input delimiter",
-        0x04 => "force listen only mode",
-        0x0A => "clear counters and diagnostic register",
-        0x0B => "return bus message count",
-        0x0C => "return bus communication error count",
-        0x0D => "return bus exception error count",
-        0x0E => "return server message count",
-        0x0F => "return server no response count",
-        0x10 => "return server NAK count",
-        0x11 => "return server busy count",
-        0x12 => "return bus character overrun count",
-        0x14 => "clear overrun counter and flag",
-        _ => "reserved sub-function",
+        0x00 => t!("return query data (loopback)"),
+        0x01 => t!("restart communications option"),
+        0x02 => t!("return diagnostic register"),
+        0x03 => t!("change ASCII input delimiter"),
+        0x04 => t!("force listen only mode"),
+        0x0A => t!("clear counters and diagnostic register"),
+        0x0B => t!("return bus message count"),
+        0x0C => t!("return bus communication error count"),
+        0x0D => t!("return bus exception error count"),
+        0x0E => t!("return server message count"),
+        0x0F => t!("return server no response count"),
+        0x10 => t!("return server NAK count"),
+        0x11 => t!("return server busy count"),
+        0x12 => t!("return bus character overrun count"),
+        0x14 => t!("clear overrun counter and flag"),
+        _ => t!("reserved sub-function"),
     }
 }
 
@@ -58,28 +58,37 @@ pub fn object(id: u8) -> &'static str {
         0x04 => "ProductName",
         0x05 => "ModelName",
         0x06 => "UserApplicationName",
-        0x07..=0x7F => "reserved object",
-        0x80..=0xFF => "private object",
+        0x07..=0x7F => t!("reserved object"),
+        0x80..=0xFF => t!("private object"),
+    }
+}
+
+/// Name of a part of an identification; those without a name of their own by number, `None` for the server id of function 11.
+pub fn identity(id: Option<u8>) -> String {
+    match id {
+        None => "ServerId".to_owned(),
+        Some(id @ 0..=6) => object(id).to_owned(),
+        Some(id @ 7..) => format!("{} {}", object(id), code(id)),
     }
 }
 
 /// Name of a read device identification code.
 pub fn identification(code: u8) -> &'static str {
     match code {
-        1 => "basic identification",
-        2 => "regular identification",
-        3 => "extended identification",
-        4 => "one object",
-        _ => "unknown read code",
+        1 => t!("basic identification"),
+        2 => t!("regular identification"),
+        3 => t!("extended identification"),
+        4 => t!("one object"),
+        _ => t!("unknown read code"),
     }
 }
 
 /// The status of functions 0B and 0C.
 pub(super) fn comm_status(status: u16) -> &'static str {
     match status {
-        0x0000 => "ready",
-        0xFFFF => "busy",
-        _ => "unknown status",
+        0x0000 => t!("ready"),
+        0xFFFF => t!("busy"),
+        _ => t!("unknown status"),
     }
 }
 
@@ -116,10 +125,46 @@ pub fn span(function: u8, address: u16, count: u16) -> String {
 
 /// `41003 / 0x03EA, wire address 1002`.
 pub fn place(function: u8, address: u16) -> String {
-    format!("{} / 0x{address:04X}, wire address {address}", modicon(function, address))
+    t!(
+        "{modicon} / 0x{hex}, wire address {address}",
+        modicon = modicon(function, address),
+        hex = format!("{address:04X}"),
+        address
+    )
+}
+
+/// `131 / 0x83`.
+pub fn code(function: u8) -> String {
+    format!("{function} / 0x{function:02X}")
+}
+
+/// What frames have more of than one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counted {
+    /// `byte`.
+    Bytes,
+    /// `bit`.
+    Bits,
+    /// `register`.
+    Registers,
+    /// `message`.
+    Messages,
+    /// `object`.
+    Objects,
 }
 
 /// `1 byte`, `2 bytes`.
-pub fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+pub fn counted(count: usize, what: Counted) -> String {
+    match (what, count) {
+        (Counted::Bytes, 1) => t!("1 byte").to_owned(),
+        (Counted::Bytes, _) => t!("{count} bytes", count),
+        (Counted::Bits, 1) => t!("1 bit").to_owned(),
+        (Counted::Bits, _) => t!("{count} bits", count),
+        (Counted::Registers, 1) => t!("1 register").to_owned(),
+        (Counted::Registers, _) => t!("{count} registers", count),
+        (Counted::Messages, 1) => t!("1 message").to_owned(),
+        (Counted::Messages, _) => t!("{count} messages", count),
+        (Counted::Objects, 1) => t!("1 object").to_owned(),
+        (Counted::Objects, _) => t!("{count} objects", count),
+    }
 }

@@ -2,17 +2,17 @@
 //! simulated devices, the check before sending and the decoder of frames all read this table.
 
 use self::Item::*;
-use super::names::{self, counted};
-use crate::plant::tag::Table;
+use super::names::{self, Counted, counted};
+use crate::{plant::tag::Table, t};
 
 /// A field of a request or response, behind the function code.
 #[derive(Debug, Clone, Copy)]
 pub enum Item {
-    /// Wire address, with a prefix of its name.
+    /// Wire address, by its name.
     Address(&'static str),
-    /// Count of bits or registers, from 1 to `most`, with a prefix of its name and what is done to them.
+    /// Count of bits or registers, from 1 to `most`, by its name and what is done to them.
     Count {
-        prefix: &'static str,
+        name: &'static str,
         verb: &'static str,
         most: u16,
     },
@@ -88,40 +88,49 @@ impl Function {
 /// Device identification (V1.1b3, 6.21).
 pub const MEI_IDENTIFICATION: u8 = 0x0E;
 
-const fn count(verb: &'static str, most: u16) -> Item {
-    Count { prefix: "", verb, most }
+const fn count(name: &'static str, verb: &'static str, most: u16) -> Item {
+    Count { name, verb, most }
 }
 
-const READ_BITS: &[Item] = &[Address(""), count("to read", 2000)];
-const READ_REGISTERS: &[Item] = &[Address(""), count("to read", 125)];
+const READ_BITS: &[Item] = &[Address("address"), count("count", "to read", 2000)];
+const READ_REGISTERS: &[Item] = &[Address("address"), count("count", "to read", 125)];
 const BITS: &[Item] = &[ByteCount, Bits];
 const REGISTERS: &[Item] = &[ByteCount, Registers];
-const WRITTEN: &[Item] = &[Address(""), count("written", u16::MAX)];
+const WRITTEN: &[Item] = &[Address("address"), count("count", "written", u16::MAX)];
 const DIAGNOSTICS: &[Item] =
     &[Word("sub-function", |code| format!("{code} / 0x{code:04X} {}", names::diagnostic(code))), Data];
-const MASK_WRITE: &[Item] = &[Address(""), Word("AND mask", |mask| format!("keeps the bits of {mask:016b}")), OrMask];
-const STATUS: Item = Byte("status", |status| format!("{status:08b}, highest first: the device says what they mean"));
+const MASK_WRITE: &[Item] = &[
+    Address("address"),
+    Word("AND mask", |mask| t!("keeps the bits of {mask}", mask = format!("{mask:016b}"))),
+    OrMask,
+];
+const STATUS: Item = Byte("status", |status| {
+    t!("{status}, highest first: the device says what they mean", status = format!("{status:08b}"))
+});
 const COMM_STATUS: Item = Word("status", |status| names::comm_status(status).to_owned());
-const EVENT_COUNT: Item = Word("event count", |count| format!("{} done", counted(count.into(), "message")));
-const MESSAGE_COUNT: Item = Word("message count", |count| format!("{} seen", counted(count.into(), "message")));
+const EVENT_COUNT: Item =
+    Word("event count", |count| t!("{messages} done", messages = counted(count.into(), Counted::Messages)));
+const MESSAGE_COUNT: Item =
+    Word("message count", |count| t!("{messages} seen", messages = counted(count.into(), Counted::Messages)));
 const READ_WRITE: &[Item] = &[
-    Address("read "),
-    Count { prefix: "read ", verb: "to read", most: 125 },
-    Address("write "),
-    Count { prefix: "write ", verb: "to write", most: 121 },
+    Address("read address"),
+    count("read count", "to read", 125),
+    Address("write address"),
+    count("write count", "to write", 121),
     ByteCount,
     Registers,
 ];
 const READ_CODE: Item = Byte("read code", |code| format!("{code} {}", names::identification(code)));
-const IDENTIFY: &[Item] = &[MeiType, READ_CODE, Byte("object", |id| format!("from {id} {}", names::object(id)))];
+const IDENTIFY: &[Item] =
+    &[MeiType, READ_CODE, Byte("object", |id| t!("from {id} {object}", id, object = names::object(id)))];
 const IDENTIFICATION: &[Item] = &[
     MeiType,
     READ_CODE,
     Byte("conformity", |level| {
-        let one_by_one = if level & 0x80 == 0 { "as a list only" } else { "as a list and one by one" };
+        let one_by_one = if level & 0x80 == 0 { t!("as a list only") } else { t!("as a list and one by one") };
         format!("{}, {one_by_one}", names::identification(level & 0x7F))
     }),
-    Byte("more follows", |more| if more == 0 { "no" } else { "yes" }.into()),
+    Byte("more follows", |more| if more == 0 { t!("no") } else { t!("yes") }.into()),
     NextObject,
     Objects,
 ];
@@ -132,20 +141,20 @@ const FUNCTIONS: &[Function] = &[
     row(0x02, "read discrete inputs", Table::Discrete, READ_BITS, BITS),
     row(0x03, "read holding registers", Table::Holding, READ_REGISTERS, REGISTERS),
     row(0x04, "read input registers", Table::Input, READ_REGISTERS, REGISTERS),
-    echo(0x05, "write single coil", Table::Coil, &[Address(""), CoilState]),
-    echo(0x06, "write single register", Table::Holding, &[Address(""), Register]),
+    echo(0x05, "write single coil", Table::Coil, &[Address("address"), CoilState]),
+    echo(0x06, "write single register", Table::Holding, &[Address("address"), Register]),
     row(0x07, "read exception status", Table::Holding, &[], &[STATUS]),
     echo(0x08, "diagnostics", Table::Holding, DIAGNOSTICS),
     row(0x0B, "get comm event counter", Table::Holding, &[], &[COMM_STATUS, EVENT_COUNT]),
     row(0x0C, "get comm event log", Table::Holding, &[], &[ByteCount, COMM_STATUS, EVENT_COUNT, MESSAGE_COUNT, Events]),
-    row(0x0F, "write multiple coils", Table::Coil, &[Address(""), count("to write", 1968), ByteCount, Bits], WRITTEN),
-    row(0x10, "write multiple registers", Table::Holding, &[Address(""), count("to write", 123), ByteCount, Registers], WRITTEN),
+    row(0x0F, "write multiple coils", Table::Coil, &[Address("address"), count("count", "to write", 1968), ByteCount, Bits], WRITTEN),
+    row(0x10, "write multiple registers", Table::Holding, &[Address("address"), count("count", "to write", 123), ByteCount, Registers], WRITTEN),
     row(0x11, "report server id", Table::Holding, &[], &[ByteCount, ServerId]),
     row(0x14, "read file record", Table::Holding, &[ByteCount, FileRequests], &[ByteCount, FileRecords]),
     echo(0x15, "write file record", Table::Holding, &[ByteCount, FileWrites]),
     echo(0x16, "mask write register", Table::Holding, MASK_WRITE),
     row(0x17, "read/write multiple registers", Table::Holding, READ_WRITE, REGISTERS),
-    row(0x18, "read FIFO queue", Table::Holding, &[Address("FIFO ")], &[WordCount, FifoCount, Registers]),
+    row(0x18, "read FIFO queue", Table::Holding, &[Address("FIFO address")], &[WordCount, FifoCount, Registers]),
     row(0x2B, "encapsulated interface transport", Table::Holding, IDENTIFY, IDENTIFICATION),
 ];
 

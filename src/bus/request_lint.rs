@@ -1,31 +1,32 @@
 //! What is wrong with a request before it is sent: counts, addresses, values and lengths that no device can take.
 
 use super::{
-    frame, names,
+    frame,
+    names::{self, Counted},
     pdu::{self, Item, Length},
 };
-use crate::plant::line::Framing;
+use crate::{plant::line::Framing, t, text::translate};
 
 /// Why a request should not be sent. Raw bytes can still be sent with an explicit override.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RequestError {
     /// Not even unit and function.
-    #[error("{bytes}, expected unit and function at least", bytes = names::counted(*.0, "byte"))]
+    #[error("{}", t!("{bytes}, expected unit and function at least", bytes = names::counted(*.0, Counted::Bytes)))]
     TooShort(usize),
     /// Longer than 254 bytes of unit and PDU.
-    #[error("{0} bytes of unit and PDU, at most 254 are allowed")]
+    #[error("{}", t!("{count} bytes of unit and PDU, at most 254 are allowed", count = .0))]
     TooLong(usize),
     /// A unit that no device on a serial line has.
-    #[error("unit {0} is reserved on serial lines, expected 1–247, or 0 for a broadcast")]
+    #[error("{}", t!("unit {unit} is reserved on serial lines, expected 1–247, or 0 for a broadcast", unit = .0))]
     Unit(u8),
     /// A broadcast that wants an answer.
-    #[error("no unit responds to a broadcast: unit 0 accepts writes only")]
+    #[error("{}", t!("no unit responds to a broadcast: unit 0 accepts writes only"))]
     ReadFromAll,
     /// An exception cannot be asked for.
-    #[error("function {0} / 0x{0:02X} is an exception, not a request")]
+    #[error("{}", t!("function {code} is an exception, not a request", code = names::code(*.0)))]
     Exception(u8),
     /// Fewer or more bytes than the function has.
-    #[error("{got} bytes of unit and PDU, function {function} / 0x{function:02X} has {expected}")]
+    #[error("{}", t!("{got} bytes of unit and PDU, function {code} has {expected}", got = .got, code = names::code(*.function), expected = .expected))]
     Length {
         /// Function.
         function: u8,
@@ -35,7 +36,7 @@ pub enum RequestError {
         expected: usize,
     },
     /// A count of none or of more than the function can do.
-    #[error("count {got} {what}, expected 1–{most}")]
+    #[error("{}", t!("count {got} {what}, expected 1–{most}", got = .got, what = translate(.what), most = .most))]
     Count {
         /// `to read` or `to write`.
         what: &'static str,
@@ -45,7 +46,7 @@ pub enum RequestError {
         most: u16,
     },
     /// The block runs past the last address.
-    #[error("{what}: {count} from address {address} / 0x{address:04X} extend past 65535 / 0xFFFF")]
+    #[error("{}", t!("{what}: {count} from address {address} / 0x{hex} extend past 65535 / 0xFFFF", what = translate(.what), count = .count, address = .address, hex = format!("{:04X}", .address)))]
     PastTheEnd {
         /// `to read` or `to write`.
         what: &'static str,
@@ -55,7 +56,7 @@ pub enum RequestError {
         count: u16,
     },
     /// The byte count does not fit the count.
-    #[error("byte count says {got}, {count} {what} take {expected}")]
+    #[error("{}", t!("byte count says {got}, {count} {what} take {expected}", got = .got, count = .count, what = translate(.what), expected = .expected))]
     ByteCount {
         /// As typed.
         got: u8,
@@ -67,11 +68,16 @@ pub enum RequestError {
         expected: usize,
     },
     /// Neither on nor off.
-    #[error("coil value {0:04X}, expected FF00 (on) or 0000 (off)")]
+    #[error("{}", coil_value_words(*.0))]
     CoilValue(u16),
     /// A function that the standard does not know.
-    #[error("function {0} / 0x{0:02X} is not in the standard")]
+    #[error("{}", t!("function {code} is not in the standard", code = names::code(*.0)))]
     Unknown(u8),
+}
+
+/// A coil is neither on nor off.
+pub(super) fn coil_value_words(value: u16) -> String {
+    t!("coil value {value}, expected FF00 (on) or 0000 (off)", value = format!("{value:04X}"))
 }
 
 /// Does a request change nothing in a device? The reads, of diagnostics the echo and the counters, and of 2B the device
@@ -145,8 +151,8 @@ fn check_data(message: &[u8], items: &[Item]) -> Vec<RequestError> {
             Item::ByteCount => {
                 let (Some(&got), Some(count)) = (message.get(at), count) else { continue };
                 let (what, expected) = match items.get(index + 1) {
-                    Some(Item::Bits) => ("coils", usize::from(count).div_ceil(8)),
-                    _ => ("registers", 2 * usize::from(count)),
+                    Some(Item::Bits) => (t!("coils"), usize::from(count).div_ceil(8)),
+                    _ => (t!("registers"), 2 * usize::from(count)),
                 };
                 let wrong = usize::from(got) != expected;
                 errors.extend(wrong.then_some(RequestError::ByteCount { got, count, what, expected }));

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::{CliError, say};
 use crate::{
     profile,
+    report::control_runs,
     sim::experiment::{self, Experiment, Milestones, Recorded},
 };
 
@@ -117,7 +118,8 @@ fn table(rows: &[Row]) -> Vec<String> {
 
 /// Here, there, and by how much they differ.
 fn beside(here: Option<u32>, thesis: Option<u32>) -> String {
-    let time = |time: Option<u32>| time.map_or_else(|| "never".into(), |s| format!("{}:{:02}", s / 60, s % 60));
+    let time =
+        |time: Option<u32>| time.map_or_else(|| control_runs::reached(None), |s| format!("{}:{:02}", s / 60, s % 60));
     let percent = off_percent(here, thesis).map_or_else(String::new, |percent| format!("{percent:+.1} %"));
     format!("{:>5}   {:>5} {percent:>8}", time(here), time(thesis))
 }

@@ -156,8 +156,10 @@ async fn find_units(line: &LineDef, known: &[Arc<PlantDef>]) -> Result<Option<(V
         if units.len() < UNITS_MANY {
             scan::describe(finding).iter().for_each(|words| say(&format!("  {words}")));
         }
-        if let Finding::Unit { unit, register, certain: true, .. } = finding {
-            units.push((*unit, register.is_some()));
+        if let Finding::Unit { unit, reply, .. } = finding
+            && reply.is_certain()
+        {
+            units.push((*unit, reply.register().is_some()));
         }
     }
     let names: Vec<String> = units.iter().map(|(unit, _)| unit.to_string()).collect();

@@ -228,9 +228,9 @@ async fn first_answer(
 
 fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
     run.findings.iter().find_map(|finding| match finding {
-        Finding::Unit { unit, serial, words, certain: true, .. } => Some((*unit, *serial, words.clone())),
+        Finding::Unit { unit, serial, reply } if reply.is_certain() => Some((*unit, *serial, reply.to_string())),
         // Corrupt bytes at one of the settings fit nothing.
-        Finding::Unit { certain: false, .. }
+        Finding::Unit { .. }
         | Finding::Exchange(_)
         | Finding::Bytes { .. }
         | Finding::Object { .. }
@@ -246,9 +246,9 @@ fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
 /// What came that was no answer.
 fn trace(run: &DiagnosticRun) -> Option<String> {
     run.findings.iter().find_map(|finding| match finding {
-        Finding::Unit { words, certain: false, .. } => Some(words.clone()),
+        Finding::Unit { reply, .. } if !reply.is_certain() => Some(reply.to_string()),
         Finding::Failed { fault, .. } => Some(fault.to_string()),
-        Finding::Unit { certain: true, .. }
+        Finding::Unit { .. }
         | Finding::Exchange(_)
         | Finding::Bytes { .. }
         | Finding::Object { .. }
@@ -282,7 +282,7 @@ fn with_serial(line: LineDef, wanted: Serial) -> LineDef {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::command::CommandId;
+    use crate::plant::{command::CommandId, diagnostics::UnitReply};
 
     #[test]
     fn corrupt_bytes_at_a_setting_are_no_answer() {
@@ -292,11 +292,11 @@ mod tests {
             Diagnostic::Identify { unit: 1 },
             jiff::Timestamp::UNIX_EPOCH,
         );
-        let found = |certain| {
-            let words = "register 0 = 77".to_owned();
-            let findings = vec![Finding::Unit { unit: 3, serial: None, words, register: Some(77), certain }];
+        let found = |reply| {
+            let findings = vec![Finding::Unit { unit: 3, serial: None, reply }];
             answer(&DiagnosticRun { findings, ..job.run().clone() }).map(|(unit, ..)| unit)
         };
-        assert_eq!((found(true), found(false)), (Some(3), None));
+        let corrupt = UnitReply::Corrupt(crate::plant::event::Fault::Timeout);
+        assert_eq!((found(UnitReply::Register(77)), found(corrupt)), (Some(3), None));
     }
 }

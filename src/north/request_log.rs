@@ -85,7 +85,8 @@ impl Ended {
                     NotConfirmed::NotApplied(_) | NotConfirmed::Different(_) => RequestResult::Failed,
                     NotConfirmed::NotAnswered(_)
                     | NotConfirmed::NotRead(_)
-                    | NotConfirmed::Partly(_)
+                    | NotConfirmed::PartlyWritten { .. }
+                    | NotConfirmed::PartlyAccepted { .. }
                     | NotConfirmed::StationStopped
                     | NotConfirmed::ConnectionLost
                     | NotConfirmed::NoReadBack => RequestResult::Unknown,

@@ -1,5 +1,8 @@
 //! Diagnostics of a line: what a technician can ask of a line beyond polling, how far it has come, and what was found.
 
+mod conclusion;
+mod finding;
+
 use crate::{t, text::translate};
 use std::{sync::Arc, time::Duration};
 
@@ -7,15 +10,16 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    command::{CommandId, Outcome},
-    event::Fault,
+    command::CommandId,
     line::{LineDef, Serial},
     line_check::{TIMEOUT_MIN, WAIT_MAX},
-    port_signals::{HOLD_MAX_S, PortSignals, SignalTest},
-    sweep::{Sweep, SweptRange},
+    port_signals::{HOLD_MAX_S, SignalTest},
+    sweep::Sweep,
     tag::Table,
-    traffic::Exchange,
 };
+
+pub use conclusion::{Conclusion, PatternTally, SweepEnd};
+pub use finding::{DiagnosticStep, Finding, UnitReply};
 
 /// Findings that a run keeps at most.
 pub const FINDINGS_MAX: usize = 1_000;
@@ -103,24 +107,26 @@ impl Diagnostic {
     /// Can a line carry it? `Err` says why not. A line is never busy with one step for longer than `WAIT_MAX`.
     pub fn check(&self) -> Result<(), String> {
         let within = |what: &str, found: usize, most: usize| match found {
-            0 => Err(format!("{what}: none, expected 1 to {most}")),
-            found if most < found => Err(format!("{what}: {found}, expected 1 to {most}")),
+            0 => Err(t!("{what}: none, expected 1 to {most}", what, most)),
+            found if most < found => Err(t!("{what}: {found}, expected 1 to {most}", what, found, most)),
             _ => Ok(()),
         };
         match self {
-            Diagnostic::Send(bytes) => within("bytes to send", bytes.len(), SEND_MAX),
-            Diagnostic::Loopback { count, .. } => within("loopbacks", usize::from(*count), usize::from(LOOPBACKS_MAX)),
-            Diagnostic::Pattern { count, .. } => within("patterns", usize::from(*count), usize::from(PATTERNS_MAX)),
+            Diagnostic::Send(bytes) => within(t!("bytes to send"), bytes.len(), SEND_MAX),
+            Diagnostic::Loopback { count, .. } => {
+                within(t!("loopbacks"), usize::from(*count), usize::from(LOOPBACKS_MAX))
+            }
+            Diagnostic::Pattern { count, .. } => within(t!("patterns"), usize::from(*count), usize::from(PATTERNS_MAX)),
             Diagnostic::Identify { .. } => Ok(()),
             Diagnostic::Read { table, address, count, .. } => {
-                within("registers", usize::from(*count), if table.is_bits() { 2_000 } else { 125 })?;
+                within(t!("registers"), usize::from(*count), if table.is_bits() { 2_000 } else { 125 })?;
                 let last = u32::from(*address) + u32::from(*count) - 1;
-                if last <= 0xFFFF { Ok(()) } else { Err(format!("address {last}: the last is 65535")) }
+                if last <= 0xFFFF { Ok(()) } else { Err(t!("address {last}: the last is 65535", last)) }
             }
             Diagnostic::Scan(scan) => scan.check(),
             Diagnostic::Sweep(sweep) => sweep.check(),
             Diagnostic::Write(write) => write.check(),
-            Diagnostic::Signal(test) => within("seconds", usize::from(test.seconds), usize::from(HOLD_MAX_S)),
+            Diagnostic::Signal(test) => within(t!("seconds"), usize::from(test.seconds), usize::from(HOLD_MAX_S)),
         }
     }
 }
@@ -234,16 +240,24 @@ pub struct Scan {
 impl Scan {
     fn check(&self) -> Result<(), String> {
         if self.last < self.first {
-            return Err(format!("units {} to {}: the first is greater than the last", self.first, self.last));
+            return Err(t!(
+                "units {first} to {last}: the first is greater than the last",
+                first = self.first,
+                last = self.last
+            ));
         }
         if !(TIMEOUT_MIN..=WAIT_MAX).contains(&self.timeout) {
-            return Err("timeout of the scan: expected 10 to 10000 ms".into());
+            return Err(t!("timeout of the scan: expected 10 to 10000 ms").to_owned());
         }
         if SERIALS_MAX < self.serials.len() {
-            return Err(format!("{} serial settings, expected at most {SERIALS_MAX}", self.serials.len()));
+            return Err(t!(
+                "{count} serial settings, expected at most {most}",
+                count = self.serials.len(),
+                most = SERIALS_MAX
+            ));
         }
         match self.serials.iter().find(|serial| !serial.is_usual()) {
-            Some(serial) => Err(format!("{serial}: no port has such settings")),
+            Some(serial) => Err(t!("{serial}: no port has such settings", serial)),
             None => Ok(()),
         }
     }
@@ -264,8 +278,8 @@ pub struct DiagnosticRun {
     pub done: u32,
     /// Steps in all.
     pub total: u32,
-    /// What it is doing: `unit 17 at 9600 8N1`.
-    pub now: String,
+    /// What it asks now.
+    pub now: Option<DiagnosticStep>,
     /// How it stands.
     pub state: DiagnosticState,
     /// What was found, in order; at most [`FINDINGS_MAX`].
@@ -283,67 +297,4 @@ pub enum DiagnosticState {
     Cancelled,
     /// The line went away, or would not open.
     Failed(String),
-}
-
-/// What a diagnostic has found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Finding {
-    /// A request with its answer.
-    Exchange(Arc<Exchange>),
-    /// Bytes that came back for bytes sent as they were; empty if the line stayed silent.
-    Bytes {
-        /// As they came.
-        bytes: Vec<u8>,
-        /// From the last byte sent to the first byte received.
-        response_time: Option<Duration>,
-    },
-    /// A unit answers.
-    Unit {
-        /// Its address.
-        unit: u8,
-        /// With these serial parameters, if others than the line's own were tried.
-        serial: Option<Serial>,
-        /// What it answered: `register 0 = 123`, `exception 02, illegal data address`.
-        words: String,
-        /// Register 0, where it could be read.
-        register: Option<u16>,
-        /// A whole frame came; else only corrupt bytes, which may be a unit with other settings.
-        certain: bool,
-    },
-    /// Part of a device's identification.
-    Object {
-        /// `VendorName`.
-        name: String,
-        /// What the device says.
-        text: String,
-    },
-    /// Registers or bits (0 or 1) that were read.
-    Values {
-        /// Which table.
-        table: Table,
-        /// Address of the first.
-        address: u16,
-        /// One a register or bit.
-        words: Vec<u16>,
-    },
-    /// How a write has ended.
-    Written(Outcome),
-    /// The signals of the port, at first, whenever one has changed, and when it is put back.
-    Signals {
-        /// So long after it was set.
-        after: Duration,
-        /// How they stand.
-        signals: PortSignals,
-    },
-    /// Addresses that a sweep has found to have the same outcome.
-    Swept(SweptRange),
-    /// A step failed.
-    Failed {
-        /// What was asked: `unit 3, loopback 08/00`.
-        what: String,
-        /// Why.
-        fault: Fault,
-    },
-    /// A conclusion: `10 of 10 came back, 11.8 to 12.4 ms`.
-    Conclusion(String),
 }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::line::{Framing, LineDef, Serial, Transport};
+use crate::t;
 
 /// Shortest time that an answer may take: no device is faster, and less would be all timeouts.
 pub const TIMEOUT_MIN: Duration = Duration::from_millis(10);
@@ -36,49 +37,79 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
             all.push(SettingError { key, what, expected });
         }
     };
-    match &line.transport {
-        Transport::Serial { port, serial, framing, .. } => {
-            let Serial { baud, data_bits, parity: _, stop_bits } = *serial;
-            let (who, expected) = match framing {
-                Framing::Ascii => ("Modbus ASCII sends 7 or 8", "expected 7 or 8"),
-                Framing::Rtu | Framing::Mbap => ("Modbus RTU sends 8", "expected 8"),
-            };
-            let fits = data_bits == 8 || (data_bits == 7 && *framing == Framing::Ascii);
-            check(port.trim().is_empty(), "port", "a serial line needs a port".into(), "expected /dev/…");
-            let unusual = format!("{baud} is not a usual baud rate");
-            let usual = "expected 300, 600, 1200 … 9600, 19200, 38400, 57600, 115200 …";
-            check(!BAUDS.contains(&baud), "baud", unusual, usual);
-            check(!fits, "data_bits", format!("{who} data bits"), expected);
-            let wrong = !matches!(stop_bits, 1 | 2);
-            check(wrong, "stop_bits", format!("{stop_bits} stop bits do not exist"), "expected 1 or 2");
-        }
-        Transport::Tcp { host, port, framing: _ } => {
-            let named = !host.trim().is_empty();
-            check(!named, "host", "a TCP line needs a host".into(), "expected a name or an address");
-            // More than one colon is an address of IPv6.
-            let with_port = host.matches(':').count() == 1;
-            check(with_port, "host", format!("`{host}` is no host"), "expected the host alone, the port is tcp_port");
-            check(*port == 0, "tcp_port", "TCP port 0 does not exist".into(), "expected 1 to 65535, usually 502");
-        }
-    }
+    check_transport(&line.transport, &mut check);
     let known = match &line.transport {
         Transport::Serial { framing, .. } => *framing != Framing::Mbap,
         Transport::Tcp { framing, .. } => *framing != Framing::Ascii,
     };
-    check(!known, "mode", format!("{} is no mode of a line", line.transport.mode()), "expected RTU, ASCII or TCP");
-    let short = "too short: no device responds within this time";
-    check(line.timeout < TIMEOUT_MIN, "timeout_ms", short.into(), "expected at least 10 ms");
+    check(
+        !known,
+        "mode",
+        t!("{mode} is no mode of a line", mode = line.transport.mode()),
+        t!("expected RTU, ASCII or TCP"),
+    );
+    let short = t!("too short: no device responds within this time");
+    check(line.timeout < TIMEOUT_MIN, "timeout_ms", short.into(), t!("expected at least 10 ms"));
     for (key, span) in [
         ("timeout_ms", line.timeout),
         ("request_gap_ms", line.gap),
         ("frame_timeout_ms", line.frame_timeout),
         ("turnaround_ms", line.turnaround),
     ] {
-        check(WAIT_MAX < span, key, "too long: the line is blocked for this time".into(), "expected at most 10000 ms");
+        check(
+            WAIT_MAX < span,
+            key,
+            t!("too long: the line is blocked for this time").into(),
+            t!("expected at most 10000 ms"),
+        );
     }
-    let short = "too short: responses may arrive in fragments";
-    check(line.frame_timeout < Duration::from_millis(2), "frame_timeout_ms", short.into(), "expected at least 2 ms");
+    let short = t!("too short: responses may arrive in fragments");
+    check(
+        line.frame_timeout < Duration::from_millis(2),
+        "frame_timeout_ms",
+        short.into(),
+        t!("expected at least 2 ms"),
+    );
     all
+}
+
+/// What is wrong with a port or an address.
+fn check_transport(transport: &Transport, check: &mut impl FnMut(bool, &'static str, String, &'static str)) {
+    match transport {
+        Transport::Serial { port, serial, framing, .. } => {
+            let Serial { baud, data_bits, parity: _, stop_bits } = *serial;
+            let (who, expected) = match framing {
+                Framing::Ascii => (t!("Modbus ASCII sends 7 or 8"), t!("expected 7 or 8")),
+                Framing::Rtu | Framing::Mbap => (t!("Modbus RTU sends 8"), t!("expected 8")),
+            };
+            let fits = data_bits == 8 || (data_bits == 7 && *framing == Framing::Ascii);
+            check(port.trim().is_empty(), "port", t!("a serial line needs a port").into(), t!("expected /dev/…"));
+            let unusual = t!("{baud} is not a usual baud rate", baud);
+            let usual = t!("expected 300, 600, 1200 … 9600, 19200, 38400, 57600, 115200 …");
+            check(!BAUDS.contains(&baud), "baud", unusual, usual);
+            check(!fits, "data_bits", t!("{who} data bits", who), expected);
+            let wrong = !matches!(stop_bits, 1 | 2);
+            check(wrong, "stop_bits", t!("{stop_bits} stop bits do not exist", stop_bits), t!("expected 1 or 2"));
+        }
+        Transport::Tcp { host, port, framing: _ } => {
+            let named = !host.trim().is_empty();
+            check(!named, "host", t!("a TCP line needs a host").into(), t!("expected a name or an address"));
+            // More than one colon is an address of IPv6.
+            let with_port = host.matches(':').count() == 1;
+            check(
+                with_port,
+                "host",
+                t!("`{host}` is no host", host),
+                t!("expected the host alone, the port is tcp_port"),
+            );
+            check(
+                *port == 0,
+                "tcp_port",
+                t!("TCP port 0 does not exist").into(),
+                t!("expected 1 to 65535, usually 502"),
+            );
+        }
+    }
 }
 
 impl Serial {

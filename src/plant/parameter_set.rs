@@ -4,6 +4,7 @@ mod plan;
 #[cfg(test)]
 mod tests;
 
+use crate::t;
 use std::{collections::BTreeMap, sync::Arc};
 
 use jiff::Timestamp;
@@ -71,19 +72,19 @@ pub const NAME_MAX: usize = 32;
 pub fn check_name(name: &str) -> Result<(), String> {
     let barred = |c: char| is_control_or_bidi(c) || "/\\:*?\"<>|".contains(c);
     if name.is_empty() {
-        return Err("type a name".to_owned());
+        return Err(t!("type a name").to_owned());
     }
     if NAME_MAX < name.chars().count() {
-        return Err(format!("at most {NAME_MAX} characters"));
+        return Err(t!("at most {most} characters", most = NAME_MAX));
     }
     if name.trim() != name {
-        return Err("no space at its beginning or end".to_owned());
+        return Err(t!("no space at its beginning or end").to_owned());
     }
     if name.starts_with('.') {
-        return Err("no dot at its beginning".to_owned());
+        return Err(t!("no dot at its beginning").to_owned());
     }
     if name.contains(barred) {
-        return Err("none of / \\ : * ? \" < > |".to_owned());
+        return Err(t!("none of / \\ : * ? \" < > |").to_owned());
     }
     Ok(())
 }

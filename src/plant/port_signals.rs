@@ -103,7 +103,7 @@ impl PortSignals {
 /// `RTS on  DTR on   CTS off  DSR off  DCD off  RI off`.
 impl fmt::Display for PortSignals {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let words = self.all().map(|(name, on)| format!("{name} {}", if on { "on" } else { "off" }));
+        let words = self.all().map(|(name, on)| format!("{name} {}", if on { t!("on") } else { t!("off") }));
         write!(f, "{}   {}", words[..2].join("  "), words[2..].join("  "))
     }
 }

@@ -178,13 +178,11 @@ impl Restore {
                 self.steps[0].outcome.clone()
             }
             State::Failed => {
-                let at = failed.map_or("", |step| &def.tag(step.change.tag).short);
-                Some(Outcome::NotConfirmed(NotConfirmed::Partly(format!("{done} of {all} written, then {at} failed"))))
+                let failed = failed.map(|step| def.tag(step.change.tag).short.clone()).unwrap_or_default();
+                Some(Outcome::NotConfirmed(NotConfirmed::PartlyWritten { done, all, failed: Some(failed) }))
             }
             State::Stopped if done == 0 => Some(Outcome::Refused(Refusal::Stopped)),
-            State::Stopped => {
-                Some(Outcome::NotConfirmed(NotConfirmed::Partly(format!("{done} of {all} written, then stopped"))))
-            }
+            State::Stopped => Some(Outcome::NotConfirmed(NotConfirmed::PartlyWritten { done, all, failed: None })),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod encoding;
 
+use crate::t;
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::{SignedDuration, Timestamp};
@@ -356,7 +357,7 @@ impl HistoryStatus {
             return Some(trouble.clone());
         }
         let share = self.waiting * 100 / self.waiting_max.max(1);
-        Some(format!("not recording: {} records waiting ({share} %); {trouble}", self.waiting))
+        Some(t!("not recording: {count} records waiting ({share} %); {trouble}", count = self.waiting, share, trouble))
     }
 }
 

@@ -1,11 +1,12 @@
 //! What went over a line: frames as bytes, requests with their answers. The source frame of every value.
 
-use std::{borrow::Cow, collections::VecDeque, fmt, sync::Arc, time::Duration};
+use std::{collections::VecDeque, fmt, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{event::Fault, line::Framing};
+use crate::t;
 
 /// Frames that a line remembers.
 pub const FRAMES_MAX: usize = 1_000;
@@ -39,15 +40,39 @@ pub enum FrameResult {
     /// Received after bytes that an operator typed: nothing was expected of it.
     Unchecked,
     /// Corrupt, late or dropped: what is wrong with it.
-    Wrong(Cow<'static, str>),
+    Wrong(FrameFault),
+}
+
+/// What is wrong with a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
+pub enum FrameFault {
+    /// It is no valid response.
+    #[error("{0}")]
+    NoResponse(Fault),
+    /// The response to a request that was given up.
+    #[error("{}", t!("late, dropped"))]
+    Late,
+    /// Nothing was expected.
+    #[error("{}", t!("unexpected, dropped"))]
+    Unexpected,
+    /// A response whose request was not heard.
+    #[error("{}", t!("a response without request"))]
+    WithoutRequest,
+    /// Bytes between frames.
+    #[error("{}", t!("no frame"))]
+    NoFrame,
+    /// The stream ended within it.
+    #[error("{}", t!("cut short"))]
+    CutShort,
+    /// Bytes of a TCP connection that begin no frame.
+    #[error("{}", t!("no MBAP header"))]
+    NoHeader,
+    /// The adapter gives back what it sends.
+    #[error("{}", t!("echo of the adapter"))]
+    Echo,
 }
 
 impl FrameResult {
-    /// Says what is wrong.
-    pub fn wrong(why: impl Into<Cow<'static, str>>) -> FrameResult {
-        FrameResult::Wrong(why.into())
-    }
-
     /// Is something wrong with the frame?
     pub fn is_wrong(&self) -> bool {
         matches!(self, FrameResult::Wrong(_))
@@ -56,12 +81,12 @@ impl FrameResult {
 
 impl fmt::Display for FrameResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            FrameResult::Sent => "sent",
-            FrameResult::Good => "ok",
-            FrameResult::Unchecked => "received",
-            FrameResult::Wrong(why) => why,
-        })
+        match self {
+            FrameResult::Sent => f.write_str(t!("sent")),
+            FrameResult::Good => f.write_str(t!("ok")),
+            FrameResult::Unchecked => f.write_str(t!("received")),
+            FrameResult::Wrong(why) => why.fmt(f),
+        }
     }
 }
 

@@ -173,6 +173,11 @@ pub fn figures(run: &ControlRun) -> Vec<String> {
     [Some(at_sv), Some(steady), overshoot, Some(offset), rise, Some(iae), energy, good].into_iter().flatten().collect()
 }
 
+/// When something was reached: `12:45`, `never`.
+pub fn reached(time: Option<Duration>) -> String {
+    time.map_or_else(|| t!("never").to_owned(), clock)
+}
+
 /// `12:45`, `1:02:45`.
 pub fn clock(time: Duration) -> String {
     let (hours, minutes, seconds) = (time.as_secs() / 3_600, time.as_secs() / 60 % 60, time.as_secs() % 60);

@@ -1,8 +1,6 @@
 //! Procedures in words: what a step does, how far one has come, and what it writes.
 
-use std::time::Duration;
-
-use super::control_runs::clock;
+use super::control_runs::{clock, reached};
 use crate::{
     plant::{
         Snapshot,
@@ -137,7 +135,6 @@ fn safe_words(snapshot: &Snapshot, def: &ProcedureDef, run: &ProcedureRun) -> Ve
 
 /// First time at SV, steady from, overshoot of a reference.
 pub fn reference(reference: &Reference, decimals: u8) -> [String; 3] {
-    let time = |time: Option<Duration>| time.map_or_else(|| t!("never").to_owned(), clock);
     let overshoot = reference.overshoot.map_or_else(String::new, |over| format!("{over:.*}", usize::from(decimals)));
-    [time(reference.at_sv), time(reference.steady), overshoot]
+    [reached(reference.at_sv), reached(reference.steady), overshoot]
 }

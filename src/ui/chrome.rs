@@ -136,7 +136,7 @@ fn headings(model: &Model, cx: &ViewContext, columns: u16) -> Vec<(u16, Tab, Str
         names.iter().map(cut).collect::<Vec<_>>()
     };
     let fits = |names: &Vec<(Tab, String)>| names.iter().map(|(_, name)| width(name) + 1).sum::<u16>() <= columns + 1;
-    let names = (5..=longest).rev().map(cut).find(fits).unwrap_or_else(|| cut(5));
+    let names = (3..=longest).rev().map(cut).find(fits).unwrap_or_else(|| cut(3));
     let heading = |x: &mut u16, (tab, name): (Tab, String)| {
         let (at, name) = (*x, format!("{blank}{name}{blank}"));
         *x += width(&name) + 1;
@@ -218,7 +218,9 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
         Outcome::Unchanged => (t!("unchanged, nothing written").to_owned(), false),
         Outcome::Refused(why) => (t!("REFUSED: {why}", why), true),
         Outcome::NotConfirmed(NotConfirmed::NoReadBack) => (t!("accepted (cannot be read back)").to_owned(), false),
-        Outcome::NotConfirmed(NotConfirmed::Partly(how)) => (t!("STOPPED: {how}", how), true),
+        Outcome::NotConfirmed(how @ (NotConfirmed::PartlyWritten { .. } | NotConfirmed::PartlyAccepted { .. })) => {
+            (t!("STOPPED: {how}", how), true)
+        }
         Outcome::NotConfirmed(
             why @ (NotConfirmed::NotAnswered(_)
             | NotConfirmed::NotApplied(_)

@@ -197,19 +197,15 @@ fn switched_off(cx: &ViewContext) -> String {
             None => unknown.push(def.short.clone()),
         }
     }
-    let mut words = if on.is_empty() {
-        t!("No output is on.").to_owned()
-    } else {
-        t!("Switched off: {join}.", join = on.join(", "))
+    let words = match (on.is_empty(), unknown.is_empty()) {
+        (true, true) => t!("No output is on.").to_owned(),
+        (true, false) => t!("No output is known to be on.").to_owned(),
+        (false, _) => t!("Switched off: {join}.", join = on.join(", ")),
     };
-    if !unknown.is_empty() {
-        words = t!(
-            "{replace} Unknown: {join}.",
-            replace = words.replace("No output is on.", "No output is known to be on."),
-            join = unknown.join(", ")
-        );
+    match unknown.join(", ") {
+        none if none.is_empty() => words,
+        unknown => t!("{words} Unknown: {unknown}.", words, unknown),
     }
-    words
 }
 
 /// What the manual commands will change at once when this value lets them act.

@@ -1,6 +1,5 @@
 //! What an operator looks at: `update` turns messages into state and effects, `view` draws state; both are pure.
 
-mod answers;
 mod context;
 mod dispatch;
 mod effects;

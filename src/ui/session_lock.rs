@@ -240,7 +240,7 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
 /// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
 /// which waits for its last request only.
 pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Durability, String>) -> Vec<UiAction> {
-    let answer = answer.map_err(|why| super::answers::said(&why));
+    let answer = answer.map_err(|why| crate::text::said(&why));
     if answer == Ok(Durability::NotRecorded) {
         model.note = Some(t!("Done, but NOT RECORDED: the station cannot write to its disk").into());
     }

@@ -6,8 +6,9 @@ use jiff::{SignedDuration, Timestamp};
 use sightglass::{
     bus::{ascii, capture, frame},
     plant::{
+        event::Fault,
         line::Framing,
-        traffic::{Frame, FrameResult},
+        traffic::{Frame, FrameFault, FrameResult},
     },
 };
 
@@ -115,7 +116,7 @@ fn what_was_corrupt_is_no_modbus_and_says_why() {
     }
     let mut frames = traffic(Framing::Rtu);
     Arc::make_mut(&mut frames[1].bytes)[4] ^= 1;
-    frames[1].result = FrameResult::wrong("CRC error: got 9139, computed 5138");
+    frames[1].result = FrameResult::Wrong(FrameFault::NoResponse(Fault::Crc { got: 0x9139, computed: 0x5138 }));
     let lines = tshark(&frames[..2], &["-T", "fields", "-e", "frame.protocols", "-e", "frame.comment"]);
     check(&lines, &[&["mbrtu"], &["data", "CRC error"]]);
 }

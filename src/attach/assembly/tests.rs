@@ -15,7 +15,7 @@ use crate::{
         alarm::AlarmState,
         command::{Command, CommandId, CommandKind, CommandStatus},
         def::{AlarmId, Framing, TagId},
-        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState},
+        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, DiagnosticStep},
         event::Fault,
         parameter_set::StoredSet,
         sample::{Cause, Sample},
@@ -84,7 +84,7 @@ fn full() -> Snapshot {
         started: now(),
         done: 3,
         total: 9,
-        now: "unit 3".into(),
+        now: Some(DiagnosticStep::Request { unit: 3, function: 8, serial: None }),
         state: DiagnosticState::Running,
         findings: Vec::new(),
     }));

@@ -1,11 +1,11 @@
-//! The loopback by function 08/00: what came back, in words.
+//! The loopback by function 08/00: what came back, and how fast.
 
 use std::time::Duration;
 
-use super::{Fault, Finding};
+use super::{Conclusion, Fault, Finding};
 
 /// How many words came back of those sent, and how fast.
-pub(super) fn conclusion(findings: &[Finding], sent: u32) -> String {
+pub(super) fn conclusion(findings: &[Finding], sent: u32) -> Conclusion {
     let replies: Vec<Duration> = findings
         .iter()
         .filter_map(|finding| match finding {
@@ -13,12 +13,10 @@ pub(super) fn conclusion(findings: &[Finding], sent: u32) -> String {
             _ => None,
         })
         .collect();
-    let ms = |span: Option<&Duration>| span.map_or(0.0, |span| span.as_secs_f64() * 1e3);
-    let (least, most) = (ms(replies.iter().min()), ms(replies.iter().max()));
+    let times = (replies.iter().min().copied().unwrap_or_default(), replies.iter().max().copied().unwrap_or_default());
     let refused = findings.iter().any(|finding| matches!(finding, Finding::Failed { fault: Fault::Exception(_), .. }));
     match replies.len() {
-        0 if refused => "the unit responds, but does not support loopback: line and unit work".to_owned(),
-        0 => format!("none of {sent} came back"),
-        back => format!("{back} of {sent} came back, {least:.1} to {most:.1} ms"),
+        0 if refused => Conclusion::LoopbackRefused,
+        back => Conclusion::Loopback { back, sent, times },
     }
 }

@@ -1,11 +1,8 @@
 //! The pattern test: bytes that a loopback plug gives back as they were sent, and what became of them.
 
-use crate::{
-    plant::{
-        diagnostics::{DiagnosticRun, Finding},
-        number::to_u8,
-    },
-    t,
+use crate::plant::{
+    diagnostics::{DiagnosticRun, Finding, PatternTally},
+    number::to_u8,
 };
 
 /// Bytes of one pattern.
@@ -31,107 +28,51 @@ pub(super) fn bytes(n: u32, bits: u8) -> Vec<u8> {
     (0..LENGTH).map(byte).map(|byte| byte & mask).collect()
 }
 
-/// Bytes of a pattern test.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct PatternTally {
-    /// Sent, and received.
-    pub sent: usize,
-    /// See above.
-    pub received: usize,
-    /// Received as another byte.
-    pub wrong: usize,
-    /// Not received.
-    pub missing: usize,
-    /// Received without being sent.
-    pub extra: usize,
+/// What became of pattern `n`: the fewest faults that explain what was received.
+pub fn tally(n: u32, bits: u8, received: &[u8]) -> PatternTally {
+    let sent = bytes(n, bits);
+    let after = |tally: PatternTally, wrong, missing, extra| PatternTally {
+        wrong: tally.wrong + wrong,
+        missing: tally.missing + missing,
+        extra: tally.extra + extra,
+        ..tally
+    };
+    // Of the first bytes sent, against ever more of those received (Wagner and Fischer 1974).
+    let start = PatternTally { sent: sent.len(), received: received.len(), ..PatternTally::default() };
+    let mut row: Vec<PatternTally> = (0..=received.len()).map(|extra| PatternTally { extra, ..start }).collect();
+    for byte in &sent {
+        let mut next = vec![after(row[0], 0, 1, 0)];
+        for (at, got) in received.iter().enumerate() {
+            let same = after(row[at], usize::from(byte != got), 0, 0);
+            let others = [after(row[at + 1], 0, 1, 0), after(next[at], 0, 0, 1)];
+            next.push(others.into_iter().fold(same, |best, one| if one.faults() < best.faults() { one } else { best }));
+        }
+        row = next;
+    }
+    row[received.len()]
 }
 
-impl PatternTally {
-    /// What became of pattern `n`: the fewest faults that explain what was received.
-    pub fn of(n: u32, bits: u8, received: &[u8]) -> PatternTally {
-        let sent = bytes(n, bits);
-        let after = |tally: PatternTally, wrong, missing, extra| PatternTally {
-            wrong: tally.wrong + wrong,
-            missing: tally.missing + missing,
-            extra: tally.extra + extra,
-            ..tally
-        };
-        // Of the first bytes sent, against ever more of those received (Wagner and Fischer 1974).
-        let start = PatternTally { sent: sent.len(), received: received.len(), ..PatternTally::default() };
-        let mut row: Vec<PatternTally> = (0..=received.len()).map(|extra| PatternTally { extra, ..start }).collect();
-        for byte in &sent {
-            let mut next = vec![after(row[0], 0, 1, 0)];
-            for (at, got) in received.iter().enumerate() {
-                let same = after(row[at], usize::from(byte != got), 0, 0);
-                let others = [after(row[at + 1], 0, 1, 0), after(next[at], 0, 0, 1)];
-                next.push(
-                    others.into_iter().fold(same, |best, one| if one.faults() < best.faults() { one } else { best }),
-                );
-            }
-            row = next;
-        }
-        row[received.len()]
-    }
-
-    /// All patterns of a test so far.
-    pub fn of_run(run: &DiagnosticRun, bits: u8) -> PatternTally {
-        let received = run.findings.iter().filter_map(|finding| match finding {
-            Finding::Bytes { bytes, .. } => Some(bytes),
-            Finding::Exchange(_)
-            | Finding::Unit { .. }
-            | Finding::Object { .. }
-            | Finding::Values { .. }
-            | Finding::Written(_)
-            | Finding::Swept(_)
-            | Finding::Signals { .. }
-            | Finding::Failed { .. }
-            | Finding::Conclusion(_) => None,
-        });
-        (0..).zip(received).map(|(n, bytes)| PatternTally::of(n, bits, bytes)).fold(
-            PatternTally::default(),
-            |sum, one| PatternTally {
-                sent: sum.sent + one.sent,
-                received: sum.received + one.received,
-                wrong: sum.wrong + one.wrong,
-                missing: sum.missing + one.missing,
-                extra: sum.extra + one.extra,
-            },
-        )
-    }
-
-    /// Bytes that did not come back as they were sent.
-    pub fn faults(&self) -> usize {
-        self.wrong + self.missing + self.extra
-    }
-
-    /// What this says of plug, line and adapter.
-    pub(super) fn conclusion(&self) -> String {
-        match (self.received, self.faults()) {
-            (0, _) => t!("nothing came back: no plug and no local echo, or transmitter or receiver does not work"),
-            (_, 0) => {
-                t!("every byte came back: plug and adapter work. Without a plug this is local echo: the adapter receives what it sends")
-            }
-            (_, _) => t!("bytes are lost or changed: contact, cable, baud rate too high, or a unit that sends too"),
-        }
-        .to_owned()
-    }
-}
-
-/// `320 bytes sent, 318 received: 1 wrong, 2 missing, 0 more than sent; 0.9 % faults`.
-impl std::fmt::Display for PatternTally {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let PatternTally { sent, received, wrong, missing, extra } = self;
-        let share = format!("{:.1}", 100.0 * self.faults() as f64 / (*sent).max(1) as f64);
-        f.write_str(&t!(
-            "{sent} bytes sent, {received} received: {wrong} wrong, {missing} missing, {extra} more than sent; {share} % faults",
-            sent,
-            received,
-            wrong,
-            missing,
-            extra,
-            share
-        ))
-    }
+/// All patterns of a test so far.
+pub fn tally_of(run: &DiagnosticRun, bits: u8) -> PatternTally {
+    let received = run.findings.iter().filter_map(|finding| match finding {
+        Finding::Bytes { bytes, .. } => Some(bytes),
+        Finding::Exchange(_)
+        | Finding::Unit { .. }
+        | Finding::Object { .. }
+        | Finding::Values { .. }
+        | Finding::Written(_)
+        | Finding::Swept(_)
+        | Finding::Signals { .. }
+        | Finding::Failed { .. }
+        | Finding::Conclusion(_) => None,
+    });
+    (0..).zip(received).map(|(n, bytes)| tally(n, bits, bytes)).fold(PatternTally::default(), |sum, one| PatternTally {
+        sent: sum.sent + one.sent,
+        received: sum.received + one.received,
+        wrong: sum.wrong + one.wrong,
+        missing: sum.missing + one.missing,
+        extra: sum.extra + one.extra,
+    })
 }
 
 #[cfg(test)]
@@ -155,7 +96,7 @@ mod tests {
         let check = |change: &dyn Fn(&mut Vec<u8>), expect: [usize; 4]| {
             let mut received = bytes(4, 8);
             change(&mut received);
-            let tally = PatternTally::of(4, 8, &received);
+            let tally = tally(4, 8, &received);
             assert_eq!([tally.received, tally.wrong, tally.missing, tally.extra], expect, "{received:02X?}");
         };
         check(&|_| {}, [32, 0, 0, 0]);

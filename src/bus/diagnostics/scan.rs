@@ -3,7 +3,7 @@
 use super::{Ask, Job, Step, read};
 use crate::plant::{
     def::Serial,
-    diagnostics::{Finding, Scan},
+    diagnostics::{DiagnosticStep, Finding, Scan, UnitReply},
     event::Fault,
     number::{to_u8, to_u32},
     tag::Table,
@@ -35,24 +35,19 @@ fn units_of(scan: &Scan) -> u32 {
 impl Job {
     pub(super) fn add_unit(&mut self, step: &Step, answer: Result<Vec<u8>, Fault>) {
         let Ask::Message(request) = &step.ask else { return };
-        let mut register = None;
-        let words = match answer {
+        let reply = match answer {
             // A broadcast has no response.
             Ok(answer) if answer.is_empty() => return,
             Ok(answer) => match answer.get(3..5) {
-                Some([high, low]) => {
-                    let word = u16::from_be_bytes([*high, *low]);
-                    register = Some(word);
-                    format!("register 0 = {word}")
-                }
-                _ => "answers".into(),
+                Some([high, low]) => UnitReply::Register(u16::from_be_bytes([*high, *low])),
+                _ => UnitReply::Answers,
             },
-            Err(fault @ Fault::Exception(code)) if !code.is_of_gateway() => fault.to_string(),
+            Err(Fault::Exception(code)) if !code.is_of_gateway() => UnitReply::Exception(code),
             // Corrupt bytes are a trace too: a unit may be there with another parity or baud rate.
             Err(fault) if fault.is_corrupt() => return self.corrupt_units.push((request[0], step.serial, fault)),
             Err(_) => return,
         };
-        self.found(Finding::Unit { unit: request[0], serial: step.serial, words, register, certain: true });
+        self.found(Finding::Unit { unit: request[0], serial: step.serial, reply });
     }
 
     /// A few corrupt responses may be units; more of them with the same settings come from another sender.
@@ -64,15 +59,12 @@ impl Job {
                 let unit = |(unit, serial, fault): &(u8, Option<Serial>, Fault)| Finding::Unit {
                     unit: *unit,
                     serial: *serial,
-                    words: format!("something is there: {fault}"),
-                    register: None,
-                    certain: false,
+                    reply: UnitReply::Corrupt(*fault),
                 };
                 same.iter().for_each(|trace| self.found(unit(trace)));
                 continue;
             }
-            let at = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
-            let what = format!("{} addresses{at}: something else talks on this line", same.len());
+            let what = DiagnosticStep::Addresses { count: same.len(), serial };
             self.found(Finding::Failed { what, fault });
         }
     }

@@ -1,12 +1,9 @@
 //! The signal test: one signal is held by hand, the others are looked at, and what was held is put back.
 
 use super::{Ask, Job, Step};
-use crate::{
-    plant::{
-        diagnostics::{Diagnostic, Finding},
-        port_signals::{LOOK, PortSignals, SignalTest},
-    },
-    t,
+use crate::plant::{
+    diagnostics::{Conclusion, Diagnostic, Finding},
+    port_signals::{LOOK, PortSignals, SignalTest},
 };
 
 /// Step `n`: looks while the signal is held, then the putting back.
@@ -25,19 +22,9 @@ fn ends(findings: &[Finding]) -> Option<(PortSignals, PortSignals)> {
     Some((first, signals.next_back().unwrap_or(first)))
 }
 
-/// Whether the port did as it was asked, and what followed.
-pub(super) fn conclusion(test: &SignalTest, findings: &[Finding]) -> String {
-    let signal = test.signal.word();
-    let Some((held, after)) = ends(findings) else { return String::new() };
-    if held.is_on(test.signal) != test.on {
-        return t!("the port did not set {signal}: its driver or adapter has no such output", signal);
-    }
-    let of = |signals: PortSignals| signals.all().into_iter().skip(2);
-    let followed = of(held).zip(of(after)).filter(|(held, after)| held != after).map(|((name, _), _)| name);
-    match followed.collect::<Vec<_>>().join(", ") {
-        none if none.is_empty() => t!("{signal} was set and put back; no input changed with it", signal),
-        inputs => t!("{signal} was set and put back; with it changed {inputs}", signal, inputs),
-    }
+/// How the signals stood while one was held and afterwards; `None` where they were never seen.
+pub(super) fn conclusion(test: &SignalTest, findings: &[Finding]) -> Option<Conclusion> {
+    ends(findings).map(|(held, after)| Conclusion::Signals { test: *test, held, after })
 }
 
 impl Job {

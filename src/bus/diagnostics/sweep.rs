@@ -6,13 +6,12 @@ use super::{Ask, Job, Step};
 use crate::{
     bus::pdu,
     plant::{
-        diagnostics::{DiagnosticState, FINDINGS_MAX, Finding},
+        diagnostics::{Conclusion, DiagnosticState, FINDINGS_MAX, Finding, SweepEnd},
         event::{ExceptionCode, Fault},
         live::AddressSpan,
         number::{to_u16, to_u32},
         sweep::{Sweep, SweptOutcome, SweptRange},
     },
-    t,
 };
 
 /// Blocks in a row without any answer after which a unit that has never answered is given up.
@@ -48,7 +47,7 @@ pub struct SweepJob {
     answered: Option<AddressSpan>,
     silent_blocks: u32,
     ranges: Vec<SweptRange>,
-    ended: Option<String>,
+    ended: Option<SweepEnd>,
 }
 
 impl SweepJob {
@@ -127,11 +126,7 @@ impl SweepJob {
                 if code == ExceptionCode::ILLEGAL_FUNCTION && self.ranges.is_empty() =>
             {
                 self.queue.clear();
-                self.ended = Some(t!(
-                    "the unit refuses function {function} with {code}: it has no such table",
-                    function = self.sweep.table.read_fc(),
-                    code = Fault::Exception(code)
-                ));
+                self.ended = Some(SweepEnd::NoTable { function: self.sweep.table.read_fc(), code });
             }
             (Err(Fault::Exception(code)), Stage::Chunks) if 1 < span.count => {
                 let half = span.count / 2;
@@ -161,7 +156,7 @@ impl SweepJob {
         self.pass_over(fault);
         if self.silent_blocks == SILENT_MAX {
             self.finish_block();
-            self.ended = Some(t!("no answer to {count} blocks: what this unit has is not known", count = SILENT_MAX));
+            self.ended = Some(SweepEnd::Silent(SILENT_MAX));
         }
     }
 
@@ -191,7 +186,7 @@ impl SweepJob {
         self.pass_over(self.silent_fault());
         let address = span.address;
         self.finish_block();
-        self.ended = Some(t!("no more answers, last asked at address {address}: the rest is not known", address));
+        self.ended = Some(SweepEnd::FellSilent(address));
     }
 
     /// Addresses of the block at work.
@@ -301,10 +296,7 @@ impl SweepJob {
     }
 
     /// What all of it shows.
-    pub fn conclusion(&self) -> String {
-        if let (Some(ended), true) = (&self.ended, self.ranges.is_empty()) {
-            return ended.clone();
-        }
+    pub fn conclusion(&self) -> Conclusion {
         let of = |wanted: fn(&SweptOutcome) -> bool| {
             let ranges = self.ranges.iter().filter(|range| wanted(&range.outcome));
             ranges.fold((0u32, 0u32), |(count, all), range| (count + 1, all + u32::from(range.last - range.first) + 1))
@@ -312,31 +304,8 @@ impl SweepJob {
         let (ranges, answers) = of(|outcome| matches!(outcome, SweptOutcome::Answers));
         let (_, refused) = of(|outcome| matches!(outcome, SweptOutcome::Refused(_)));
         let (_, silent) = of(|outcome| matches!(outcome, SweptOutcome::Silent(_)));
-        let every = self.sweep.every;
-        let mut words = match (answers, refused, silent) {
-            (0, 0, _) => t!("nothing answers, and nothing is refused: what this unit has is not known").to_owned(),
-            (0, _, 0) => t!("nothing but exceptions: no address that was asked can be read").to_owned(),
-            (0, ..) => t!("nothing can be read; {refused} are refused, {silent} silent", refused, silent),
-            (_, 0, 0) => t!("all {answers} answer: this unit does not say what it does not have", answers),
-            (_, _, 0) => t!("{answers} answer in {ranges} ranges, {refused} are refused", answers, ranges, refused),
-            (..) => t!(
-                "{answers} answer in {ranges} ranges, {refused} are refused, {silent} silent",
-                answers,
-                ranges,
-                refused,
-                silent
-            ),
-        };
-        if 0 < refused && 1 < every {
-            words += &t!("; a refused block was asked at every {every}th address", every);
-        }
-        if FINDINGS_MAX <= self.ranges.len() {
-            words += &t!("; only the first {count} ranges are listed", count = FINDINGS_MAX - 1);
-        }
-        match &self.ended {
-            Some(ended) => format!("{ended}; {words}"),
-            None => words,
-        }
+        let (ended, every, cut) = (self.ended, self.sweep.every, FINDINGS_MAX <= self.ranges.len());
+        Conclusion::Sweep { ended, ranges, answers, refused, silent, every, cut }
     }
 }
 

@@ -6,7 +6,13 @@ use crate::plant::{
     def::Framing,
     event::ExceptionCode,
 };
-use crate::plant::{diagnostics::Scan, port_signals::SignalTest};
+use crate::{
+    bus::names,
+    plant::{
+        diagnostics::{PatternTally, Scan},
+        port_signals::SignalTest,
+    },
+};
 
 /// Runs a diagnostic against a device given as a function from request to answer.
 fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> DiagnosticRun {
@@ -36,9 +42,9 @@ fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>)
     panic!("it never ends")
 }
 
-fn verdict(run: &DiagnosticRun) -> &str {
+fn verdict(run: &DiagnosticRun) -> String {
     match run.findings.last() {
-        Some(Finding::Conclusion(words)) => words,
+        Some(Finding::Conclusion(conclusion)) => conclusion.to_string(),
         other => panic!("no verdict but {other:?}"),
     }
 }
@@ -57,11 +63,12 @@ fn a_scan_finds_who_answers_and_who_refuses() {
         .findings
         .iter()
         .filter_map(|finding| match finding {
-            Finding::Unit { unit, words, register, .. } => Some((*unit, words.as_str(), *register)),
+            Finding::Unit { unit, reply, .. } => Some((*unit, reply.to_string(), reply.register())),
             _ => None,
         })
         .collect();
-    assert_eq!(units, [(3, "register 0 = 77", Some(77)), (17, "exception 02, illegal data address", None)]);
+    let [register, refused] = ["register 0 = 77", "exception 02, illegal data address"].map(str::to_owned);
+    assert_eq!(units, [(3, register, Some(77)), (17, refused, None)]);
     assert_eq!(verdict(&found), "2 answers");
 }
 
@@ -88,12 +95,12 @@ fn a_foreign_unit_that_chatters_is_not_every_unit() {
     let units = |run: &DiagnosticRun| run.findings.iter().filter(|found| matches!(found, Finding::Unit { .. })).count();
     assert_eq!(units(&scan(4)), 4, "a few may be units with other settings");
     let many = scan(20);
-    assert_eq!((units(&many), verdict(&many)), (1, "1 answer"));
+    assert_eq!((units(&many), verdict(&many).as_str()), (1, "1 answer"));
     let text = many.findings.iter().find_map(|finding| match finding {
-        Finding::Failed { what, .. } => Some(what.as_str()),
+        Finding::Failed { what, .. } => Some(what.to_string()),
         _ => None,
     });
-    assert_eq!(text, Some("19 addresses: something else talks on this line"));
+    assert_eq!(text.as_deref(), Some("19 addresses: something else talks on this line"));
 }
 
 #[test]
@@ -112,9 +119,10 @@ fn loopbacks_are_counted() {
 fn patterns_are_counted_and_a_plug_is_recognised() {
     let plug = run(Diagnostic::Pattern { bits: 8, count: 6 }, |_| Err(Fault::Timeout));
     assert!(verdict(&plug).starts_with("every byte came back"), "{}", verdict(&plug));
-    let total = Finding::Conclusion(
-        "192 bytes sent, 192 received: 0 wrong, 0 missing, 0 more than sent; 0.0 % faults".to_owned(),
-    );
+    let total = PatternTally { sent: 192, received: 192, ..PatternTally::default() };
+    let words = "192 bytes sent, 192 received: 0 wrong, 0 missing, 0 more than sent; 0.0 % faults";
+    assert_eq!(total.to_string(), words);
+    let total = Finding::Conclusion(Conclusion::Patterns(total));
     assert_eq!((plug.done, plug.findings.contains(&total)), (6, true), "{:?}", plug.findings);
 }
 
@@ -135,7 +143,7 @@ fn an_identification_in_pieces_is_asked_to_its_end() {
         .findings
         .iter()
         .filter_map(|finding| match finding {
-            Finding::Object { name, text } => Some(format!("{name} {text}")),
+            Finding::Object { id, text } => Some(format!("{} {text}", names::identity(*id))),
             _ => None,
         })
         .collect();
@@ -148,7 +156,7 @@ fn a_device_without_identification_is_asked_for_its_server_id() {
         0x11 => Ok(vec![1, 0x11, 3, b'X', 0xFF, b'Y']),
         _ => Err(Fault::Exception(ExceptionCode(1))),
     });
-    let server = Finding::Object { name: "ServerId".into(), text: "X\\xFFY".into() };
+    let server = Finding::Object { id: None, text: "X\\xFFY".into() };
     assert!(found.findings.contains(&server), "{:?}", found.findings);
 }
 

@@ -5,9 +5,10 @@ use crate::{
     bus::{
         ascii,
         frame::{self, Mbap, hex},
-        names::counted,
+        names::{Counted, counted},
     },
     plant::{event::Fault, line::Framing},
+    t,
 };
 
 /// A message and what stood around it.
@@ -68,13 +69,14 @@ fn rtu(bytes: &[u8]) -> Envelope {
     };
     let computed = frame::crc16(message).to_le_bytes();
     // As the bytes stand on the wire, low byte first.
-    let fault = (*check != computed).then(|| format!("CRC error: got {}, computed {}", hex(check), hex(&computed)));
+    let fault = (*check != computed)
+        .then(|| t!("CRC error: got {got}, computed {computed}", got = hex(check), computed = hex(&computed)));
     let words = match fault {
-        None => "right".to_owned(),
+        None => t!("right").to_owned(),
         Some(_) if computed == [check[1], check[0]] => {
-            format!("bytes swapped: {} is right, low byte first", hex(&computed))
+            t!("bytes swapped: {computed} is right, low byte first", computed = hex(&computed))
         }
-        Some(_) => format!("wrong, computed {}", hex(&computed)),
+        Some(_) => t!("wrong, computed {computed}", computed = hex(&computed)),
     };
     let after = vec![Field { range: message.len()..bytes.len(), hex: hex(check), name: "CRC".into(), words }];
     Envelope { framing, after, fault, ..bare(message) }
@@ -95,37 +97,44 @@ fn in_ascii(bytes: &[u8]) -> Envelope {
     let mut fault = fault.map(|fault| fault.to_string());
     let mut before = Vec::new();
     if start == 1 {
-        before.push(field(0, 1, "start", "`:` begins an ASCII frame".into()));
+        before.push(field(0, 1, t!("start"), t!("`:` begins an ASCII frame").into()));
     } else {
-        fault = Some("no `:` at the beginning".into());
+        fault = Some(t!("no `:` at the beginning").into());
     }
     let mut after = Vec::new();
     let message = match ascii::decode(&bytes[start..end]) {
         Ok(mut message) => {
             if let Some(got) = message.pop() {
                 let computed = ascii::lrc(&message);
-                let words = if got == computed { "right".into() } else { format!("wrong, computed {computed:02X}") };
+                let words = match got == computed {
+                    true => t!("right").into(),
+                    false => t!("wrong, computed {computed}", computed = format!("{computed:02X}")),
+                };
                 after.push(Field { hex: format!("{got:02X}"), ..field(end - 2, end, "LRC", words) });
             }
             message
         }
         Err(why) => {
             is_cut = false;
-            after.push(field(start, end, "digits", format!("\"{}\"", bytes[start..end].escape_ascii())));
+            after.push(field(start, end, t!("digits"), format!("\"{}\"", bytes[start..end].escape_ascii())));
             fault = Some(match bytes[start..end].iter().position(|digit| !digit.is_ascii_hexdigit()) {
                 Some(at) => {
-                    format!("`{}` at character {} is not a hex digit", bytes[start + at].escape_ascii(), start + at + 1)
+                    t!(
+                        "`{found}` at character {number} is not a hex digit",
+                        found = bytes[start + at].escape_ascii(),
+                        number = start + at + 1
+                    )
                 }
-                None => format!("odd count of hex digits: {}", why),
+                None => t!("odd count of hex digits: {why}", why),
             });
             Vec::new()
         }
     };
     if end < bytes.len() {
         let right = &bytes[end..] == b"\r\n";
-        after.push(field(end, bytes.len(), "end", if right { "CR LF" } else { "must be CR LF" }.into()));
+        after.push(field(end, bytes.len(), t!("end"), if right { "CR LF" } else { t!("must be CR LF") }.into()));
     } else if before.len() == 1 && is_cut {
-        fault = Some("CR LF missing at the end".into());
+        fault = Some(t!("CR LF missing at the end").into());
     }
     Envelope { framing, message, offset: start, step: 2, before, after, fault }
 }
@@ -144,20 +153,27 @@ fn mbap(bytes: &[u8]) -> Envelope {
     };
     let (protocol, length, follow) = (word(2), usize::from(word(4)), bytes.len() - 6);
     let before = vec![
-        field(0, "transaction", format!("{}, the answer repeats it", word(0))),
-        field(2, "protocol", if protocol == 0 { "0, Modbus".into() } else { format!("{protocol}, must be 0") }),
+        field(0, t!("transaction"), t!("{number}, the answer repeats it", number = word(0))),
+        field(
+            2,
+            t!("protocol"),
+            if protocol == 0 { "0, Modbus".into() } else { t!("{protocol}, must be 0", protocol) },
+        ),
         field(
             4,
-            "length",
-            if length == follow { format!("{length} bytes follow") } else { format!("says {length}, {follow} follow") },
+            t!("length"),
+            match length == follow {
+                true => t!("{count} bytes follow", count = length),
+                false => t!("says {length}, {follow} follow", length, follow),
+            },
         ),
     ];
     let fault = if protocol != 0 {
-        Some(format!("MBAP protocol {protocol}, expected 0"))
+        Some(t!("MBAP protocol {protocol}, expected 0", protocol))
     } else if length != follow {
-        Some(format!("MBAP length says {length}, {follow} bytes follow"))
+        Some(t!("MBAP length says {length}, {follow} bytes follow", length, follow))
     } else if frame::MESSAGE_MAX < length {
-        Some(format!("MBAP length {length}, at most {} is allowed", frame::MESSAGE_MAX))
+        Some(t!("MBAP length {length}, at most {most} is allowed", length, most = frame::MESSAGE_MAX))
     } else {
         None
     };
@@ -165,5 +181,5 @@ fn mbap(bytes: &[u8]) -> Envelope {
 }
 
 fn too_short(got: usize, least: usize) -> String {
-    format!("too short for a frame: {}, the shortest has {least}", counted(got, "byte"))
+    t!("too short for a frame: {bytes}, the shortest has {least}", bytes = counted(got, Counted::Bytes), least)
 }

@@ -4,9 +4,15 @@ use super::{
     Direction,
     reader::{Reader, hex_words, text},
 };
-use crate::bus::{
-    names::{self, counted, place},
-    pdu::{Item, MEI_IDENTIFICATION},
+use crate::{
+    bus::{
+        frame::hex,
+        names::{self, Counted, counted, place},
+        pdu::{Item, MEI_IDENTIFICATION},
+        request_lint::coil_value_words,
+    },
+    t,
+    text::translate,
 };
 
 /// What the fields of one message hold.
@@ -52,7 +58,7 @@ impl<'r, 'a> Fields<'r, 'a> {
                 Item::ByteCount => self.byte_count(items.get(index + 1).copied())?,
                 Item::MeiType if self.mei_type()? != MEI_IDENTIFICATION => {
                     let left = self.reader.left();
-                    self.reader.bytes("data", left, text)?;
+                    self.reader.bytes(t!("data"), left, text)?;
                     break;
                 }
                 Item::MeiType => {}
@@ -65,15 +71,15 @@ impl<'r, 'a> Fields<'r, 'a> {
     fn item(&mut self, item: Item) -> Option<()> {
         let function = self.function;
         match item {
-            Item::Address(prefix) => {
-                let address = self.reader.word(&format!("{prefix}address"), |address| place(function, address))?;
+            Item::Address(name) => {
+                let address = self.reader.word(translate(name), |address| place(function, address))?;
                 self.start = Some(address);
                 self.values.blocks.push((address, 1));
             }
-            Item::Count { prefix, verb, .. } => {
-                let kind = if names::table(function).is_bits() { "bit" } else { "register" };
-                let label = |count: u16| format!("{} {verb}", counted(count.into(), kind));
-                let count = self.reader.word(&format!("{prefix}count"), label)?;
+            Item::Count { name, verb, .. } => {
+                let kind = if names::table(function).is_bits() { Counted::Bits } else { Counted::Registers };
+                let label = |count: u16| format!("{} {}", counted(count.into(), kind), translate(verb));
+                let count = self.reader.word(translate(name), label)?;
                 (self.count, self.counts) = (Some(count), true);
                 self.values.blocks.last_mut()?.1 = count;
             }
@@ -81,11 +87,13 @@ impl<'r, 'a> Fields<'r, 'a> {
             Item::Register => {
                 self.values.registers = self.reader.registers(function, self.start, 1)?;
             }
-            Item::Byte(name, label) => self.values.numbers.push(self.reader.byte(name, label)?.into()),
-            Item::Word(name, label) => self.number(name, label)?,
+            Item::Byte(name, label) => self.values.numbers.push(self.reader.byte(translate(name), label)?.into()),
+            Item::Word(name, label) => self.number(translate(name), label)?,
             Item::OrMask => {
                 let and = self.values.numbers.last().copied().unwrap_or_default();
-                self.number("OR mask", |mask| format!("sets {:016b} of the others", mask & !and))?;
+                self.number(t!("OR mask"), |mask| {
+                    t!("sets {bits} of the others", bits = format!("{:016b}", mask & !and))
+                })?;
             }
             Item::Data => self.data()?,
             Item::Bits => {
@@ -97,27 +105,27 @@ impl<'r, 'a> Fields<'r, 'a> {
                 self.values.registers = self.reader.registers(function, self.start, count.min(self.bytes / 2))?;
             }
             Item::WordCount => {
-                self.bytes = self.reader.word("byte count", |count| format!("{count} bytes follow"))?.into();
+                self.bytes = self.reader.word(t!("byte count"), |count| t!("{count} bytes follow", count))?.into();
             }
             Item::FifoCount => self.fifo_count()?,
             Item::Events => {
                 if self.bytes < 6 {
-                    self.reader.wrong(format!("byte count says {}, expected 6 or more", self.bytes));
+                    self.reader.wrong(t!("byte count says {got}, expected 6 or more", got = self.bytes));
                 }
                 let count = self.bytes.saturating_sub(6);
-                self.reader.bytes("events", count, |_| "one byte per event, latest first".into())?;
+                self.reader.bytes(t!("events"), count, |_| t!("one byte per event, latest first").into())?;
             }
             Item::ServerId => {
-                let label = |bytes: &[u8]| format!("{}, run state FF on, 00 off", text(bytes));
-                let id = self.reader.bytes("id and run", self.bytes, label)?;
+                let label = |bytes: &[u8]| t!("{text}, run state FF on, 00 off", text = text(bytes));
+                let id = self.reader.bytes(t!("id and run"), self.bytes, label)?;
                 self.values.parts.push(text(id));
             }
             Item::FileRequests | Item::FileWrites | Item::FileRecords => self.groups(item)?,
             Item::NextObject => {
                 let more = self.values.numbers.last() != Some(&0);
-                self.reader.byte("next object", |id| match more {
-                    false => "none".into(),
-                    true => format!("ask on from {id} {}", names::object(id)),
+                self.reader.byte(t!("next object"), |id| match more {
+                    false => t!("none").into(),
+                    true => t!("ask on from {id} {object}", id, object = names::object(id)),
                 })?;
             }
             Item::Objects => self.objects()?,
@@ -134,10 +142,10 @@ impl<'r, 'a> Fields<'r, 'a> {
     }
 
     fn coil_state(&mut self) -> Option<()> {
-        let label = |value| coil_state(value).unwrap_or("neither on (FF00) nor off (0000)").into();
-        let value = self.reader.word("value", label)?;
+        let label = |value| coil_state(value).unwrap_or(t!("neither on (FF00) nor off (0000)")).into();
+        let value = self.reader.word(t!("value"), label)?;
         if coil_state(value).is_none() {
-            self.reader.wrong(format!("coil value {value:04X}, expected FF00 (on) or 0000 (off)"));
+            self.reader.wrong(coil_value_words(value));
         }
         self.values.numbers.push(value);
         Some(())
@@ -145,10 +153,12 @@ impl<'r, 'a> Fields<'r, 'a> {
 
     /// The count of a queue must fit the byte count before it.
     fn fifo_count(&mut self) -> Option<()> {
-        self.number("FIFO count", |count| format!("{} queued", counted(count.into(), "register")))?;
+        self.number(t!("FIFO count"), |count| {
+            t!("{registers} queued", registers = counted(count.into(), Counted::Registers))
+        })?;
         let count = usize::from(*self.values.numbers.last()?);
         if self.bytes != 2 + 2 * count {
-            self.reader.wrong(format!("byte count says {}, {} fit", self.bytes, 2 + 2 * count));
+            self.reader.wrong(t!("byte count says {got}, {expected} fit", got = self.bytes, expected = 2 + 2 * count));
         }
         (self.start, self.bytes) = (None, 2 * count);
         Some(())
@@ -156,7 +166,7 @@ impl<'r, 'a> Fields<'r, 'a> {
 
     /// The byte count must fit what `next` needs.
     fn byte_count(&mut self, next: Option<Item>) -> Option<()> {
-        self.bytes = usize::from(self.reader.byte("byte count", follow)?);
+        self.bytes = usize::from(self.reader.byte(t!("byte count"), follow)?);
         let bytes = self.bytes;
         let expected = match (&next, self.count.map(usize::from)) {
             (Some(Item::Bits), Some(count)) => count.div_ceil(8),
@@ -164,9 +174,9 @@ impl<'r, 'a> Fields<'r, 'a> {
             _ => bytes,
         };
         if bytes != expected {
-            self.reader.wrong(format!("byte count says {bytes}, {expected} fit"));
+            self.reader.wrong(t!("byte count says {got}, {expected} fit", got = bytes, expected));
         } else if matches!(next, Some(Item::Registers)) && bytes % 2 == 1 {
-            self.reader.wrong(format!("byte count {bytes} is odd, registers have two bytes"));
+            self.reader.wrong(t!("byte count {bytes} is odd, registers have two bytes", bytes));
         }
         Some(())
     }
@@ -175,21 +185,21 @@ impl<'r, 'a> Fields<'r, 'a> {
     fn data(&mut self) -> Option<()> {
         let words = |bytes: &[u8]| match bytes {
             [high, low] => u16::from_be_bytes([*high, *low]).to_string(),
-            [..] => counted(bytes.len(), "byte"),
+            [..] => counted(bytes.len(), Counted::Bytes),
         };
-        let name = if self.direction == Direction::Request { "data" } else { "result" };
+        let name = if self.direction == Direction::Request { t!("data") } else { t!("result") };
         let count = self.reader.left().max(2);
         let bytes = self.reader.bytes(name, count, words)?;
-        self.values.parts.push(format!("{name} {}", crate::bus::frame::hex(bytes)));
+        self.values.parts.push(format!("{name} {}", hex(bytes)));
         Some(())
     }
 
     /// The kind of an encapsulated transport.
     fn mei_type(&mut self) -> Option<u8> {
-        self.reader.byte("MEI type", |kind| match kind {
+        self.reader.byte(t!("MEI type"), |kind| match kind {
             0x0D => "13 / 0x0D CANopen".into(),
-            0x0E => "14 / 0x0E read device identification".into(),
-            _ => format!("{kind} / 0x{kind:02X} unknown"),
+            0x0E => t!("14 / 0x0E read device identification").into(),
+            _ => t!("{code} unknown", code = names::code(kind)),
         })
     }
 
@@ -207,7 +217,7 @@ impl<'r, 'a> Fields<'r, 'a> {
 
     /// Length, reference type and registers.
     fn file_record(&mut self) -> Option<String> {
-        let length = usize::from(self.reader.byte("group length", follow)?);
+        let length = usize::from(self.reader.byte(t!("group length"), follow)?);
         self.reference()?;
         Some(hex_words(&self.reader.registers(0x03, None, length.saturating_sub(1) / 2)?))
     }
@@ -215,28 +225,31 @@ impl<'r, 'a> Fields<'r, 'a> {
     /// Reference type, file, record and length; and the registers to write.
     fn file_group(&mut self, with_data: bool) -> Option<String> {
         self.reference()?;
-        let file = self.reader.word("file", |file| format!("file {file}"))?;
-        let record = self.reader.word("record", |record| format!("from record {record}"))?;
-        let length = self.reader.word("length", |length| counted(length.into(), "register"))?;
+        let file = self.reader.word(t!("file"), |file| t!("file {file}", file))?;
+        let record = self.reader.word(t!("record"), |record| t!("from record {record}", record))?;
+        let length = self.reader.word(t!("length"), |length| counted(length.into(), Counted::Registers))?;
         let registers = if with_data { usize::from(length) } else { 0 };
         let data = hex_words(&self.reader.registers(0x03, None, registers)?);
         let data = if data.is_empty() { String::new() } else { format!(": {data}") };
-        Some(format!("file {file} record {record}, {}{data}", counted(length.into(), "register")))
+        let count = counted(length.into(), Counted::Registers);
+        Some(t!("file {file} record {record}, {count}{data}", file, record, count, data))
     }
 
     fn reference(&mut self) -> Option<()> {
-        let kind = self.reader.byte("reference", |kind| if kind == 6 { "file record" } else { "must be 06" }.into())?;
+        let kind = self
+            .reader
+            .byte(t!("reference"), |kind| if kind == 6 { t!("file record") } else { t!("must be 06") }.into())?;
         if kind != 6 {
-            self.reader.wrong(format!("reference type {kind:02X}, expected 06"));
+            self.reader.wrong(t!("reference type {kind}, expected 06", kind = format!("{kind:02X}")));
         }
         Some(())
     }
 
     fn objects(&mut self) -> Option<()> {
-        let count = self.reader.byte("objects", |count| counted(count.into(), "object"))?;
+        let count = self.reader.byte(t!("objects"), |count| counted(count.into(), Counted::Objects))?;
         for _ in 0..count {
-            let id = self.reader.byte("object", |id| format!("{id} {}", names::object(id)))?;
-            let length = self.reader.byte("length", |length| counted(length.into(), "byte"))?;
+            let id = self.reader.byte(t!("object"), |id| format!("{id} {}", names::object(id)))?;
+            let length = self.reader.byte(t!("length"), |length| counted(length.into(), Counted::Bytes))?;
             let value = self.reader.bytes(names::object(id), length.into(), text)?;
             self.values.parts.push(format!("{} {}", names::object(id), text(value)));
         }
@@ -247,15 +260,15 @@ impl<'r, 'a> Fields<'r, 'a> {
 /// `on` or `off`; `None` for any other value of a coil.
 pub(super) fn coil_state(value: u16) -> Option<&'static str> {
     match value {
-        0x0000 => Some("off"),
-        0xFF00 => Some("on"),
+        0x0000 => Some(t!("off")),
+        0xFF00 => Some(t!("on")),
         _ => None,
     }
 }
 
 fn follow(count: u8) -> String {
     match count {
-        1 => "1 byte follows".into(),
-        _ => format!("{count} bytes follow"),
+        1 => t!("1 byte follows").into(),
+        _ => t!("{count} bytes follow", count),
     }
 }

@@ -57,22 +57,12 @@ pub struct Dissection {
     pub fields: Vec<Field>,
     /// One line: `unit 1 read holding registers 41003–41012 (0x03EA, 10)`.
     pub summary: String,
+    /// The same without the unit.
+    pub what: String,
     /// The first thing that is wrong.
     pub wrong: Option<String>,
     /// What else these bytes may be: the other reading, or why both are the same.
     pub also: Option<String>,
-}
-
-impl Dissection {
-    /// The summary in at most `width` characters; cut between words, so that no number is cut.
-    pub fn brief(&self, width: usize) -> String {
-        if self.summary.chars().count() <= width {
-            return self.summary.clone();
-        }
-        let room: String = self.summary.chars().take(width.saturating_sub(1)).collect();
-        let kept = room.rsplit_once(' ').map_or("", |(kept, _)| kept);
-        if width == 0 { String::new() } else { format!("{kept} …").trim_start().to_owned() }
-    }
 }
 
 /// Decodes a frame. Framing and direction are recognised if they are not given. `asked` is the request message (unit
@@ -117,6 +107,7 @@ pub fn dissect(
         message: envelope.message,
         fields,
         summary: reading.summary,
+        what: reading.what,
         wrong,
         also,
     }
@@ -149,6 +140,7 @@ pub fn request_of<'a>(answer: &Frame, before: impl Iterator<Item = &'a Frame>) -
 struct Reading {
     fields: Vec<Field>,
     summary: String,
+    what: String,
     trouble: Option<String>,
     fits: bool,
     /// No device would refuse its counts and values.
@@ -171,10 +163,10 @@ impl Readings {
         let same = match message.get(1) {
             Some(code @ 0..=0x7F) => match pdu::function(*code) {
                 Some(function) if function.echoes => {
-                    Some("the response repeats the request: these bytes may be either")
+                    Some(t!("the response repeats the request: these bytes may be either"))
                 }
                 Some(_) => None,
-                None => Some("not a standard function: request and response look the same"),
+                None => Some(t!("not a standard function: request and response look the same")),
             },
             Some(_) | None => None,
         };
@@ -201,11 +193,11 @@ impl Readings {
             (Some(Direction::Answer), ..) => (known, answer, None),
             (None, true, true) if same.is_some() => (None, request, same.map(str::to_owned)),
             (None, true, true) if !request.sound => {
-                let also = format!("a request: {}", request.summary);
+                let also = t!("a request: {summary}", summary = request.summary);
                 (Some(Direction::Answer), answer, Some(also))
             }
             (None, true, true) => {
-                let also = format!("an answer: {}", answer.summary);
+                let also = t!("an answer: {summary}", summary = answer.summary);
                 (Some(Direction::Request), request, Some(also))
             }
             (None, true, false) => (Some(Direction::Request), request, None),
@@ -218,46 +210,57 @@ impl Readings {
 
 fn read(message: &[u8], mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Reading {
     let mut reader = Reader::new(message);
-    let summary = read_message(&mut reader, mbap, direction, asked);
+    let read = read_message(&mut reader, mbap, direction, asked);
     let (fits, sense) = (reader.fits(), reader.sense());
     let sound = request_lint::check_request(message, Framing::Mbap).is_empty();
     reader.finish();
-    let summary = summary.unwrap_or_else(|| match message {
-        [unit, function, ..] => format!("unit {unit} {}, cut short", function_name(*function)),
-        [] | [_] => format!("no frame: {}", frame::hex(message)).trim_end_matches(": ").to_owned(),
+    let (what, to) = read.unwrap_or_else(|| match message {
+        [unit, function, ..] => (t!("{function}, cut short", function = function_name(*function)), Some(*unit)),
+        [] => (t!("no frame").to_owned(), None),
+        [_] => (t!("no frame: {bytes}", bytes = frame::hex(message)), None),
     });
-    Reading { fields: reader.fields, summary, trouble: reader.trouble, fits, sound, sense }
+    let summary = to.map_or_else(|| what.clone(), |unit| t!("unit {unit} {what}", unit, what));
+    Reading { fields: reader.fields, summary, what, trouble: reader.trouble, fits, sound, sense }
 }
 
-fn read_message(reader: &mut Reader, mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Option<String> {
-    let unit = reader.byte("unit", |unit| unit_words(unit, mbap))?;
-    let function = reader.byte("function", |code| match code {
-        0x80.. => format!("{code} / 0x{code:02X}: exception to {}", function_words(code & 0x7F)),
+/// What the message says, and the one unit that it goes to.
+fn read_message(
+    reader: &mut Reader,
+    mbap: bool,
+    direction: Direction,
+    asked: Option<&[u8]>,
+) -> Option<(String, Option<u8>)> {
+    let unit = reader.byte(t!("unit"), |unit| unit_words(unit, mbap))?;
+    let function = reader.byte(t!("function"), |code| match code {
+        0x80.. => {
+            t!("{code}: exception to {function}", code = names::code(code), function = function_words(code & 0x7F))
+        }
         _ => function_words(code),
     })?;
     let what = summary::read(reader, function, direction, asked)?;
     Some(match direction {
-        Direction::Answer => what,
-        Direction::Request if unit == 0 && !mbap => format!("broadcast {what}"),
-        Direction::Request => format!("unit {unit} {what}"),
+        Direction::Answer => (what, None),
+        Direction::Request if unit == 0 && !mbap => (t!("broadcast {what}", what), None),
+        Direction::Request => (what, Some(unit)),
     })
 }
 
 fn unit_words(unit: u8, mbap: bool) -> String {
     match unit {
-        0 | 255 if mbap => format!("{unit}, the device itself, no gateway"),
-        0 => "0, broadcast: all execute, none responds".into(),
+        0 | 255 if mbap => t!("{unit}, the device itself, no gateway", unit),
+        0 => t!("0, broadcast: all execute, none responds").into(),
         1..=247 => format!("{unit}"),
         248..=255 if mbap => format!("{unit}"),
-        248..=255 => format!("{unit}, reserved on serial lines (1–247)"),
+        248..=255 => t!("{unit}, reserved on serial lines (1–247)", unit),
     }
 }
 
 /// `3 / 0x03 read holding registers`.
 pub fn function_words(code: u8) -> String {
-    format!("{code} / 0x{code:02X} {}", translate(names::function(code).unwrap_or(t!("not in the standard"))))
+    format!("{} {}", names::code(code), translate(names::function(code).unwrap_or(t!("not in the standard"))))
 }
 
 fn function_name(code: u8) -> String {
-    names::function(code & 0x7F).map_or_else(|| format!("function {code} / 0x{code:02X}"), str::to_owned)
+    let known = names::function(code & 0x7F).map(|name| translate(name).to_owned());
+    known.unwrap_or_else(|| t!("function {code}", code = names::code(code)))
 }

@@ -4,8 +4,12 @@ use std::ops::Range;
 
 use super::Field;
 use crate::{
-    bus::{frame, names},
+    bus::{
+        frame,
+        names::{self, Counted},
+    },
     plant::{number::to_u16, visible::is_control_or_bidi},
+    t,
 };
 
 /// The reading of one message as a request or as an answer.
@@ -70,7 +74,7 @@ impl<'a> Reader<'a> {
                     let address = start.saturating_add(to_u16(index));
                     format!("{} / 0x{address:04X}", names::modicon(function, address))
                 }
-                None => format!("register {}", index + 1),
+                None => t!("register {number}", number = index + 1),
             };
             values.push(self.word(&name, number)?);
         }
@@ -85,15 +89,15 @@ impl<'a> Reader<'a> {
             let of_byte = (count - first).min(8);
             let name = match start {
                 Some(start) => names::span(function, start.saturating_add(to_u16(first)), to_u16(of_byte)),
-                None if of_byte == 1 => format!("bit {}", first + 1),
-                None => format!("bits {}–{}", first + 1, first + of_byte),
+                None if of_byte == 1 => t!("bit {number}", number = first + 1),
+                None => t!("bits {first}–{last}", first = first + 1, last = first + of_byte),
             };
             let (range, bytes) = self.take(1, &name)?;
             let bits: Vec<bool> = (0..of_byte).map(|bit| bytes[0] >> bit & 1 == 1).collect();
             let digits: Vec<&str> = bits.iter().map(|on| if *on { "1" } else { "0" }).collect();
             let mut words = digits.join(" ");
             if first == 0 && 1 < of_byte {
-                words += "  (lowest address first)";
+                words += t!("  (lowest address first)");
             }
             self.name(range, name, words);
             values.extend(bits);
@@ -113,16 +117,20 @@ impl<'a> Reader<'a> {
         if left == 0 {
             return;
         }
-        let words = if self.trouble.is_none() { "does not belong to this message" } else { "unknown" };
-        self.wrong(format!("{} too many", names::counted(left, "byte")));
-        self.name(self.at..self.message.len(), "rest".into(), words.into());
+        let words = if self.trouble.is_none() { t!("does not belong to this message") } else { t!("unknown") };
+        self.wrong(t!("{bytes} too many", bytes = names::counted(left, Counted::Bytes)));
+        self.name(self.at..self.message.len(), t!("rest").into(), words.into());
     }
 
     fn take(&mut self, count: usize, name: &str) -> Option<(Range<usize>, &'a [u8])> {
         let range = self.at..self.at + count;
         let Some(bytes) = self.message.get(range.clone()) else {
             let missing = count - self.left();
-            self.wrong(format!("cut short: {} of {name} missing", names::counted(missing, "byte")));
+            self.wrong(t!(
+                "cut short: {bytes} of {name} missing",
+                bytes = names::counted(missing, Counted::Bytes),
+                name
+            ));
             return None;
         };
         self.at = range.end;
@@ -138,7 +146,7 @@ impl<'a> Reader<'a> {
 /// `0x00C8  200`, and the signed reading where it differs: `0xFFFE  65534 or -2`.
 fn number(value: u16) -> String {
     match value.cast_signed() {
-        signed @ ..0 => format!("0x{value:04X}  {value} or {signed}"),
+        signed @ ..0 => t!("0x{hex}  {value} or {signed}", hex = format!("{value:04X}"), value, signed),
         0.. => format!("0x{value:04X}  {value}"),
     }
 }

@@ -8,10 +8,12 @@ use super::{
 use crate::{
     bus::{
         frame,
-        names::{self, comm_status, counted, modicon, span},
+        names::{self, Counted, comm_status, counted, modicon, span},
         pdu,
     },
     plant::{event::ExceptionCode, number::to_u8},
+    t,
+    text::translate,
 };
 
 /// Reads the fields behind the function code. Gives the summary, without the unit; `None` if the message is cut short.
@@ -20,7 +22,7 @@ pub(super) fn read(reader: &mut Reader, function: u8, direction: Direction, aske
     match (pdu::function(function), direction) {
         (None, Direction::Answer) if 0x80 <= function => exception(reader),
         (None, Direction::Request) if 0x80 <= function => {
-            reader.wrong(format!("function {function} / 0x{function:02X} is an exception, not a request"));
+            reader.wrong(t!("function {code} is an exception, not a request", code = names::code(function)));
             None
         }
         (None, _) => unknown(reader, function),
@@ -34,16 +36,18 @@ pub(super) fn read(reader: &mut Reader, function: u8, direction: Direction, aske
 }
 
 fn exception(reader: &mut Reader) -> Option<String> {
-    let words = |code| format!("{code:02X} {}: {}", ExceptionCode(code).label(), names::advice(code));
-    let code = reader.byte("exception", words)?;
-    Some(format!("exception {code:02X} {}", ExceptionCode(code).label()))
+    let label = |code| format!("{code:02X} {}", translate(ExceptionCode(code).label()));
+    let code = reader.byte("exception", |code| format!("{}: {}", label(code), translate(names::advice(code))))?;
+    // A word of the protocol, the same in every language.
+    Some(format!("exception {}", label(code)))
 }
 
 /// A function that is not in the standard: its bytes as they are.
 fn unknown(reader: &mut Reader, function: u8) -> Option<String> {
     let left = reader.left();
-    let bytes = reader.bytes("data", left, |bytes| counted(bytes.len(), "byte"))?;
-    Some(format!("function {function} / 0x{function:02X}: {}", frame::hex(bytes)).trim_end_matches(": ").into())
+    let bytes = reader.bytes(t!("data"), left, |bytes| counted(bytes.len(), Counted::Bytes))?;
+    let summary = t!("function {code}: {bytes}", code = names::code(function), bytes = frame::hex(bytes));
+    Some(summary.trim_end_matches(": ").into())
 }
 
 /// `41003–41012 (0x03EA, 10)`.
@@ -53,27 +57,38 @@ fn range(function: u8, (address, count): (u16, u16)) -> String {
 
 fn of_request(row: &pdu::Function, values: &Values) -> String {
     let (code, registers) = (row.code, hex_words(&values.registers));
-    let parts = values.parts.join(", ");
+    let (name, parts) = (translate(row.name), values.parts.join(", "));
     match (code, &values.blocks[..], &values.numbers[..]) {
-        (0x01..=0x04, [block], _) => format!("{} {}", row.name, range(code, *block)),
-        (0x05, [(address, _)], _) => format!("write coil {} (0x{address:04X})", written(values, code)),
+        (0x01..=0x04, [block], _) => format!("{name} {}", range(code, *block)),
+        (0x05, [(address, _)], _) => {
+            t!("write coil {written} (0x{hex})", written = written(values, code), hex = hex_words(&[*address]))
+        }
         (0x06, [(address, _)], _) => {
-            format!("write register {} (0x{address:04X}, 0x{registers})", written(values, code))
+            let hex = hex_words(&[*address]);
+            t!("write register {written} (0x{hex}, 0x{registers})", written = written(values, code), hex, registers)
         }
-        (0x08, _, [code, ..]) => format!("diagnostics {}, {parts}", names::diagnostic(*code)),
-        (0x0F, [block], _) => format!("write coils {}: {}", range(code, *block), bit_words(&values.bits)),
-        (0x10, [block], _) => format!("write registers {}: {registers}", range(code, *block)),
-        (0x14 | 0x15, ..) => format!("{} {parts}", row.name),
+        (0x08, _, [code, ..]) => t!("diagnostics {what}, {parts}", what = names::diagnostic(*code), parts),
+        (0x0F, [block], _) => {
+            t!("write coils {range}: {bits}", range = range(code, *block), bits = bit_words(&values.bits))
+        }
+        (0x10, [block], _) => t!("write registers {range}: {registers}", range = range(code, *block), registers),
+        (0x14 | 0x15, ..) => format!("{name} {parts}"),
         (0x16, [(address, _)], [and, or]) => {
-            format!("mask write {} and {and:04X} or {or:04X} (0x{address:04X})", modicon(code, *address))
+            let [and, or, hex] = [*and, *or, *address].map(|word| hex_words(&[word]));
+            t!("mask write {place} and {and} or {or} (0x{hex})", place = modicon(code, *address), and, or, hex)
         }
-        (0x17, [read, write], _) => format!("read {}, write {}: {registers}", range(code, *read), range(code, *write)),
-        (0x18, [(address, _)], _) => format!("read FIFO queue {} (0x{address:04X})", modicon(code, *address)),
+        (0x17, [read, write], _) => {
+            let [read, write] = [*read, *write].map(|block| range(code, block));
+            t!("read {read}, write {write}: {registers}", read, write, registers)
+        }
+        (0x18, [(address, _)], _) => {
+            t!("read FIFO queue {place} (0x{hex})", place = modicon(code, *address), hex = hex_words(&[*address]))
+        }
         (0x2B, _, &[code, object]) => {
             let (what, object) = (names::identification(to_u8(code)), names::object(to_u8(object)));
-            format!("read device identification, {what} from {object}")
+            t!("read device identification, {what} from {object}", what, object)
         }
-        _ => row.name.to_owned(),
+        _ => name.to_owned(),
     }
 }
 
@@ -83,7 +98,7 @@ fn written(values: &Values, function: u8) -> String {
     match (values.registers.first(), values.numbers.first()) {
         (Some(value), _) => format!("{address} = {value}"),
         (None, value) => {
-            format!("{address} {}", value.and_then(|value| coil_state(*value)).unwrap_or("neither on nor off"))
+            format!("{address} {}", value.and_then(|value| coil_state(*value)).unwrap_or(t!("neither on nor off")))
         }
     }
 }
@@ -91,24 +106,28 @@ fn written(values: &Values, function: u8) -> String {
 fn of_response(row: &pdu::Function, values: &Values) -> String {
     let (code, registers) = (row.code, hex_words(&values.registers));
     match (code, &values.numbers[..]) {
-        (0x01 | 0x02, _) => format!("{}: {}", counted(values.bits.len(), "bit"), bit_words(&values.bits)),
-        (0x03 | 0x04 | 0x17, _) => format!("{}: {registers}", counted(values.registers.len(), "register")),
-        (0x05, _) => format!("written: coil {}", written(values, code)),
-        (0x06, _) => format!("written: {}", written(values, code)),
-        (0x07, [status]) => format!("exception status {status:02X} ({status:08b})"),
-        (0x0B, [status, events]) => format!("{}, {events} events", comm_status(*status)),
+        (0x01 | 0x02, _) => format!("{}: {}", counted(values.bits.len(), Counted::Bits), bit_words(&values.bits)),
+        (0x03 | 0x04 | 0x17, _) => format!("{}: {registers}", counted(values.registers.len(), Counted::Registers)),
+        (0x05, _) => t!("written: coil {place}", place = written(values, code)),
+        (0x06, _) => t!("written: {place}", place = written(values, code)),
+        (0x07, [status]) => {
+            let [hex, bits] = [format!("{status:02X}"), format!("{status:08b}")];
+            t!("exception status {hex} ({bits})", hex, bits)
+        }
+        (0x0B, [status, events]) => t!("{status}, {events} events", status = comm_status(*status), events),
         (0x0C, [status, events, messages]) => {
-            format!("{}, {events} events, {messages} messages", comm_status(*status))
+            t!("{status}, {events} events, {messages} messages", status = comm_status(*status), events, messages)
         }
         (0x0F | 0x10, _) => {
-            format!("written: {}", values.blocks.first().map_or_else(String::new, |block| range(code, *block)))
+            let place = values.blocks.first().map_or_else(String::new, |block| range(code, *block));
+            t!("written: {place}", place)
         }
-        (0x11, _) => format!("server id {}", values.parts.join(", ")),
-        (0x14, _) => format!("file records {}", values.parts.join(", ")),
-        (0x15 | 0x16, _) => format!("done: {}", of_request(row, values)),
-        (0x18, [count]) => format!("{count} queued: {registers}"),
+        (0x11, _) => t!("server id {parts}", parts = values.parts.join(", ")),
+        (0x14, _) => t!("file records {parts}", parts = values.parts.join(", ")),
+        (0x15 | 0x16, _) => t!("done: {request}", request = of_request(row, values)),
+        (0x18, [count]) => t!("{count} queued: {registers}", count, registers),
         (0x2B, [_, _, _]) => values.parts.join(", "),
         (0x08, _) => of_request(row, values),
-        _ => row.name.to_owned(),
+        _ => translate(row.name).to_owned(),
     }
 }

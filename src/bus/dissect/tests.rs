@@ -147,15 +147,6 @@ fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
 }
 
 #[test]
-fn a_brief_summary_cuts_no_number() {
-    let dissection = check("01 03 04 00 C8 FF FE", "", "2 registers: 00C8 FFFE");
-    assert_eq!(dissection.brief(22), "2 registers: 00C8 FFFE");
-    assert_eq!(dissection.brief(21), "2 registers: 00C8 …");
-    assert_eq!(dissection.brief(1), "…");
-    assert_eq!(dissection.brief(0), "");
-}
-
-#[test]
 fn an_answer_on_a_line_finds_its_request_before_it() {
     let frame = |sent: bool, message: &[u8], transaction: u16| Frame {
         at: jiff::Timestamp::UNIX_EPOCH,

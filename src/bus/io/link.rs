@@ -45,7 +45,7 @@ use crate::{
         def::{Framing, LineDef},
         event::{ExceptionCode, Fault, FaultKind, LineCounters},
         number::to_u32,
-        traffic::{Exchange, Frame, FrameResult},
+        traffic::{Exchange, Frame, FrameFault, FrameResult},
     },
 };
 

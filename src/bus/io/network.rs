@@ -114,7 +114,7 @@ async fn ask(host: Ipv4Addr, line: &LineDef) -> Option<HostAnswer> {
             }
         }
         let words = job.run().findings.iter().find_map(|finding| match finding {
-            Finding::Unit { words, certain: true, .. } => Some(words.clone()),
+            Finding::Unit { reply, .. } if reply.is_certain() => Some(reply.to_string()),
             _ => None,
         });
         if let Some(words) = words {

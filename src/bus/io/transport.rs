@@ -115,7 +115,7 @@ pub(super) async fn connect(host: &str, port: u16) -> Result<TcpStream, String> 
     let connect = TcpStream::connect((host, port));
     let stream = match tokio::time::timeout(CONNECT_TIMEOUT, connect).await {
         Err(_) => return Err(format!("{host}:{port}: no connection within {} s", CONNECT_TIMEOUT.as_secs())),
-        Ok(Err(error)) => return Err(format!("{host}:{port}: {}", tcp_words(&error))),
+        Ok(Err(error)) => return Err(format!("{host}:{port}{}", tcp_words(&error))),
         Ok(Ok(stream)) => stream,
     };
     // Small frames must not wait for each other.
@@ -140,9 +140,9 @@ fn notice_silence(stream: &TcpStream) -> Result<(), rustix::io::Errno> {
 
 fn tcp_words(error: &io::Error) -> String {
     match error.kind() {
-        io::ErrorKind::ConnectionRefused => "refused (is the device on, is the TCP port right?)".into(),
-        io::ErrorKind::HostUnreachable | io::ErrorKind::NetworkUnreachable => "no route to this address".into(),
-        _ => error.to_string(),
+        io::ErrorKind::ConnectionRefused => ": refused (is the device on, is the TCP port right?)".into(),
+        io::ErrorKind::HostUnreachable | io::ErrorKind::NetworkUnreachable => ": no route to this address".into(),
+        _ => format!(": {error}"),
     }
 }
 

@@ -20,7 +20,7 @@ use crate::{
         def::{Framing, LineDef},
         event::LineCounters,
         number::{to_u16, to_u32},
-        traffic::{FRAMES_MAX, Frame, FrameResult},
+        traffic::{FRAMES_MAX, Frame, FrameFault, FrameResult},
     },
 };
 
@@ -246,7 +246,7 @@ impl Wire {
         self.counters.late += 1;
         self.late.push(unit);
         tracing::debug!(unit, bytes = %frame::hex(frame), "late answer dropped");
-        self.record(false, frame.into(), FrameResult::wrong("late, dropped"));
+        self.record(false, frame.into(), FrameResult::Wrong(FrameFault::Late));
     }
 
     /// So many stray bytes have come.
@@ -295,7 +295,7 @@ impl Wire {
         self.record(
             false,
             bytes.into(),
-            FrameResult::wrong(if late { "late, dropped" } else { "unexpected, dropped" }),
+            FrameResult::Wrong(if late { FrameFault::Late } else { FrameFault::Unexpected }),
         );
     }
 

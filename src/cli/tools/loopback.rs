@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::{UnitArgs, exchange_lines, run};
 use crate::{
-    bus::{diagnostics::PatternTally, frame::hex},
+    bus::{diagnostics::tally_of, frame::hex},
     cli::{CliError, say},
     plant::{
         diagnostics::{Diagnostic, Finding},
@@ -48,7 +48,7 @@ fn lines(finding: &Finding, verbose: bool) -> Vec<String> {
         Finding::Exchange(exchange) if verbose => exchange_lines(exchange),
         Finding::Bytes { bytes, .. } if verbose => vec![format!("RX {}", hex(bytes))],
         Finding::Failed { what, fault } if !verbose => vec![format!("{what}: {fault}")],
-        Finding::Conclusion(words) => vec![words.clone()],
+        Finding::Conclusion(conclusion) => vec![conclusion.to_string()],
         Finding::Exchange(_)
         | Finding::Written(_)
         | Finding::Swept(_)
@@ -72,7 +72,7 @@ fn plug(args: &Args) -> Result<(), CliError> {
     diagnostic.check().map_err(CliError::Usage)?;
     say(&format!("{diagnostic} on {}", line.transport));
     let run = run(&line, diagnostic, |finding| lines(finding, args.of.verbose))?;
-    let (tally, time) = (PatternTally::of_run(&run, bits), elapsed(run.started, Timestamp::now()).as_secs_f64());
+    let (tally, time) = (tally_of(&run, bits), elapsed(run.started, Timestamp::now()).as_secs_f64());
     let rate = tally.received as f64 / time.max(0.001);
     say(&format!("{time:.1} s, {rate:.0} bytes a second with the pauses between the patterns"));
     match tally.faults() {

@@ -210,7 +210,8 @@ pub async fn search(
     let work = testing::run(line, job, |run: &DiagnosticRun| {
         let found = found(run);
         if 1 < run.total {
-            show_progress(&format!("{} of {}  {}", run.done, run.total, run.now));
+            let now = run.now.map(|now| now.to_string()).unwrap_or_default();
+            show_progress(&format!("{} of {}  {now}", run.done, run.total));
         }
         !found
     });

@@ -2,7 +2,7 @@
 
 use super::{UnitArgs, exchange_lines, run};
 use crate::{
-    bus::interpret,
+    bus::{interpret, names},
     cli::{CliError, say},
     plant::{
         diagnostics::{Diagnostic, Finding},
@@ -33,7 +33,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     };
     let run = run(&line, diagnostic, |finding| match finding {
         Finding::Exchange(exchange) if args.of.verbose => exchange_lines(exchange),
-        Finding::Object { name, text } => vec![format!("{name:20}  {text}")],
+        Finding::Object { id, text } => vec![format!("{:20}  {text}", names::identity(*id))],
         Finding::Values { table, address, words } => value_lines(*table, *address, words),
         Finding::Failed { what, fault } => vec![format!("{what}: {fault}")],
         Finding::Exchange(_)

@@ -65,11 +65,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
 /// What a scan has found, in words.
 pub fn describe(finding: &Finding) -> Vec<String> {
     match finding {
-        Finding::Unit { unit, serial, words, .. } => {
+        Finding::Unit { unit, serial, reply } => {
             let settings = serial.map(|serial| format!(" at {serial}")).unwrap_or_default();
-            vec![format!("unit {unit:3}{settings}: {words}")]
+            vec![format!("unit {unit:3}{settings}: {reply}")]
         }
-        Finding::Conclusion(words) => vec![words.clone()],
+        Finding::Conclusion(conclusion) => vec![conclusion.to_string()],
         Finding::Failed { what, fault } => vec![format!("{what} ({fault})")],
         Finding::Exchange(_)
         | Finding::Written(_)

@@ -13,6 +13,7 @@ use crate::plant::{
     scale,
     tag::{Decimals, TagDef},
 };
+use crate::t;
 
 /// One write of a plan.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,31 +30,31 @@ pub struct PlannedChange {
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum Problem {
     /// It was taken from another kind of device.
-    #[error("the set is for {set}, this device is {device}")]
+    #[error("{}", t!("the set is for {set}, this device is {device}", set = .set, device = .device))]
     OtherProfile { set: String, device: String },
     /// The device has no such setting.
-    #[error("{0} is not a setting of this device")]
+    #[error("{}", t!("{what} is not a setting of this device", what = .0))]
     NoSetting(String),
     /// A tag that the set rests on has another value in the device.
-    #[error("{tag} is {device} in the device, {set} in the set: the values mean something else")]
+    #[error("{}", t!("{tag} is {device} in the device, {set} in the set: the values mean something else", tag = .tag, device = .device, set = .set))]
     OtherGround { tag: String, set: String, device: String },
     /// A value that must be known is not.
-    #[error("{0} is unknown now")]
+    #[error("{}", t!("{what} is unknown now", what = .0))]
     Unknown(String),
     /// It would change how other values are scaled or what they are measured in.
-    #[error("{0} differs, and other values depend on it: set it manually first")]
+    #[error("{}", t!("{what} differs, and other values depend on it: set it manually first", what = .0))]
     Ground(String),
     /// Outside the limits that the device would then have.
-    #[error("{tag} {value} is outside {min} … {max}")]
+    #[error("{}", t!("{tag} {value} is outside {min} … {max}", tag = .tag, value = .value, min = .min, max = .max))]
     OutOfRange { tag: String, value: f64, min: String, max: String },
     /// Not one of the values of an enumeration.
-    #[error("{tag} has no value {value}")]
+    #[error("{}", t!("{tag} has no value {value}", tag = .tag, value = .value))]
     NotAChoice { tag: String, value: f64 },
     /// The station would refuse it now.
-    #[error("{tag}: interlock: {text}")]
+    #[error("{}", t!("{tag}: interlock: {text}", tag = .tag, text = .text))]
     Interlock { tag: String, text: String },
     /// The limits forbid every sequence.
-    #[error("{0}: no sequence of writes keeps within the limits")]
+    #[error("{}", t!("{what}: no sequence of writes keeps within the limits", what = .0))]
     NoOrder(String),
 }
 
@@ -124,9 +125,9 @@ fn other_units<'a>(
         if now == Some(wanted) || tag.unit_from.as_ref().is_some_and(|(from, _)| is_given(*from)) {
             return None;
         }
-        let device = now.map_or("unknown", |unit| if unit.is_empty() { "none" } else { unit });
+        let device = now.map_or(t!("unknown"), |unit| if unit.is_empty() { t!("none") } else { unit });
         Some(Problem::OtherGround {
-            tag: format!("the unit of {}", tag.short),
+            tag: t!("the unit of {tag}", tag = tag.short),
             set: wanted.clone(),
             device: device.to_owned(),
         })
@@ -161,7 +162,7 @@ fn unfit(
         Err(from) => return Some(Problem::Unknown(def.tag(from).short.clone())),
     };
     let Some(decimals) = tag.scaling_decimals(trusted) else {
-        return Some(Problem::Unknown(format!("the decimals of {}", tag.short)));
+        return Some(Problem::Unknown(t!("the decimals of {tag}", tag = tag.short)));
     };
     if scale::is_inside(min, max, change.new) && scale::to_raw(tag, change.new, decimals).is_some() {
         return None;

@@ -200,6 +200,6 @@ fn together(
     match (done, first) {
         (0, first) => Outcome::Refused(Refusal::Alarm(first.unwrap_or(of_none))),
         (_, None) => Outcome::Verified,
-        (_, Some(first)) => Outcome::NotConfirmed(NotConfirmed::Partly(format!("{done} of {count}; {first}"))),
+        (_, Some(first)) => Outcome::NotConfirmed(NotConfirmed::PartlyAccepted { done, count, first }),
     }
 }

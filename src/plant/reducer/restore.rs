@@ -11,7 +11,7 @@ use super::{Effects, Plant};
 use crate::plant::{
     command::{BusRequest, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
     def::{DeviceId, LineId, TagId},
-    parameter_set::{self, Problem, StoredSet},
+    parameter_set::{self, StoredSet},
     process_image::ProcessImage,
     record::Record,
     restore::{READ_MAX, Restore, RestoreRequest, State, Step},
@@ -127,7 +127,9 @@ impl Plant {
         confirmed: impl IntoIterator<Item = &'a parameter_set::PlannedChange>,
     ) -> Option<Refusal> {
         match parameter_set::plan(&self.def, device, set, &trusted(&self.image)) {
-            Err(problems) => Some(Refusal::NotFit(first_of(&problems))),
+            Err(problems) => {
+                problems.split_first().map(|(first, others)| Refusal::NotFit(Box::new(first.clone()), others.len()))
+            }
             Ok(changes) => (!changes.iter().eq(confirmed)).then_some(Refusal::Changed),
         }
     }
@@ -237,14 +239,5 @@ fn overtaken(step: &Step, image: &ProcessImage) -> Option<Refusal> {
         None => Some(Refusal::NotKnownNow),
         Some(now) if now != step.change.old => Some(Refusal::ChangedSince),
         Some(_) => None,
-    }
-}
-
-/// The first reason and the number of others.
-fn first_of(problems: &[Problem]) -> String {
-    let first = problems.first().map_or(String::new(), Problem::to_string);
-    match problems.len() {
-        0 | 1 => first,
-        count => format!("{first}, and {} more", count - 1),
     }
 }

@@ -1,6 +1,6 @@
 //! Words to be read: why something cannot be done now.
 
-use crate::t;
+use crate::{t, text::said};
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -45,8 +45,8 @@ impl Notice {
         let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
             (LineState::Disconnected, _) => t!("Line {line} was disconnected by an operator.", line),
             (LineState::Testing, _) => t!("Line {line} is in use by a test (tab Bus).", line),
-            (LineState::Waiting { why, .. }, _) => t!("Line {line} is not connected: {why}.", line, why),
             (LineState::NoTraffic, _) => t!("No traffic is heard on line {line}.", line),
+            (LineState::Waiting { why, .. }, _) => t!("Line {line} is not connected: {why}.", line, why = said(why)),
             (LineState::Connecting, _) => t!("Line {line} is connecting.", line),
             (LineState::Connected, DeviceState::Down { since }) => {
                 t!("No data received since {clock}.", clock = clock(since, &cx.def().time_zone))

@@ -27,7 +27,7 @@ pub(super) use crate::{
         time::elapsed,
     },
     t,
-    text::translate,
+    text::{said, translate},
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint, Key, char, code},

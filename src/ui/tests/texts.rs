@@ -49,6 +49,12 @@ const SAME: &[&str] = &[
     "UTF",
     "CSV",
     "English",
+    "CRC",
+    "LRC",
+    "MBAP",
+    "TX",
+    "RX",
+    "exception",
 ];
 
 /// Screens of the usual terminals; the smallest must show everything.
@@ -80,7 +86,10 @@ fn missed_words(line: &str, given: &BTreeSet<String>) -> Vec<String> {
             || is_edge(before) && given.iter().any(|whole| whole.ends_with(&word))
             || is_edge(after) && given.iter().any(|whole| whole.starts_with(&word))
     };
-    let is_word = |word: &str| word.len() > 1 && word.chars().all(|letter| letter.is_ascii_alphabetic());
+    // A byte of a frame may have no digit.
+    let is_byte = |word: &str| word.len() == 2 && word.chars().all(|letter| ('A'..='F').contains(&letter));
+    let is_word =
+        |word: &str| word.len() > 1 && !is_byte(word) && word.chars().all(|letter| letter.is_ascii_alphabetic());
     let missed = |(word, before, after): &(&str, _, _)| {
         is_word(word) && !SAME.contains(word) && !is_given(word, *before, *after)
     };
@@ -94,7 +103,7 @@ const PAGES: &[(Tab, &[&str])] = &[
     (Tab::Alarms, &["", "?", "v", "vv", "vvv", "vvvv", "vvvvv", "⏎", "z", "o", "n", "r", "t", "A"]),
     (Tab::Controllers, &["", "?", "⏎", "T", "f", "⏎p", "h", "h→", "h→→", "D", "x", "⏎m", "⏎g", "⏎S"]),
     (Tab::Reports, &["", "?", "⏎", "u", "/", ";"]),
-    (Tab::Bus, &["B", "B⏎", "Bw", "T", "Ts"]),
+    (Tab::Bus, &["B", "B⏎", "Bw", "F", "F⏎", "T", "Ts"]),
     (Tab::Users, &["", "?", "n", "⏎", "j", "r", "p"]),
     (Tab::Login, &["", "p", "⏎"]),
 ];
@@ -103,7 +112,7 @@ const TECHNICAL: &[(Tab, &[&str])] = &[
     (Tab::Alarms, &["/"]),
     (Tab::Controllers, &["c"]),
     (Tab::Reports, &["b"]),
-    (Tab::Bus, &["", "?", "F", "F⏎", "Ff", "Tt", "Tf", "Tm", "R", "c"]),
+    (Tab::Bus, &["", "?", "Ff", "Tt", "Tf", "Tm", "R", "c"]),
 ];
 
 /// Draws pages and windows with the texts of a language, in every size.

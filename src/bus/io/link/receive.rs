@@ -10,7 +10,12 @@ use crate::{
         frame::{self, ResponseSignature},
         framing::{self, FrameMatch},
     },
-    plant::{def::Framing, event::Fault, number::to_u32, traffic::FrameResult},
+    plant::{
+        def::Framing,
+        event::Fault,
+        number::to_u32,
+        traffic::{FrameFault, FrameResult},
+    },
 };
 
 /// Characters of an ASCII frame may be this far apart (Modbus over serial line V1.02, 2.5.2.1).
@@ -53,11 +58,7 @@ impl Link {
         loop {
             // An adapter that gives back what it sends: its echo is no answer, however much it looks like one.
             if let Some(sent) = echo.filter(|sent| buffer.starts_with(sent)) {
-                self.wire.record(
-                    false,
-                    buffer.drain(..sent.len()).collect(),
-                    FrameResult::wrong("echo of the adapter"),
-                );
+                self.wire.record(false, buffer.drain(..sent.len()).collect(), FrameResult::Wrong(FrameFault::Echo));
                 (self.echoes, echo) = (true, None);
             }
             let echo_begun = self.echoes && echo.is_some_and(|sent| sent.starts_with(&buffer));
@@ -94,7 +95,7 @@ impl Link {
             };
             let frame: Arc<[u8]> = buffer.into();
             if !frame.is_empty() {
-                self.wire.record(false, frame.clone(), FrameResult::wrong(fault.to_string()));
+                self.wire.record(false, frame.clone(), FrameResult::Wrong(FrameFault::NoResponse(fault)));
             }
             return Ok(Received { answer: Err(fault), frame, response_time });
         }

@@ -1,10 +1,7 @@
 //! A signal of the port, held by hand for a test.
 
 use super::{Link, LinkError, PortWatch};
-use crate::{
-    plant::port_signals::{LOOK, OutputSignal, PortSignals},
-    t,
-};
+use crate::plant::port_signals::{LOOK, OutputSignal, PortSignals};
 
 impl Link {
     /// Holds a signal until the next look, and says how all of them stand then; `Err` where the port has none.
@@ -33,10 +30,10 @@ impl Link {
     fn signals(&self) -> Result<Result<PortSignals, String>, LinkError> {
         // It had some: an adapter that was unplugged has none any more.
         let now = self.watch.as_ref().and_then(PortWatch::signals);
-        now.map(Ok).ok_or_else(|| LinkError::Gone(t!("the port is gone").to_owned()))
+        now.map(Ok).ok_or_else(|| LinkError::Gone("the port is gone".to_owned()))
     }
 }
 
 fn no_signals() -> String {
-    t!("this port has no RTS and DTR: a pseudo-terminal, or a driver without them").to_owned()
+    "this port has no RTS and DTR: a pseudo-terminal, or a driver without them".to_owned()
 }

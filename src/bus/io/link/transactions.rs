@@ -11,7 +11,7 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use tokio::time::Instant;
 
-use super::{FrameResult, Link, LinkError};
+use super::{FrameFault, FrameResult, Link, LinkError};
 use crate::{
     bus::frame::{self, Mbap},
     plant::{def::Framing, event::Fault, traffic::Exchange},
@@ -317,7 +317,7 @@ impl Link {
         let now = Instant::now();
         let expired = self.transactions.expire(now);
         if !expired.is_empty() && self.transactions.is_cut_short() {
-            self.wire.record(false, self.transactions.inbox[..].into(), FrameResult::wrong("cut short"));
+            self.wire.record(false, self.transactions.inbox[..].into(), FrameResult::Wrong(FrameFault::CutShort));
             // The rest may come later and would stand before the next header.
             return Err(LinkError::Gone("a response was incomplete, the stream is out of sync".into()));
         }
@@ -337,7 +337,7 @@ impl Link {
     fn take_frames_mbap(&mut self) -> Result<(), LinkError> {
         let (mut bytes, mut start, now) = (std::mem::take(&mut self.transactions.inbox), 0, Instant::now());
         if frame::is_out_of_sync(&bytes) {
-            self.wire.record(false, bytes.into(), FrameResult::wrong("no MBAP header"));
+            self.wire.record(false, bytes.into(), FrameResult::Wrong(FrameFault::NoHeader));
             return Err(LinkError::Gone("bytes came that are no Modbus TCP frame".into()));
         }
         while let Mbap::Whole { transaction, end } = frame::mbap(&bytes[start..]) {
@@ -376,7 +376,7 @@ impl Link {
         if response_time.is_some() {
             let result = match &answer {
                 Ok(_) | Err(Fault::Exception(_)) => FrameResult::Good,
-                Err(fault) => FrameResult::wrong(fault.to_string()),
+                Err(fault) => FrameResult::Wrong(FrameFault::NoResponse(*fault)),
             };
             self.wire.record(false, frame.clone(), result);
         }

@@ -241,10 +241,11 @@ fn limits_are_checked_in_the_station_whatever_a_terminal_sends() {
     let too_high = RestoreRequest { set: set(600.0, 100.0), ..request.clone() };
     let effects = command(&mut plant, 1, CommandKind::Restore(Box::new(too_high)));
     let why = "SV 600 is outside −∞ … 100";
-    let refused = |why: &str| Some(Outcome::Refused(Refusal::NotFit(why.to_owned())));
+    let refused = |why: &str| Some(format!("{}: {why}", Outcome::Refused(Refusal::Stopped).label()));
     let min = plant.def.tag(SV).min;
     assert_eq!(min, Some(Bound::Fixed(0.0)));
-    assert_eq!((written(&effects), outcome(&plant, 1)), (vec![], refused(&why.replace("−∞", "0"))));
+    let outcome_words = outcome(&plant, 1).map(|outcome| outcome.to_string());
+    assert_eq!((written(&effects), outcome_words), (vec![], refused(&why.replace("−∞", "0"))));
     command(&mut plant, 2, CommandKind::Restore(Box::new(request)));
     assert_eq!(outcome(&plant, 2), Some(Outcome::Unchanged));
 }

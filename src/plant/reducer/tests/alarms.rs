@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::plant::{
-    alarm::AlarmCommand,
+    alarm::{AlarmCommand, AlarmRefusal},
     device_time::{DeviceTime, SeenTime},
 };
 
@@ -46,7 +46,10 @@ fn several_alarms_are_shelved_by_one_command() {
     plant.on_command(with_reason(2, shelve(&[all[0], unknown])), at(2));
     let snapshot = plant.snapshot();
     let status = snapshot.commands.iter().find(|status| status.command.id.number == 2).expect("the second command");
-    assert_eq!(status.outcome, Outcome::NotConfirmed(NotConfirmed::Partly("1 of 2; no such alarm".to_owned())));
+    assert_eq!(
+        status.outcome,
+        Outcome::NotConfirmed(NotConfirmed::PartlyAccepted { done: 1, count: 2, first: AlarmRefusal::NoSuchAlarm })
+    );
 }
 
 #[test]

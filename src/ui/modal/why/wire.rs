@@ -20,7 +20,7 @@ use crate::{
     },
     ui::{
         ViewContext,
-        widgets::text::{clock, running},
+        widgets::text::{clock, fit, pad, running},
     },
 };
 
@@ -48,7 +48,7 @@ pub(super) fn exchange_rows(
     let at = clock(exchange.at, &cx.def().time_zone);
     // What was good then says nothing of now.
     let old = !cx.snapshot.sample(def.id).quality.is_good() && exchange.outcome.is_ok();
-    rows.push(Row::new("", format!("{}, at {at}", request.summary), theme.dim()));
+    rows.push(Row::new("", t!("{summary}, at {at}", summary = request.summary, at), theme.dim()));
     if exchange.answer.is_empty() {
         let timeout = settings(cx, def).timeout;
         rows.push(Row::new(t!("response"), t!("none within {span}", span = span(timeout)), theme.trouble()));
@@ -89,11 +89,10 @@ pub(super) fn every_byte(
         for field in &dissection.fields {
             let own = marked.is_some_and(|marked| field.range.start < marked.end && marked.start < field.range.end);
             let mark = if own { "▸" } else { " " };
-            let text = format!("{mark} {:<12} {:<16} {}", field.hex, field.name, field.words);
+            let text = format!("{mark} {} {} {}", pad(&field.hex, 12), pad(&field.name, 16), field.words);
             let style = if own { cx.theme.strong() } else { cx.theme.normal() };
             // Long fields (a text) are cut: the frame itself stands above.
-            let text = text.chars().take(usize::from(room)).collect();
-            rows.push(Row { label: "", text, style, wraps: false });
+            rows.push(Row { label: "", text: fit(&text, room), style, wraps: false });
         }
     }
     rows

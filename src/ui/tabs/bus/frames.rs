@@ -132,7 +132,7 @@ impl Ring {
         let name = |end: &str| cx.def().report.folder.join(format!("{}-{stamp}.{end}", at.settings.name));
         let outgoing = |path, bytes| Outgoing { tab: Tab::Bus, path, bytes, new: false };
         let text = outgoing(name("txt"), file(|| capture::text(&frames)).into_bytes());
-        self.outgoing = VecDeque::from([text, outgoing(name("pcapng"), capture::pcapng(&frames))]);
+        self.outgoing = VecDeque::from([text, outgoing(name("pcapng"), file(|| capture::pcapng(&frames)))]);
         self.outgoing.front().map(Outgoing::export_request).into_iter().collect()
     }
 
@@ -244,7 +244,7 @@ impl Ring {
         let unit = frame.unit.map_or(String::new(), |unit| unit.to_string());
         let x = canvas.text(1, 0, &format!("{time} {direction} {unit:>3} {bytes} "), style);
         let room = canvas.width().saturating_sub(x + 1);
-        let summary = if wide { dissection.summary } else { short(&dissection.summary) };
+        let summary = if wide { dissection.summary } else { short(&dissection.what) };
         let words = match (good, refused) {
             (true, false) => summary,
             (true, true) => format!("! {summary}"),
@@ -280,12 +280,11 @@ pub fn around(cx: &ViewContext, frames: &Frames, at: Timestamp, canvas: &mut Can
     }
 }
 
-/// Without what the columns before it say: `read holding 41001–41003 (0x03E8, 3)`.
-fn short(summary: &str) -> String {
-    let rest = summary.strip_prefix("unit ").and_then(|rest| rest.split_once(' ')).map_or(summary, |(_, rest)| rest);
+/// `read holding 41001–41003 (0x03E8, 3)`.
+fn short(what: &str) -> String {
     let words =
         [(t!("holding registers"), t!("holding")), (t!("input registers"), t!("input")), (t!(" registers:"), ":")];
-    words.into_iter().fold(rest.to_owned(), |text, (long, short)| text.replacen(long, short, 1))
+    words.into_iter().fold(what.to_owned(), |text, (long, short)| text.replacen(long, short, 1))
 }
 
 /// The bytes as they are written: hex, or the characters of an ASCII frame.

@@ -10,12 +10,12 @@ use super::{
 use crate::ui::{chrome::outcome_words, tabs::prelude::*};
 use crate::{
     bus::{
-        diagnostics::PatternTally,
+        diagnostics::tally,
         dissect::{self, Direction},
-        meaning,
+        meaning, names,
     },
     plant::{
-        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
+        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, PatternTally},
         event::Fault,
         number::to_u32,
         port_signals::PortSignals,
@@ -45,7 +45,7 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
         match finding {
             Finding::Bytes { bytes, response_time: reply } => {
                 if let Diagnostic::Pattern { bits, .. } = run.diagnostic {
-                    rows.extend(pattern_row(cx, n, PatternTally::of(to_u32(n), bits, bytes)));
+                    rows.extend(pattern_row(cx, n, tally(to_u32(n), bits, bytes)));
                 } else {
                     rows.extend(came_back(cx, at, run, bytes, *reply, room));
                 }
@@ -60,12 +60,12 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
                 });
             }
             Finding::Exchange(exchange) => rows.extend(exchange_rows(cx, exchange, room)),
-            Finding::Unit { unit, serial, words, .. } => {
+            Finding::Unit { unit, serial, reply } => {
                 let serial = serial.map_or(String::new(), |serial| t!(" at {serial}", serial));
-                rows.push(plain(t!("● unit {unit}{serial}: {words}", unit, serial, words), theme.strong()));
+                rows.push(plain(t!("● unit {unit}{serial}: {words}", unit, serial, words = reply), theme.strong()));
             }
-            Finding::Object { name, text } => {
-                rows.push(vec![(format!("{name:20} "), theme.dim()), (text.clone(), theme.strong())])
+            Finding::Object { id, text } => {
+                rows.push(vec![(pad(&names::identity(*id), 21), theme.dim()), (text.clone(), theme.strong())]);
             }
             Finding::Values { table, address, words } => {
                 let from = format!("{} / 0x{address:04X}", table.modicon(*address));
@@ -86,8 +86,8 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
                 let answers = range.outcome == SweptOutcome::Answers;
                 rows.push(plain(swept(range), if answers { theme.strong() } else { theme.dim() }));
             }
-            Finding::Conclusion(words) => {
-                rows.extend(wrap(words, room).into_iter().map(|line| plain(line, theme.strong())));
+            Finding::Conclusion(conclusion) => {
+                rows.extend(wrap(&conclusion.to_string(), room).into_iter().map(|line| plain(line, theme.strong())));
             }
         }
     }
@@ -129,12 +129,13 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
     };
     let mut rows = vec![vec![(t!("{at} {what} by {by}   ", at, what, by = run.by), theme.normal()), (state, style)]];
     if let DiagnosticState::Failed(why) = &run.state {
-        rows.extend(wrap(why, room).into_iter().map(|line| plain(line, theme.trouble())));
+        rows.extend(wrap(&said(why), room).into_iter().map(|line| plain(line, theme.trouble())));
     }
     if run.state == DiagnosticState::Running && 1 < run.total {
         let share = f64::from(run.done) / f64::from(run.total);
         let left = remaining(cx, run).map_or(String::new(), |left| t!(", {ms} left", ms = ms(left)));
-        let words = t!(" {done} of {total}{left}   {now}", done = run.done, total = run.total, left, now = run.now);
+        let now = run.now.map(|now| now.to_string()).unwrap_or_default();
+        let words = t!(" {done} of {total}{left}   {now}", done = run.done, total = run.total, left, now);
         rows.push(vec![(draw::bar(cx, share, 20), theme.normal()), (words, theme.normal())]);
     }
     rows

@@ -14,7 +14,9 @@ use crate::{
     plant::{
         command::{CommandId, CommandKind},
         def::{Framing, LineId, Serial},
-        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
+        diagnostics::{
+            Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, DiagnosticStep, Finding, Scan, UnitReply,
+        },
         event::{Fault, LineState},
         line_minute::LineMinute,
         ne107::Reason,
@@ -50,8 +52,9 @@ fn run(
 ) -> Arc<DiagnosticRun> {
     let id = CommandId { terminal: 1, number: 1 };
     let started = now() - jiff::SignedDuration::from_secs(8);
-    let words = "unit 17, function 3 / 0x03 at 9600 8E1".to_owned();
-    Arc::new(DiagnosticRun { id, by: "tech1".into(), diagnostic, started, done, total, now: words, state, findings })
+    let serial = Some(Serial { parity: crate::plant::def::Parity::Even, ..Serial::USUAL });
+    let asks = Some(DiagnosticStep::Request { unit: 17, function: 3, serial });
+    Arc::new(DiagnosticRun { id, by: "tech1".into(), diagnostic, started, done, total, now: asks, state, findings })
 }
 
 #[test]
@@ -233,13 +236,7 @@ fn a_scan_of_all_settings_is_asked_and_shows_how_far_it_is() {
     let mut fixture = Fixture::traffic();
     fixture.line.state = LineState::Testing;
     let even = Serial { parity: crate::plant::def::Parity::Even, ..Serial::USUAL };
-    let found = Finding::Unit {
-        unit: 3,
-        serial: Some(even),
-        words: "register 0 = 77".to_owned(),
-        register: Some(77),
-        certain: true,
-    };
+    let found = Finding::Unit { unit: 3, serial: Some(even), reply: UnitReply::Register(77) };
     fixture.line.test = Some(run(diagnostic.clone(), DiagnosticState::Running, 40, 7_904, vec![found]));
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     insta::assert_snapshot!("scan_at_work", screen(&mut model, 80, 24));
@@ -293,14 +290,15 @@ fn loopback_and_identification_are_described() {
         }))
     };
     let diagnostic = Diagnostic::Loopback { unit: 1, data: 0xA537, count: 2 };
-    let conclusion = Finding::Conclusion("1 of 2 came back, 12.0 to 12.0 ms".to_owned());
+    let took = std::time::Duration::from_millis(12);
+    let conclusion = Finding::Conclusion(Conclusion::Loopback { back: 1, sent: 2, times: (took, took) });
     let findings = vec![exchange(Ok(())), exchange(Err(Fault::Timeout)), conclusion];
     fixture.line.test = Some(run(diagnostic, DiagnosticState::Done, 2, 2, findings));
     let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24);
     for words in ["✓ returned after 12 ms", "✗ response timeout", "1 of 2 came back"] {
         assert!(shown.contains(words), "{words} is missing:\n{shown}");
     }
-    let object = Finding::Object { name: "VendorName".to_owned(), text: "FUJI".to_owned() };
+    let object = Finding::Object { id: Some(0), text: "FUJI".to_owned() };
     fixture.line.test = Some(run(Diagnostic::Identify { unit: 1 }, DiagnosticState::Done, 1, 1, vec![object]));
     assert!(screen(&mut bus(&fixture, Theme::FULL, "T"), 80, 24).contains("VendorName           FUJI"));
 }

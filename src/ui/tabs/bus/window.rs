@@ -14,7 +14,7 @@ use crate::{
     bus::{dissect, frame::hex, meaning, names},
     plant::{
         tag::Table,
-        traffic::{Exchange, Frame, FrameResult},
+        traffic::{Exchange, Frame},
     },
     ui::{
         modal::{Next, window},
@@ -191,9 +191,7 @@ fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection,
     let good = !frame.result.is_wrong();
     let result = if good { frame.result.to_string() } else { format!("✗ {}", frame.result) };
     rows.push(plain(result, if good { theme.normal() } else { theme.trouble() }));
-    if let Some(wrong) =
-        dissection.wrong.as_ref().filter(|wrong| !matches!(&frame.result, FrameResult::Wrong(why) if why == *wrong))
-    {
+    if let Some(wrong) = dissection.wrong.as_ref().filter(|wrong| **wrong != frame.result.to_string()) {
         rows.push(plain(format!("! {wrong}"), theme.trouble()));
     }
     rows.extend(dissection_rows(cx, dissection, room));

@@ -161,8 +161,8 @@ fn row(cx: &ViewContext, run: &ControlRun) -> String {
 pub fn figures(run: &ControlRun) -> [String; 5] {
     let time = |figure: Figure| match figure {
         Figure::NotYet if run.is_running() => "…".to_owned(),
-        Figure::NotYet => "–".to_owned(),
-        Figure::After(time) => control_runs::clock(time),
+        Figure::NotYet => control_runs::reached(None),
+        Figure::After(time) => control_runs::reached(Some(time)),
         Figure::Unknown => "?".to_owned(),
     };
     let value = |value: f64| format!("{value:.*}", usize::from(run.decimals));

@@ -15,7 +15,7 @@ use crate::{
         Effect, Model, Msg,
         fixture::{self, Fixture},
         tabs::Tab,
-        tests::{assert_acts_only_on_what_was_drawn, model, screen, type_keys},
+        tests::{LANGUAGES, assert_acts_only_on_what_was_drawn, model, screen, type_keys},
         theme::Theme,
         update,
     },
@@ -194,4 +194,30 @@ fn faults_and_truth_at_every_size() {
     insta::assert_snapshot!("faults_drill_80x24", screen(&mut model, 80, 24));
     press(&mut model, "v");
     insta::assert_snapshot!("faults_verdict_80x24", screen(&mut model, 80, 24));
+}
+
+#[test]
+fn every_tab_has_its_number_on_the_smallest_screen() {
+    let fixture = Fixture::normal();
+    for language in LANGUAGES {
+        for tab in Tab::ALL.into_iter().filter(|tab| *tab != Tab::Registers) {
+            let mut model = with(&fixture, status(&fixture), Theme::FULL);
+            model.locale = language.locale();
+            model.tabs.shown = tab;
+            let shown = screen(&mut model, 60, 20);
+            let bar = shown.lines().nth(1).unwrap_or_default();
+            let missing = (0..9).find(|number| !bar.contains(&format!("{number} ")));
+            assert_eq!(missing, None, "{} {tab:?}: {bar}", language.code());
+        }
+    }
+}
+
+#[test]
+fn a_heading_is_not_cut_where_there_is_room() {
+    let fixture = Fixture::normal();
+    let mut model = with(&fixture, status(&fixture), Theme::FULL);
+    model.locale = crate::text::Language::THAI.locale();
+    let shown = screen(&mut model, 80, 24);
+    let heading = shown.lines().find(|line| line.trim_start().starts_with("TIC-1 ")).unwrap_or_default();
+    assert!(heading.contains("L1"), "{shown}");
 }

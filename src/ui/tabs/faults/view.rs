@@ -83,7 +83,9 @@ fn list(tab: &Faults, cx: &ViewContext, status: &Status, canvas: &mut Canvas) {
     for (y, (name, state, style, selected)) in lines.iter().skip(first).take(height).enumerate() {
         let y = to_u16(y);
         let x = canvas.text(0, y, if *selected { cx.theme.pick("▸", ">") } else { " " }, cx.theme.strong());
-        canvas.text(x, y, &pad(name, LIST - 12), *style);
+        // A heading has no state behind it.
+        let room = if state.is_empty() { LIST - 2 } else { LIST - 12 };
+        canvas.text(x, y, &pad(name, room), *style);
         canvas.text_right(LIST - 2, y, state, if state == t!("off") { cx.theme.dim() } else { *style });
         if *selected {
             canvas.paint(0, y, LIST, 1, cx.theme.focus());

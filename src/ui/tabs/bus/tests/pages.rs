@@ -3,6 +3,7 @@
 use super::*;
 use crate::plant::{
     def::{Rs485, Transport},
+    diagnostics::PatternTally,
     port_signals::{OutputSignal, PortSignals, SignalTest},
 };
 
@@ -199,7 +200,8 @@ fn a_plug_is_tested_after_a_question_and_its_faults_are_listed() {
     assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, diagnostic.clone())));
     let mut fixture = Fixture::traffic();
     let came_back = |bytes: Vec<u8>| Finding::Bytes { bytes, response_time: None };
-    let conclusion = Finding::Conclusion("bytes are lost".to_owned());
+    let conclusion =
+        Finding::Conclusion(Conclusion::Plug(PatternTally { received: 63, missing: 1, ..PatternTally::default() }));
     let findings = vec![came_back(vec![0x55; 32]), came_back(vec![0xAA; 31]), conclusion];
     fixture.line.test = Some(run(diagnostic, DiagnosticState::Done, 2, 2, findings));
     let shown = screen(&mut bus(&fixture, Theme::FULL, "T"), 120, 40);

@@ -3,7 +3,11 @@
 use super::*;
 use crate::{
     history::{Answer, Bucket, Query, Series},
-    plant::control_run::{ControlRun, RunCause},
+    plant::{
+        control_run::{ControlRun, Figure, RunCause},
+        procedure::Reference,
+    },
+    report::procedures,
     ui::QueryId,
 };
 
@@ -91,4 +95,13 @@ fn without_marks_the_selected_run_and_those_before_it() {
     });
     let run = &runs()[1];
     assert!(spans.into_iter().any(|(from, to)| from <= run.from && run.until <= to), "{effects:?}");
+}
+
+#[test]
+fn what_was_never_reached_has_one_word_everywhere() {
+    let run = ControlRun { at_sv: Figure::NotYet, steady: Figure::NotYet, ..control_run(16, RunState::Ended) };
+    let source = Reference { source: String::new(), at_sv: None, steady: None, overshoot: None };
+    let [at_sv, steady, ..] = super::super::runs::figures(&run);
+    let [known_at_sv, known_steady, _] = procedures::reference(&source, 1);
+    assert_eq!([&at_sv, &steady, &known_at_sv, &known_steady], ["never"; 4]);
 }

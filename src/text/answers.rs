@@ -1,8 +1,9 @@
-//! What the station answers to a request is English, because it stands in the audit log too; here a terminal reads it in its language.
+//! What the station says in words of its own is English, because it stands in the audit log and in logs too; here a terminal
+//! reads it in its language: answers to requests, and why a line is not connected.
 
-use crate::text::{fill, translation};
+use super::{fill, translation};
 
-/// Answers by their texts in `access`, with names for what differs. A test finds each of them there.
+/// Answers by their texts in `access`, `plant` and `bus/io`, with names for what differs. A test finds each of them there.
 fn words() -> &'static [&'static str] {
     &[
         "wrong name or password",
@@ -34,6 +35,31 @@ fn words() -> &'static [&'static str] {
         "this tag requires your own password",
         "this tag requires a second user",
         "the station was restarted since this was shown: check and confirm again",
+        "no setting of the device could be read",
+        "the port accepts no bytes",
+        "the port is gone",
+        "this port has no RTS and DTR: a pseudo-terminal, or a driver without them",
+        "closed by the other side",
+        "a request was incomplete, the stream is out of sync",
+        "a response was incomplete, the stream is out of sync",
+        "bytes came that are no Modbus TCP frame",
+        "no answer to {count} requests over this connection",
+        "cancelled by an urgent stop",
+        "the line was closed",
+        "the line is not connected",
+        "{place}: no connection within {seconds} s",
+        "{place}: refused (is the device on, is the TCP port right?)",
+        "{place}: no route to this address",
+        "{path}: no such port ({known})",
+        "{path}: no permission{why}",
+        "{path}: in use by {holder}",
+        "{path}: not a serial port",
+        "this machine has no serial port",
+        "there are: {ports}",
+        ": it belongs to root; ask the administrator for access (a udev rule)",
+        ": it belongs to the group {name} (usermod -aG {name} USER, then log in again)",
+        "another program",
+        "this program, on another line",
     ]
 }
 
@@ -44,6 +70,8 @@ pub fn said(answer: &str) -> String {
     found.map_or_else(
         || answer.to_owned(),
         |(translated, values)| {
+            // A reason may stand within another.
+            let values: Vec<_> = values.into_iter().map(|(name, value)| (name, said(value))).collect();
             let values: Vec<(&str, &dyn std::fmt::Display)> =
                 values.iter().map(|(name, value)| (*name, value as &dyn std::fmt::Display)).collect();
             fill(translated, &values)
@@ -77,6 +105,8 @@ mod tests {
         assert_eq!(thai("wrong name or password; wait 8 s"), "ชื่อผู้ใช้\u{200b}หรือรหัสผ่าน\u{200b}ไม่ถูกต้อง; รอ 8 s");
         assert!(thai("this is for a supervisor, you are viewer").contains("supervisor"));
         assert_eq!(thai("the disk is full"), "the disk is full");
+        let held = thai("/dev/ttyUSB0: in use by another program");
+        assert!(held.starts_with("/dev/ttyUSB0") && !held.contains("use by") && !held.contains("program"), "{held}");
     }
 
     #[test]
