@@ -280,19 +280,6 @@ pub(super) fn close_picture(model: &mut Model) -> bool {
     std::mem::take(&mut model.tabs.trends.pictured)
 }
 
-/// A picture lies over everything: whatever opens above the chart, or takes its place, closes it.
-pub(super) fn close_covering_picture(model: &mut Model) {
-    let covers = model.modal.is_some()
-        || model.tabs.shown != Tab::Trends
-        || model.small()
-        || model.replay.page().is_some()
-        || session_lock::is_closed(&model.session)
-        || model.tabs.trends.pictured && model.tabs.trends.picture(&model.cx()).is_none();
-    if covers {
-        close_picture(model);
-    }
-}
-
 /// A window that cannot be seen must not take keys, and none that gives commands opens where it may not be seen whole;
 /// the palette only leads on. What it held is dropped, nothing is done; and what is typed for it is no key of the tab.
 pub(super) fn close_unseen(model: &mut Model) {
@@ -302,6 +289,20 @@ pub(super) fn close_unseen(model: &mut Model) {
     if Size::of(model.screen) <= Size::Compact && model.modal.take_if(|modal| closes(modal)).is_some() && !small {
         let words = vec![effects::needs_room().to_owned()];
         model.modal = Some(Modal::Notice(Notice::for_form(t!("too small"), words)));
+    }
+    close_covered_picture(model);
+}
+
+/// A picture lies over everything: whatever opens above the chart, or takes its place, closes it.
+fn close_covered_picture(model: &mut Model) {
+    let covers = model.modal.is_some()
+        || model.tabs.shown != Tab::Trends
+        || model.small()
+        || model.replay.page().is_some()
+        || session_lock::is_closed(&model.session)
+        || model.tabs.trends.pictured && model.tabs.trends.picture(&model.cx()).is_none();
+    if covers {
+        close_picture(model);
     }
 }
 

@@ -236,7 +236,7 @@ impl Loop {
     }
 
     fn on_event(&mut self, event: Event) -> Result<bool, UiError> {
-        if self.late.as_mut().is_some_and(|late| late.holds(&event, std::time::Instant::now())) {
+        if self.late.as_mut().is_some_and(|late| late.holds(&event, Instant::now())) {
             return Ok(false);
         }
         match event {

@@ -240,7 +240,6 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         Msg::Key(event) => on_input(model, |model| on_key(model, event)),
         Msg::Pointer(pointer) => on_input(model, |model| mouse::on_pointer(model, pointer)),
         Msg::Paste(text) => {
-            dispatch::close_picture(model);
             on_paste(model, &text);
             Vec::new()
         }
@@ -291,7 +290,6 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let actions = tour::follow(model, event);
     effects.extend(perform(model, actions));
     dispatch::close_unseen(model);
-    dispatch::close_covering_picture(model);
     model.close_confirmation();
     model.apply_preferences();
     if keyed {
@@ -319,6 +317,7 @@ pub fn picture(model: &Model) -> Option<Picture> {
 }
 
 fn on_paste(model: &mut Model, text: &str) {
+    dispatch::close_picture(model);
     match model.modal.take() {
         Some(mut modal) => {
             if !model.session.locked || modal.is_unlock() {

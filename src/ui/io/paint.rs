@@ -46,7 +46,7 @@ impl Loop {
         self.draw()?;
         let answers = question::read_answers(asked_at);
         self.model.limits.graphics = answers.graphics();
-        self.late = question::LateAnswer::after(&answers, std::time::Instant::now());
+        self.late = question::LateAnswer::after(&answers, Instant::now());
         for event in answers.typed {
             if self.on_event(event)? {
                 return Ok(true);

@@ -4,16 +4,14 @@
 #[cfg(test)]
 mod tests;
 
-use std::{
-    io,
-    time::{Duration, Instant},
-};
+use std::{io, time::Duration};
 
 use crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
     io::Errno,
 };
+use tokio::time::Instant;
 
 use crate::ui::graphics::{Graphics, kitty};
 

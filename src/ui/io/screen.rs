@@ -7,7 +7,6 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    time::Instant,
 };
 
 use crossterm::{
@@ -17,6 +16,7 @@ use crossterm::{
     terminal,
 };
 use ratatui::{Frame, Terminal, backend::Backend};
+use tokio::time::Instant;
 
 use super::{question, wire::Wire};
 use crate::ui::graphics::{Graphics, Picture, Protocol, kitty};

@@ -18,7 +18,7 @@ fn typed(answers: &Answers) -> String {
 }
 
 #[test]
-fn answers_are_told_from_keys() {
+fn answers_and_keys_are_distinguished() {
     for (bytes, expect, keys) in [
         ("", (false, false, false), ""),
         ("\x1b[?62;22c", (false, false, true), ""),

@@ -100,7 +100,6 @@ impl Stand {
                 '→' => KeyCode::Right,
                 '↓' => KeyCode::Down,
                 '⏎' => KeyCode::Enter,
-                '⎋' => KeyCode::Esc,
                 key => KeyCode::Char(key),
             };
             self.send(Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)));
