@@ -83,6 +83,7 @@
 //! | tag, block | one value of a device by name; registers that one request reads |
 //! | sample, quality | value with quality and time; good, uncertain or bad (OPC UA) |
 //! | snapshot | everything that is true now, immutable, for terminals and the history |
+//! | listening line, no traffic | one that another master polls: heard, never sent to; no frame is heard on it |
 //! | bench, live read | one device without tags, for `open`; a read of its registers beside the polls |
 //! | hole | an address that a device does not have, found by a live read, a sweep or a refused block |
 //! | replay, present | a past instant that the tabs show; what is true now, while they do |

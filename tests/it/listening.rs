@@ -74,7 +74,7 @@ impl Master {
         let (stop, place) = (Arc::new(AtomicBool::new(false)), place.to_owned());
         let stopped = stop.clone();
         let asks = [
-            ["-t", "3", "-r", "1000", "-c", "4"],
+            ["-t", "3", "-r", "1000", "-c", "10"],
             ["-t", "4", "-r", "1019", "-c", "1"],
             ["-t", "4", "-r", "1002", "-c", "1"],
         ];

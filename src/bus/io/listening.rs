@@ -211,7 +211,7 @@ impl Task<'_> {
         if let Heard::Frame(heard) = heard {
             self.counters.frames += 1;
             self.counters.received_bytes += heard.frame.bytes.len() as u64;
-            self.bytes += heard.frame.bytes.len() as u32;
+            self.bytes = self.bytes.saturating_add(u32::try_from(heard.frame.bytes.len()).unwrap_or(u32::MAX));
             self.counters.last_rx = Some(heard.frame.at);
             match (&heard.role, heard.frame.unit) {
                 (Role::Request, _) => self.counters.requests += 1,

@@ -126,8 +126,11 @@ pub fn events(def: &PlantDef, line: LineId, at: Timestamp, heard: &Heard) -> Vec
     pairs.flat_map(|(device, span)| events_of(def, at, device, span, &exchange)).collect()
 }
 
+/// A request and its response, without frames.
+type Messages = (Vec<u8>, Option<Vec<u8>>);
+
 /// The request and what came back, as a poll would have it, and both as messages; `None` for what is no end of a request.
-fn exchange_of(heard: &Heard) -> Option<(Exchange, (Vec<u8>, Option<Vec<u8>>))> {
+fn exchange_of(heard: &Heard) -> Option<(Exchange, Messages)> {
     let (at, framing, request, answer, response_time, outcome) = match heard {
         Heard::Lost { at, framing, request, fault } => (*at, *framing, request, None, None, Err(*fault)),
         Heard::Frame(heard) => {
