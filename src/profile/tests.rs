@@ -8,6 +8,7 @@ mod inline;
 mod interlocks;
 mod messages;
 mod new_plants;
+mod north;
 mod pictures;
 mod reports;
 mod text_tags;
@@ -391,9 +392,6 @@ fn a_program_names_tags_that_take_commands() {
 fn a_setting_can_be_written_and_a_default_be_held() {
     check("min = 0\nmax = 100\n", "min = 0\nmax = 100\nset = true\n", &["D1.T cannot be part of a parameter set"]);
     let enumeration = "enum = { 0 = \"off\", 1 = \"on\" }\n";
-    check(
-        enumeration,
-        &format!("{enumeration}default = \"of\"\n"),
-        &["`of` is not a state of D1.MODE", "did you mean"],
-    );
+    let wrong = format!("{enumeration}default = \"of\"\n");
+    check(enumeration, &wrong, &["`of` is not a state of D1.MODE", "did you mean"]);
 }
