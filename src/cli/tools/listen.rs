@@ -15,7 +15,7 @@ use crate::{
         io::{clock::Clock, tap::Tap},
         listen::{Follower, Heard, Listener},
     },
-    cli::{CliError, in_runtime, say, span},
+    cli::{CliError, in_runtime, is_read, run::signalled, say, span},
     plant::{PlantDef, line::LineDef, time::elapsed},
     profile::{self, Search},
 };
@@ -102,14 +102,14 @@ impl Session<'_> {
     async fn listen(&mut self, mut tap: Tap, clock: Clock) -> Result<(), CliError> {
         let end = self.args.time.map(|time| tokio::time::Instant::now() + time);
         let mut buffer = [0; 4096];
-        let stopped = tokio::signal::ctrl_c();
+        let stopped = signalled();
         tokio::pin!(stopped);
         let result = loop {
             let silence = self.listener.silent_at().map(|at| elapsed(clock.utc(), at));
             let heard = tokio::select! {
                 // The end comes also where bytes never end; what has come is heard before a silence is.
                 biased;
-                _ = &mut stopped => break Ok(()),
+                () = &mut stopped => break Ok(()),
                 () = tokio::time::sleep_until(end.unwrap_or_else(tokio::time::Instant::now)), if end.is_some() => break Ok(()),
                 read = tap.bytes.read(&mut buffer) => match read {
                     Ok(count @ 1..) => self.listener.hear(clock.utc(), &buffer[..count]),
@@ -119,6 +119,9 @@ impl Session<'_> {
                 () = tokio::time::sleep(silence.unwrap_or_default()), if silence.is_some() => self.listener.rest(clock.utc()),
             };
             heard.iter().for_each(|heard| self.on_heard(heard));
+            if !is_read() && self.capture.is_none() {
+                break Ok(());
+            }
         };
         let last = self.listener.rest(Timestamp::MAX);
         last.iter().for_each(|heard| self.on_heard(heard));
