@@ -15,7 +15,7 @@ use ratatui::{
 
 use super::{CliError, say};
 use crate::{
-    plant::PlantDef,
+    plant::{PlantDef, visible::visible},
     profile::{self, Search},
     ui::{self, preview, theme::Theme},
 };
@@ -90,7 +90,7 @@ fn watch(args: &Args, size: impl Fn() -> (u16, u16)) -> Result<(), CliError> {
         }
         match &now.1 {
             Ok((page, plant)) => frame(&mut out, &draw(plant, *page, now.0, phase)).map_err(&failed)?,
-            Err(error) if changed => out.extend(error.replace('\n', "\r\n").into_bytes()),
+            Err(error) if changed => out.extend(visible(error).replace('\n', "\r\n").into_bytes()),
             Err(_) => {}
         }
         shown = Some(now);

@@ -26,6 +26,7 @@ mod mistyped;
 mod new;
 mod open;
 mod open_log;
+mod output;
 mod own_files;
 mod paths;
 mod profiles;
@@ -43,7 +44,7 @@ mod systemd_unit;
 mod terminal;
 
 use std::{
-    io::{IsTerminal, Write},
+    io::Write,
     path::{Path, PathBuf},
     process::ExitCode,
 };
@@ -51,6 +52,7 @@ use std::{
 use clap::{Parser, Subcommand};
 
 use self::{
+    output::{all_said, is_read, put_out, put_out_file, say, say_error, say_problems},
     terminal::TerminalArgs,
     times::{span, speed},
 };
@@ -237,7 +239,7 @@ pub fn main() -> ExitCode {
         return ExitCode::from(2);
     }
     let result = menu::completed(std::env::args_os().collect()).and_then(|words| run_command(parse(words)));
-    match result {
+    match result.and_then(|()| all_said()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             match &error {
@@ -313,30 +315,6 @@ fn run_command(args: Args) -> Result<(), CliError> {
     }
 }
 
-/// Prints one line to standard output. A reader that has gone away (`| head`) is no error worth a word.
-fn say(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{}", visible(line));
-}
-
-/// Prints a message to standard error.
-fn say_error(message: &str) {
-    let _ = writeln!(std::io::stderr(), "sightglass: {}", visible(message));
-}
-
-/// Writes the bytes of a file to standard output: as they are, made visible on a terminal.
-fn put_out(bytes: &[u8]) -> std::io::Result<()> {
-    let mut out = std::io::stdout();
-    if out.is_terminal() {
-        return out.write_all(visible(&String::from_utf8_lossy(bytes)).as_bytes());
-    }
-    out.write_all(bytes)
-}
-
-/// Writes a file that may be large to standard output.
-fn put_out_file(path: &Path) -> std::io::Result<()> {
-    std::io::copy(&mut std::fs::File::open(path)?, &mut std::io::stdout()).map(drop)
-}
-
 /// A runtime for the tasks of a station: two workers are plenty, and the terminal stays quick.
 fn runtime() -> Result<tokio::runtime::Runtime, CliError> {
     tokio::runtime::Builder::new_multi_thread()
@@ -375,12 +353,4 @@ fn load_with_file(
         paths::replace_port(&mut def, port).map_err(CliError::Usage)?;
     }
     Ok((def, file))
-}
-
-/// Prints problems or warnings of a profile, in colour on a terminal, unless NO_COLOR is set.
-fn say_problems(problems: &profile::Errors) {
-    let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-    // The rendering holds nothing raw but its own colours.
-    let text = profile::render(problems, std::io::stderr().is_terminal() && !plain);
-    let _ = writeln!(std::io::stderr(), "sightglass: {text}");
 }

@@ -21,6 +21,7 @@ pub mod deadband;
 pub mod forwarder;
 pub mod io;
 pub mod payload;
+pub(crate) mod refusals;
 pub mod request;
 pub(crate) mod request_log;
 pub(crate) mod requests;

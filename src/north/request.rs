@@ -15,6 +15,7 @@ use crate::plant::{
     def::{DeviceDef, MqttDef, TagId},
     mqtt_request::MqttRefusal,
     north_def::topic_level,
+    visible::is_control_or_bidi,
 };
 
 /// The last levels of the topics of requests and of their answers.
@@ -29,6 +30,8 @@ pub const EXPIRES_MAX: Duration = Duration::from_secs(600);
 const ID_MAX: usize = 64;
 const RESPONSE_TOPIC_MAX: usize = 256;
 const CORRELATION_MAX: usize = 256;
+/// Characters of what a client wrote that are said back and shown at most.
+const WORDS_MAX: usize = 160;
 
 /// A message on a topic of requests, as the broker delivered it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -119,8 +122,8 @@ pub fn read(received: &Received) -> Result<Request, MqttRefusal> {
     if PAYLOAD_MAX < received.payload.len() {
         return Err(MqttRefusal::TooLong(PAYLOAD_MAX));
     }
-    let request: Request =
-        serde_json::from_slice(&received.payload).map_err(|error| MqttRefusal::NotARequest(error.to_string()))?;
+    let request: Request = serde_json::from_slice(&received.payload)
+        .map_err(|error| MqttRefusal::NotARequest(shown(&error.to_string())))?;
     if !is_id(&request.id) {
         return Err(MqttRefusal::Id(ID_MAX));
     }
@@ -142,12 +145,19 @@ pub fn check(
         return Err(MqttRefusal::ExpiresLate(EXPIRES_MAX.as_secs()));
     }
     let Some(tag) = plant.tag_named(&request.tag) else {
-        return Err(MqttRefusal::UnknownTag(request.tag.chars().filter(|letter| !letter.is_control()).collect()));
+        return Err(MqttRefusal::UnknownTag(shown(&request.tag)));
     };
     if topic != topic_of(mqtt, plant.device(plant.tag(tag).device)) {
         return Err(MqttRefusal::OtherDevice);
     }
     Ok(tag)
+}
+
+/// What a client wrote, as it can be shown anywhere.
+pub(super) fn shown(words: &str) -> String {
+    let mut letters = words.chars().filter(|letter| !is_control_or_bidi(*letter));
+    let shown: String = letters.by_ref().take(WORDS_MAX).collect();
+    if letters.next().is_none() { shown } else { shown + "…" }
 }
 
 fn topic_of(mqtt: &MqttDef, device: &DeviceDef) -> String {
@@ -227,6 +237,17 @@ pub(super) mod tests {
         check(TOPIC, &|request| request.expires = Timestamp::MAX, Err(MqttRefusal::ExpiresLate(600)));
         check(TOPIC, &|request| request.tag = "TIC-9.SV".into(), Err(MqttRefusal::UnknownTag("TIC-9.SV".into())));
         check("sightglass/tank/PLC-1/request", &|_| {}, Err(MqttRefusal::OtherDevice));
+    }
+
+    #[test]
+    fn what_a_client_wrote_is_never_said_at_length() {
+        let check = |words: &str, expect: &str| assert_eq!(shown(words), expect);
+        check("TIC-9.SV", "TIC-9.SV");
+        check("a\u{1b}[2J\u{202e}b\nc", "a[2Jbc");
+        check(&"x".repeat(160), &"x".repeat(160));
+        check(&"x".repeat(4_000), &("x".repeat(160) + "…"));
+        let refusal = read(&message(&format!(r#"{{"{}":1}}"#, "y".repeat(3_000)))).expect_err("no request");
+        assert!(refusal.to_string().len() < 200, "{refusal}");
     }
 
     #[test]

@@ -17,6 +17,7 @@ use serde_json::json;
 
 use super::{
     payload::Message,
+    refusals::{Refusal, Refusals},
     request::{self, EXPIRES_MAX, Received, ReplyTo, Request},
     request_log::{Ended, Entry, RequestLog},
 };
@@ -60,6 +61,8 @@ pub struct Requests {
     /// The list was damaged: nothing is taken before, as it may have been done already.
     closed_until: Option<Timestamp>,
     status: MqttRequestStatus,
+    /// What the audit log does not have yet.
+    refusals: Refusals,
     /// Times of the commands under way, by number.
     sent: Vec<(u32, Timestamp)>,
 }
@@ -110,7 +113,8 @@ impl Requests {
         };
         let status = MqttRequestStatus { user, error, ..MqttRequestStatus::default() };
         let (rate, answers) = (RATE, ANSWERS);
-        Requests { mqtt, log, rate, answers, last_number: 0, closed_until, status, sent: Vec::new() }
+        let (refusals, sent) = (Refusals::default(), Vec::new());
+        Requests { mqtt, log, rate, answers, last_number: 0, closed_until, status, refusals, sent }
     }
 
     /// What is shown.
@@ -131,8 +135,26 @@ impl Requests {
 
     /// Messages for which the queue had no room.
     pub fn on_lost(&mut self, lost: u64) {
-        self.status.refused += lost;
-        self.status.unanswered += lost;
+        if 0 < lost {
+            self.status.refused += lost;
+            self.status.unanswered += lost;
+            self.refusals.count(Refusal { what: UNREADABLE.into(), why: MqttRefusal::TooMany, count: lost });
+        }
+    }
+
+    /// An answer for which there was no room.
+    pub fn on_answer_lost(&mut self) {
+        self.status.unanswered += 1;
+    }
+
+    /// Refusals that are to be recorded now.
+    pub fn refusals(&mut self, now: Now) -> Vec<Refusal> {
+        self.refusals.take(now.plant)
+    }
+
+    /// They could not be recorded now.
+    pub fn on_refusal_not_recorded(&mut self, refusal: Refusal) {
+        self.refusals.count(refusal);
     }
 
     /// The broker has delivered a message.
@@ -184,9 +206,15 @@ impl Requests {
 
     /// `named`: its id, if it can be sent back, and what is shown of it.
     fn refuse(&mut self, (id, shown): (Option<&str>, String), reply: &ReplyTo, why: MqttRefusal, now: Now) -> Decision {
-        self.status.refused += 1;
-        self.show(shown, MqttResult::Refused(why.clone()), now);
+        self.on_refused(shown, &why, now);
         self.limited(refusal(id, reply, &why, now), now)
+    }
+
+    /// Counts a refusal before the plant, shows it and keeps it for the audit log.
+    fn on_refused(&mut self, what: String, why: &MqttRefusal, now: Now) {
+        self.status.refused += 1;
+        self.refusals.count(Refusal { what: what.clone(), why: why.clone(), count: 1 });
+        self.show(what, MqttResult::Refused(why.clone()), now);
     }
 
     fn limited(&mut self, answer: Message, now: Now) -> Decision {
@@ -201,8 +229,7 @@ impl Requests {
     pub fn on_not_passed_on(&mut self, number: u32, why: MqttRefusal, now: Now) -> Option<Message> {
         let entry = self.log.remove(number)?;
         self.status.accepted -= 1;
-        self.status.refused += 1;
-        self.show(entry.what(), MqttResult::Refused(why.clone()), now);
+        self.on_refused(entry.what(), &why, now);
         Some(refusal(Some(&entry.id), &entry.reply, &why, now))
     }
 
@@ -263,6 +290,7 @@ fn what(request: &Request) -> String {
 
 fn words(id: &str, tag: &str, value: f64) -> String {
     let tag: String = tag.chars().filter(char::is_ascii_graphic).take(40).collect();
+    let value = if value.abs() < 1e15 { value.to_string() } else { format!("{value:e}") };
     format!("{id} {tag} = {value}")
 }
 

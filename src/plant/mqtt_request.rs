@@ -17,11 +17,11 @@ pub struct MqttRequestStatus {
     pub accepted: u64,
     /// Refused, by the station before or by the plant.
     pub refused: u64,
-    /// Refused without an answer, because there were too many.
+    /// Without an answer: there were too many, or the broker refused it.
     pub unanswered: u64,
     /// The latest.
     pub last: Option<LastMqttRequest>,
-    /// Why none is taken; `None` while all is well.
+    /// Why none is taken, or answered; `None` while all is well.
     pub error: Option<String>,
 }
 

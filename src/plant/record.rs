@@ -194,12 +194,16 @@ pub const RESTORE: &str = "restore history";
 /// Samples came from a file.
 pub const IMPORT: &str = "import samples";
 
+/// Requests from outside that were refused before the plant saw them.
+pub const OUTSIDE_REQUEST: &str = "request from outside";
+
 /// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
 /// not for shift reports and curves. So it is with the request of a write, whose outcome is there already.
-pub const NOT_PROCESS_ACTIONS: [&str; 35] = [
+pub const NOT_PROCESS_ACTIONS: [&str; 36] = [
     BACKUP,
     RESTORE,
     IMPORT,
+    OUTSIDE_REQUEST,
     WRITE_REQUESTED,
     SEAL_LOG,
     "attach",

@@ -17,6 +17,8 @@ use crate::plant::{
 /// The ports that brokers have, without and with TLS.
 const PORT: u16 = 1_883;
 const PORT_TLS: u16 = 8_883;
+/// Bytes of a text that a broker gets; MQTT itself ends at 65,535 for a topic with what is added to it.
+const TEXT_MAX: usize = 1_024;
 /// A subscriber that has just come knows every value after so long.
 const MAX_INTERVAL: Duration = Duration::from_secs(60);
 const LAG_MAX: Duration = Duration::from_secs(120);
@@ -40,6 +42,13 @@ fn mqtt_of(plant: &str, table: &MqttTable, defs: &Defs, problems: &mut Problems)
         if let Some(given) = given.filter(|given| given.value < least) {
             problems.add(given.at, "this is too short").label(format!("expected {}s or more", least.as_secs()));
         }
+    }
+    let texts = [&table.host, &table.client_id, &table.user, &table.topic, &table.commands_as];
+    for text in texts.into_iter().flatten().filter(|text| TEXT_MAX < text.value.len()) {
+        problems.add(text.at, "this is too long for a broker").label(format!("expected at most {TEXT_MAX} bytes"));
+    }
+    if let Some(port) = table.port.filter(|port| port.value == 0) {
+        problems.add(port.at, "no broker has port 0").label("expected 1 to 65535");
     }
     let client_id = table.client_id.as_ref();
     if let Some(id) = client_id.filter(|id| id.value.is_empty()) {

@@ -9,6 +9,7 @@ mod listening;
 mod interlocks;
 mod messages;
 mod new_plants;
+mod north;
 mod pictures;
 mod reports;
 mod text_tags;

@@ -41,6 +41,13 @@ pub enum Request {
     Ask(QueryRequest),
     /// A session request.
     SessionRequest(SessionRequest, oneshot::Sender<Result<Durability, String>>),
+    /// For the audit log: requests from outside that were refused before one became a command. Never over a socket.
+    RecordRefusal {
+        /// What was requested.
+        what: String,
+        /// What became of it.
+        outcome: String,
+    },
 }
 
 impl Session {

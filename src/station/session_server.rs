@@ -188,6 +188,10 @@ impl SessionServer {
                 let effects = self.access.on_request(terminal, self.last_ticket, request, now);
                 self.apply_effects(effects);
             }
+            Request::RecordRefusal { what, outcome } => {
+                let effects = self.access.record_refusal(terminal, &what, &outcome, now);
+                self.apply_effects(effects);
+            }
         }
     }
 

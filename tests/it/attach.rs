@@ -158,6 +158,7 @@ fn answer(request: Request, commands: &watch::Sender<Arc<Snapshot>>) {
         Request::Ask(query) => drop(query.reply.send(Err(HistoryError::EmptyPeriod))),
         Request::SessionRequest(SessionRequest::Stop, reply) => drop(reply.send(Ok(Durability::Recorded))),
         Request::SessionRequest(_, reply) => drop(reply.send(Err("not yet".into()))),
+        Request::RecordRefusal { .. } => {}
     }
 }
 

@@ -289,3 +289,33 @@ fn a_broker_with_tls_and_passwords_is_trusted_or_an_alarm() {
     station.signal("TERM");
     assert_eq!(station.end(), Some(0));
 }
+
+#[test]
+fn what_the_broker_may_not_take_is_not_skipped() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new("");
+    let acl = place.path("acl");
+    let listener = format!("allow_anonymous true\nacl_file {}\n", acl.display());
+    fs::write(&acl, "topic readwrite sightglass/tank/+\n").unwrap();
+    let broker = place.broker(&listener);
+    let mut station = place.station();
+    let refused = place.wait_until("the station says so", |status| {
+        status["north"]["error"].as_str().is_some_and(|error| error.contains("refuses: NotAuthorized"))
+    });
+    assert_eq!((sent(&refused), &refused["north"]["refused"]), (0, &Value::from(0)), "{}", refused["north"]);
+    fs::write(&acl, "topic readwrite sightglass/tank/#\n").unwrap();
+    broker.signal("HUP");
+    let mut subscriber = place.subscriber();
+    let complete = Timestamp::now();
+    place.wait_until("all of before is there", |status| {
+        status["north"]["sent_until"].as_str().and_then(|at| at.parse().ok()) > Some(complete)
+    });
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+    place.catch_up(&mut subscriber, "the end");
+    let all: BTreeSet<Row> = received(&subscriber.said).into_iter().collect();
+    let stored: Vec<Row> = place.stored().into_iter().filter(|(_, at, _)| *at < complete).collect();
+    assert!(stored.len() > 50 && stored.iter().all(|row| all.contains(row)), "{} stored", stored.len());
+}

@@ -233,3 +233,109 @@ fn without_the_key_the_station_subscribes_to_nothing() {
     assert!(broker.said.iter().any(|line| line.contains("sightglass-tank")));
     assert!(broker.said.iter().all(|line| !line.contains("SUBSCRIBE from sightglass-tank")), "{:?}", broker.said);
 }
+
+#[test]
+fn refusals_before_the_plant_are_on_record_in_bounds() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new(AS_MES);
+    let _broker = place.broker("allow_anonymous true\n");
+    let mut station = place.station();
+    place.wait_until("it takes requests", is_ready);
+    let client = Client::new(&place);
+    for _ in 0..12 {
+        client.publish(TOPIC, b"on", &[]);
+    }
+    client.send(&request("a-1", "TIC-7.SV", 50), &[]);
+    place.wait_until("they are counted", |status| requests_of(status, "refused") == 13);
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+    let log = std::fs::read_to_string(place.path("tank.audit.jsonl")).expect("the audit log");
+    let entries: Vec<_> = log.lines().filter(|line| line.contains("request from outside")).collect();
+    assert_eq!(entries.len(), 2, "{entries:?}");
+    assert!(entries[0].contains("not a request") && entries[1].contains("no tag is called TIC-7.SV"), "{entries:?}");
+}
+
+#[test]
+fn a_broker_that_refuses_answers_is_said_until_it_takes_one() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new(AS_MES);
+    let acl = place.path("acl");
+    std::fs::write(&acl, "topic readwrite sightglass/tank/#\n").expect("the folder is writable");
+    let _broker = place.broker(&format!("allow_anonymous true\nacl_file {}\n", acl.display()));
+    let mut station = place.station();
+    place.wait_until("it takes requests", is_ready);
+    let mut client = Client::new(&place);
+    client.send(&request("a-1", "TIC-1.SV", 51), &["-D", "PUBLISH", "response-topic", "mes/answers"]);
+    let said = |status: &Value| {
+        let error = status["north"]["requests"]["error"].as_str().unwrap_or_default();
+        error.contains("refuses answers on mes/answers: NotAuthorized")
+    };
+    let status = place.wait_until("it is said", said);
+    assert!(requests_of(&status, "unanswered") >= 1, "{}", status["north"]);
+    // Some brokers end the connection of who publishes what they refuse: what is sent before it is back is not delivered.
+    let second = request("a-2", "TIC-1.SV", 52);
+    place.wait_until("it takes the next one", |status| {
+        client.send(&second, &[]);
+        requests_of(status, "accepted") == 2
+    });
+    assert_eq!(client.outcome("a-2")["result"], "verified");
+    place.wait_until("it is over", is_ready);
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+}
+
+#[test]
+fn a_broker_that_refuses_the_subscription_is_said() {
+    const PLUGIN: &str = "/usr/lib/x86_64-linux-gnu/mosquitto_dynamic_security.so";
+    if !have_mosquitto() || !std::path::Path::new(PLUGIN).exists() {
+        return;
+    }
+    let place = Place::new(AS_MES);
+    let rules = place.path("rules.json");
+    let may =
+        json!({ "publishClientSend": true, "publishClientReceive": true, "subscribe": false, "unsubscribe": true });
+    std::fs::write(&rules, json!({ "defaultACLAccess": may }).to_string()).expect("the folder is writable");
+    let listener = format!("allow_anonymous true\nplugin {PLUGIN}\nplugin_opt_config_file {}\n", rules.display());
+    let _broker = place.broker(&listener);
+    let mut station = place.station();
+    let status = place.wait_until("it is said", |status| {
+        let error = status["north"]["requests"]["error"].as_str().unwrap_or_default();
+        error.contains("the broker delivers no requests") && error.contains("NotAuthorized")
+    });
+    assert_eq!(status["north"]["connected"], true, "values go out nevertheless");
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+}
+
+#[test]
+fn answers_wait_for_a_broker_that_is_restarted() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new(AS_MES);
+    let mut broker = place.broker("allow_anonymous true\n");
+    let mut station = place.station();
+    place.wait_until("it takes requests", is_ready);
+    let mut client = Client::new(&place);
+    place.simulator().signal("STOP");
+    client.send(&request("b-1", "TIC-1.SV", 53), &[]);
+    assert_eq!(client.answer("b-1")["result"], "accepted");
+    broker.signal("TERM");
+    broker.end();
+    place.simulator().signal("CONT");
+    place.wait_until("it has its outcome", |status| status["north"]["requests"]["last"]["result"] != "pending");
+    drop(client);
+    // The station may be first, so this broker keeps the answer for nobody: what it was given stands in its words.
+    let mut broker = place.broker("allow_anonymous true\n");
+    broker.wait_for("'sightglass/tank/TIC-1/response'");
+    place.wait_until("it takes requests", is_ready);
+    let mut client = Client::new(&place);
+    client.send(&request("b-2", "TIC-1.SV", 54), &[]);
+    assert_eq!(client.outcome("b-2")["result"], "verified");
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0));
+}

@@ -249,7 +249,25 @@ fn a_port_without_signals_says_so() {
     let folder = folder();
     let cable = Cable::plug(folder.path());
     let (code, said) = run(&["signals", cable.ends[0].to_str().unwrap(), "--rts", "off"]);
+    assert!(
+        code == Some(1) && said.contains("this port has no RTS, DTR"),
+        "what was asked is not done: {code:?} {said}"
+    );
+    let (code, said) = run(&["signals", cable.ends[0].to_str().unwrap()]);
     assert!(code == Some(0) && said.contains("this port has no RTS, DTR"), "{code:?} {said}");
     let (code, said) = run(&["signals", "127.0.0.1:502"]);
     assert!(code == Some(2) && said.contains("a serial port is needed"), "{code:?} {said}");
+}
+
+#[test]
+fn what_standard_output_does_not_take_is_a_failure() {
+    let full = || OpenOptions::new().write(true).open("/dev/full").unwrap();
+    for args in
+        [&["experiments", "--csv"][..], &["mimic", "tank"], &["profiles"], &["decode", "01 03 00 00 00 01 84 0A"]]
+    {
+        let output = sightglass().args(args).stdout(full()).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{args:?}: {said}");
+        assert!(said.contains("standard output: No space left on device"), "{args:?}: {said}");
+    }
 }

@@ -9,7 +9,7 @@ use super::{
     audit_entries::{audit, clean},
     session::SessionState,
 };
-use crate::access::LoggedInUser;
+use crate::{access::LoggedInUser, plant::record::OUTSIDE_REQUEST};
 
 /// What its refusals are counted under.
 const ORIGIN: &str = "requests from outside";
@@ -26,6 +26,13 @@ impl AccessControl {
         self.sessions.insert(terminal, session);
         self.publish_status(terminal, &mut effects);
         effects
+    }
+
+    /// Records that requests from outside were refused before one became a command. The session itself limits how many entries
+    /// there are.
+    pub fn record_refusal(&self, terminal: u32, what: &str, outcome: &str, at: Timestamp) -> Vec<Effect> {
+        let session = self.sessions.get(&terminal).filter(|session| session.acts_as.is_some());
+        session.map(|session| audit(session, OUTSIDE_REQUEST, &clean(what), &clean(outcome), at)).into_iter().collect()
     }
 
     /// The user as whom requests act, as long as that user exists and is not disabled.

@@ -212,6 +212,7 @@ impl ClientTask {
                     out,
                 );
             }
+            Request::RecordRefusal { .. } => {}
         }
     }
 
@@ -278,6 +279,7 @@ impl ClientTask {
             }
             Request::Ask(query) => Waiting::Ask(query.reply).refuse(GONE),
             Request::SessionRequest(_, reply) => Waiting::SessionRequest(reply).refuse(GONE),
+            Request::RecordRefusal { .. } => {}
         }
     }
 

@@ -14,7 +14,7 @@ use crate::{
         io::{clock::Clock, hearing::Hearing, tap::Tap},
         listen::{Follower, Heard, Listener},
     },
-    cli::{CliError, in_runtime, say, span},
+    cli::{CliError, in_runtime, is_read, run::signalled, say, span},
     plant::{PlantDef, line::LineDef, time::elapsed},
     profile::{self, Search},
 };
@@ -99,19 +99,22 @@ struct Session<'a> {
 impl Session<'_> {
     async fn listen(&mut self, hearing: &mut Hearing) -> Result<(), CliError> {
         let end = self.args.time.map(|time| tokio::time::Instant::now() + time);
-        let stopped = tokio::signal::ctrl_c();
+        let stopped = signalled();
         tokio::pin!(stopped);
         let result = loop {
             let heard = tokio::select! {
                 // The end comes also where bytes never end.
                 biased;
-                _ = &mut stopped => break Ok(()),
+                () = &mut stopped => break Ok(()),
                 () = tokio::time::sleep_until(end.unwrap_or_else(tokio::time::Instant::now)), if end.is_some() => break Ok(()),
                 heard = hearing.next() => heard,
             };
             match heard {
                 Ok(heard) => heard.iter().for_each(|heard| self.on_heard(heard)),
                 Err(why) => break Err(CliError::Failed(why)),
+            }
+            if !is_read() && self.capture.is_none() {
+                break Ok(());
             }
         };
         hearing.end().iter().for_each(|heard| self.on_heard(heard));

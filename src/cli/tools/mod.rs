@@ -105,6 +105,10 @@ impl PortArgs {
 
     /// The line that the arguments describe.
     pub fn line(&self) -> Result<LineDef, CliError> {
+        if self.port.starts_with(['.', '~']) {
+            let words = format!("port: found `{}`, expected a whole path such as /dev/ttyUSB0", self.port);
+            return Err(CliError::Usage(words));
+        }
         if let Some(network) = self.network() {
             network.map_err(CliError::Usage)?;
             let words = format!("port: found a network; `sightglass scan {}` looks for its devices", self.port);
@@ -310,6 +314,7 @@ mod tests {
             ("plc:99999", "found `plc:99999`, expected HOST or HOST:TCPPORT with a TCP port"),
             ("[::1]x", "or [IPV6]:TCPPORT"),
             ("10.0.0.0/24", "found a network; `sightglass scan 10.0.0.0/24`"),
+            ("./ttyUSB0", "expected a whole path such as /dev/ttyUSB0"),
             ("10.0.0.0/8", "at most 256 addresses"),
             ("/dev/ttyUSB0 --baud 9601", "found 9601, expected one of 300"),
             ("/dev/ttyUSB0 --data 7", "found 7, expected 8"),

@@ -10,7 +10,7 @@ use tokio::sync::mpsc;
 use super::PortArgs;
 use crate::{
     bus::io::signals::{Signal, SignalPort},
-    cli::{CliError, in_runtime, say, span},
+    cli::{CliError, in_runtime, run::signalled, say, span},
     plant::line::Transport,
 };
 
@@ -45,7 +45,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let mut port = SignalPort::open(port, *serial).map_err(CliError::Failed)?;
         if port.read().is_none() {
-            say("this port has no RTS, DTR, CTS, DSR, DCD and RI: a pseudo-terminal, or a driver without them");
+            let why = "this port has no RTS, DTR, CTS, DSR, DCD and RI: a pseudo-terminal, or a driver without them";
+            if args.rts.is_some() || args.dtr.is_some() || args.send_break {
+                return Err(CliError::Failed(why.to_owned()));
+            }
+            say(why);
             return Ok(());
         }
         let asked = [(Signal::Rts, &args.rts), (Signal::Dtr, &args.dtr)];
@@ -77,7 +81,7 @@ async fn watch(port: &mut SignalPort, time: Option<Duration>) -> Result<(), CliE
     let end = time.map(|time| tokio::time::Instant::now() + time);
     let mut typed = commands();
     let mut shown = String::new();
-    let stopped = tokio::signal::ctrl_c();
+    let stopped = signalled();
     tokio::pin!(stopped);
     loop {
         let words = state(port)?;
@@ -89,7 +93,7 @@ async fn watch(port: &mut SignalPort, time: Option<Duration>) -> Result<(), CliE
             return Ok(());
         }
         tokio::select! {
-            _ = &mut stopped => return Ok(()),
+            () = &mut stopped => return Ok(()),
             Some(line) = typed.recv() => match command(&line) {
                 Some((signal, on)) => set(port, signal, on)?,
                 None => say("expected rts on, rts off, dtr on, dtr off or break"),

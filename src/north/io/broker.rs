@@ -95,7 +95,8 @@ impl Broker {
         // What is retained arrives as such, and is refused.
         let filter = SubscribeFilterInput::new(request::filter(def), QoS::AtLeastOnce).preserve_retain(true);
         let notice = self.within(client.subscribe_many_tracked([filter])).await?.map_err(|error| error.to_string())?;
-        self.within(notice.wait_async()).await?.map(drop).map_err(|error| error.to_string())
+        // Only the completion knows what the broker refuses; the packet alone counts as an answer.
+        self.within(notice.wait_completion_async()).await?.map_err(|error| error.to_string())
     }
 
     /// Publishes over this connection, without the others waiting.
@@ -114,8 +115,8 @@ impl Broker {
         }
         let mut refused = 0;
         for notice in notices {
-            match self.within(notice.wait_async()).await? {
-                Ok(_) => {}
+            match self.within(notice.wait_completion_async()).await? {
+                Ok(()) => {}
                 Err(PublishNoticeError::V5PubAck(reason)) if is_final(reason) => refused += 1,
                 Err(PublishNoticeError::V5PubAck(reason)) => return Err(format!("the broker refuses: {reason:?}")),
                 Err(error) => return Err(error.to_string()),

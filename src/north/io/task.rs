@@ -12,6 +12,7 @@ use tokio::{
 };
 
 use super::{
+    answers::AnswerStatus,
     broker::{Broker, Inbox},
     cursor,
 };
@@ -76,6 +77,8 @@ pub(crate) struct RequestChannels {
     pub clients: watch::Sender<Option<AsyncClient>>,
     /// How they stand.
     pub status: watch::Receiver<MqttRequestStatus>,
+    /// What the broker made of their answers.
+    pub answers: watch::Receiver<AnswerStatus>,
 }
 
 /// Runs until the station stops.
@@ -260,7 +263,9 @@ impl North {
         self.status.connected = self.broker.is_some();
         self.status.requests = self.task.requests.as_ref().map(|requests| {
             let status = requests.status.borrow().clone();
-            MqttRequestStatus { error: status.error.or(self.not_subscribed.clone()), ..status }
+            let AnswerStatus { refused, error } = requests.answers.borrow().clone();
+            let error = status.error.or(self.not_subscribed.clone()).or(error);
+            MqttRequestStatus { error, unanswered: status.unanswered + refused, ..status }
         });
         let at = self.task.clock.now();
         let _ = self.task.events.try_send(Event::North { at, status: Arc::new(self.status.clone()) });

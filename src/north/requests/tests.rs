@@ -129,9 +129,18 @@ fn a_flood_is_refused_then_not_even_answered() {
     let count = |start: &str| found.iter().filter(|found| found.starts_with(start)).count();
     assert_eq!((count("command"), count("refused: too many"), count("nothing")), (10, 20, 70));
     requests.on_lost(5);
+    let [refusal] = &requests.refusals(now(0))[..] else { panic!("one entry for all of them") };
+    assert_eq!(refusal.outcome(), "refused: 95 requests, the last: too many requests, wait a moment");
     let MqttRequestStatus { accepted, refused, unanswered, .. } = *requests.status();
     assert_eq!((accepted, refused, unanswered), (10, 95, 75));
     assert_eq!(decide(&mut requests, &message(&json("next", "50")), 1), "command 11", "one more a second");
+}
+
+#[test]
+fn what_is_shown_of_a_request_is_short() {
+    let mut requests = requests(Ok(RequestLog::default()));
+    decide(&mut requests, &message(&json("a", "-1e308")), 0);
+    assert_eq!(requests.status().last.as_ref().map(|last| last.what.as_str()), Some("a TIC-1.SV = -1e308"));
 }
 
 #[test]

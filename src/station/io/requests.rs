@@ -19,7 +19,12 @@ use tokio::{
 use crate::{
     bus::io::clock::Clock,
     north::{
-        io::{answers, broker::Inbox, request_file, task::RequestChannels},
+        io::{
+            answers::{self, AnswerStatus},
+            broker::Inbox,
+            request_file,
+            task::RequestChannels,
+        },
         payload::Message,
         request::{self, Received},
         requests::{Decision, Now, PassOn, Requests},
@@ -55,13 +60,14 @@ pub(crate) fn start(
     let (publish, status) = watch::channel(MqttRequestStatus::default());
     let lost = Arc::new(AtomicU64::new(0));
     let inbox = Inbox::new(inbox, lost.clone());
-    tokio::spawn(answers::run(answer_queue, client));
+    let (publish_answers, answer_status) = watch::channel(AnswerStatus::default());
+    tokio::spawn(answers::run(answer_queue, client, publish_answers));
     let now = Now { plant: clock.now(), utc: clock.utc() };
     let file = request_file::beside(history);
     let requests = Requests::new(mqtt.clone(), request_file::read(&file), now);
     let task = RequestTask { requests, clock, session, lost, answers, publish, file };
     tokio::spawn(task.run(received, stopped));
-    Some(RequestChannels { inbox, clients, status })
+    Some(RequestChannels { inbox, clients, status, answers: answer_status })
 }
 
 struct RequestTask {
@@ -88,6 +94,7 @@ impl RequestTask {
                 shown.clone_from(self.requests.status());
                 is_news
             });
+            self.record_refusals();
             tokio::select! {
                 biased;
                 () = has_stopped(&mut stopped) => return,
@@ -103,6 +110,15 @@ impl RequestTask {
                 }
                 Some(received) = received.recv() => self.on_received(&received).await,
                 _ = tick.tick() => self.requests.on_lost(self.lost.swap(0, Ordering::Relaxed)),
+            }
+        }
+    }
+
+    fn record_refusals(&mut self) {
+        for refusal in self.requests.refusals(self.now()) {
+            let record = Request::RecordRefusal { what: refusal.what.clone(), outcome: refusal.outcome() };
+            if self.session.send(record).is_err() {
+                self.requests.on_refusal_not_recorded(refusal);
             }
         }
     }
@@ -145,8 +161,9 @@ impl RequestTask {
         answers.for_each(|answer| self.send(answer));
     }
 
-    fn send(&self, answer: Message) {
+    fn send(&mut self, answer: Message) {
         if self.answers.try_send(answer).is_err() {
+            self.requests.on_answer_lost();
             tracing::warn!("an answer to a request from outside had no room");
         }
     }

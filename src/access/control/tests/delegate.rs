@@ -57,6 +57,16 @@ fn disabling_the_user_ends_its_requests_at_once() {
 }
 
 #[test]
+fn a_refusal_before_the_plant_is_on_record_of_requests_only() {
+    let mut bench = bench("tech", AccessDef::default());
+    let effects = bench.access.record_refusal(MES, "\u{1b}[2J", "refused: \u{202e}not a request", bench.now);
+    bench.work(effects);
+    assert_eq!(bench.last(), ("tech request from outside", " [2J", "refused:  not a request"));
+    bench.open(1, "here");
+    assert!(bench.access.record_refusal(1, "?", "refused", bench.now).is_empty(), "a terminal");
+}
+
+#[test]
 fn requests_are_never_locked_and_take_no_place_of_a_terminal() {
     let mut bench = bench("tech", AccessDef { sessions_max: 8, ..AccessDef::default() });
     bench.later(100_000);
