@@ -329,7 +329,7 @@ fn answers_wait_for_a_broker_that_is_restarted() {
     place.simulator().signal("CONT");
     place.wait_until("it has its outcome", |status| status["north"]["requests"]["last"]["result"] != "pending");
     drop(client);
-    // The station may be first, so this broker keeps the answer for nobody: what it was given stands in its words.
+    // The station may be first, so this broker keeps the answer for no subscriber: what it was given stands in its words.
     let mut broker = place.broker("allow_anonymous true\n");
     broker.wait_for("'sightglass/tank/TIC-1/response'");
     place.wait_until("it takes requests", is_ready);
