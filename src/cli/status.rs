@@ -10,6 +10,7 @@ use crate::{
     plant::{
         PlantDef, Snapshot,
         alarm::manager::subject_name,
+        def::DeviceDef,
         event::{LineCounters, LineState},
         line::LineDef,
         line_minute::LineMinute,
@@ -100,7 +101,7 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
     }
     for (device, status) in def.devices.iter().zip(&snapshot.devices) {
         let why = status.diagnosis.map(|reason| format!(": {reason}")).unwrap_or_default();
-        lines.push(format!("device   {:12} {}{why}", device.name, device_word(status.state)));
+        lines.push(format!("device   {:12} {}{why}", device.name, device_word(def, device, status.state)));
     }
     lines.extend(snapshot.alarms.iter().map(|alarm| format!("alarm    {}", alarm_words(snapshot, alarm))));
     if snapshot.alarms.is_empty() {
@@ -209,8 +210,9 @@ fn line_json(def: &PlantDef, line: &LineDef, status: &LineStatus, visible: bool)
     })
 }
 
-fn device_word(state: DeviceState) -> &'static str {
+fn device_word(def: &PlantDef, device: &DeviceDef, state: DeviceState) -> &'static str {
     match state {
+        DeviceState::Unknown if def.listens_on(device.line) => "not heard yet",
         DeviceState::Unknown => "not polled yet",
         DeviceState::Responding => "responding",
         DeviceState::Failing(_) => "fails",
@@ -227,7 +229,7 @@ fn in_json(snapshot: &Snapshot) -> Value {
     let lines = def.lines.iter().zip(&snapshot.lines).map(|(line, status)| line_json(def, line, status, visible));
     let devices = def.devices.iter().zip(&snapshot.devices).map(|(device, status)| {
         json!({
-            "name": device.name, "unit": device.unit, "state": device_word(status.state),
+            "name": device.name, "unit": device.unit, "state": device_word(def, device, status.state),
             "responding": status.state == DeviceState::Responding,
             "ne107": status.diagnosis.map(|reason| reason.to_string()),
             "reply_ms": status.response_time.map(in_ms),

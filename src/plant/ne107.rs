@@ -149,8 +149,8 @@ pub struct DiagnosisInput<'a> {
     pub settling: bool,
     /// What it has answered lately. Reads that its line had no time for are not its fault, so they do not count.
     pub lately: &'a RequestStats,
-    /// How long is waited for an answer.
-    pub timeout: Duration,
+    /// How long is waited for an answer; `None` on the line of another master, whose timeout is not known.
+    pub timeout: Option<Duration>,
     /// What it takes itself, as far as known.
     pub time: Option<DeviceTime>,
 }
@@ -190,14 +190,15 @@ pub fn evaluate(input: DiagnosisInput) -> Option<Reason> {
     }
 }
 
-fn out_of_specification(lately: &RequestStats, timeout: Duration) -> Option<Reason> {
+fn out_of_specification(lately: &RequestStats, timeout: Option<Duration>) -> Option<Reason> {
     let enough = REQUESTS_MIN <= lately.requests;
-    let slow = lately.response_time.p99().filter(|p99| enough && timeout * SLOW_PERCENT < *p99 * 100);
+    let times = timeout.filter(|_| enough).zip(lately.response_time.p99());
+    let slow = times.filter(|(timeout, p99)| *timeout * SLOW_PERCENT < *p99 * 100);
     if lately.fails_since(NO_VALUES_AFTER) {
         return Some(Reason::NoValues);
     }
     let (failed, of) = lately.recent();
-    if let Some(p99) = slow {
+    if let Some((timeout, p99)) = slow {
         Some(Reason::Slow { p99, timeout })
     } else if enough && of * FAILING_PERCENT <= failed * 100 {
         Some(Reason::Failing { failed, of })
@@ -243,7 +244,7 @@ mod tests {
     }
 
     fn check(line: &LineState, device: DeviceState, settling: bool, lately: &RequestStats, expect: &str) {
-        let timeout = Duration::from_millis(300);
+        let timeout = Some(Duration::from_millis(300));
         let reason = evaluate(DiagnosisInput { device, line, settling, lately, timeout, time: None });
         let words = reason.map(|reason| format!("{} {reason}", reason.signal().word()));
         assert_eq!(words.as_deref().unwrap_or(""), expect);
@@ -260,7 +261,7 @@ mod tests {
                 line: &LineState::Connected,
                 settling: false,
                 lately: &stats(30, 12, &[]),
-                timeout: ms(300),
+                timeout: Some(ms(300)),
                 time: Some(DeviceTime::new(&seen)),
             })
         };
@@ -291,6 +292,9 @@ mod tests {
         check(&stats(1_000, 200, &[]), "");
         check(&stats(1_000, 260, &[]), "S responses take 260 of 300 ms");
         check(&stats(10, 260, &[]), "");
+        let (device, line, lately) = (UP, &LineState::Connected, &stats(1_000, 260, &[]));
+        let unknown = DiagnosisInput { device, line, settling: false, lately, timeout: None, time: None };
+        assert_eq!(evaluate(unknown), None, "the timeout of another master is not known");
         check(&stats(94, 12, &[Fault::Timeout; 6]), "");
         check(&stats(93, 12, &[Fault::Timeout; 7]), "S 7 of 64 requests failed");
         check(&stats(3, 12, &[Fault::Timeout; 3]), "");

@@ -8,7 +8,7 @@ use ratatui::layout::Rect;
 use super::{
     Clock, ViewContext,
     context::view_context,
-    modal::confirm::subject,
+    modal::{confirm::subject, faceplate::unknown_text},
     preferences::Preferences,
     tabs::alarms::actions,
     theme::Theme,
@@ -115,7 +115,7 @@ fn facts(cx: &ViewContext) -> BTreeMap<Fact, (String, Option<Quality>)> {
     let devices = def.devices.iter().filter(|device| !is_retry(device.line)).map(|device| {
         let status = snapshot.device(device.id);
         let why = status.diagnosis.map(|reason| format!(", {reason}")).unwrap_or_default();
-        let state = device_label(status.state);
+        let state = device_label(cx, device.id);
         (Fact::Device(device.id), t!("device {name}: {state}{why}", name = device.name, state, why))
     });
     let alarm = |line: String| t!("alarm: {line}", line);
@@ -182,9 +182,9 @@ fn alarm_label(state: AlarmState) -> &'static str {
     }
 }
 
-fn device_label(state: DeviceState) -> &'static str {
-    match state {
-        DeviceState::Unknown => t!("not polled yet"),
+fn device_label(cx: &ViewContext, device: DeviceId) -> &'static str {
+    match cx.snapshot.device(device).state {
+        DeviceState::Unknown => unknown_text(cx, device),
         DeviceState::Responding => t!("responding"),
         DeviceState::Failing(_) => t!("requests fail"),
         DeviceState::Down { .. } => t!("not responding"),

@@ -48,7 +48,8 @@ impl Plant {
             let tracker = &self.line_minutes[def.line.index()];
             let report = line.report.as_deref();
             let lately = report.map(|report| tracker.lately(report, def.id)).unwrap_or_default();
-            let timeout = report.map_or(self.def.line(def.line).timeout, |report| report.settings.timeout);
+            let settings = report.map_or(self.def.line(def.line), |report| &report.settings);
+            let timeout = (!settings.listens).then_some(settings.timeout);
             let settling = self.settling(def.id);
             let time = report.and_then(|report| report.device_time(def.id));
             let input =

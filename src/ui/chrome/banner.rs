@@ -73,7 +73,7 @@ pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let tail = tails.iter().find(|(least, tail)| fits(*least, tail)).map_or("", |(_, tail)| tail.trim_end());
     let end = room.saturating_sub(1);
     let left = end.saturating_sub(x + if tail.is_empty() { 0 } else { 2 + width(tail) });
-    let whole = format!("{text}  {value}");
+    let whole = format!("{text}  {value}").trim_end().to_owned();
     let shown = if width(&whole) <= left { whole } else { fit_words(&text, left) };
     canvas.text(x, 0, &shown, style);
     canvas.text_right(end, 0, tail, cx.theme.normal());
@@ -168,7 +168,10 @@ fn what_text(cx: &ViewContext, alarm: &ActiveAlarm) -> (String, String) {
         Subject::Line(line) => line_state_text(cx, line),
         Subject::Station => cx.snapshot.fault_details(alarm.id).to_owned(),
     };
-    (format!("{} {}", subject(cx, alarm.id), translate(&def.message)), now)
+    let message = translate(&def.message);
+    // The message of "no traffic heard" is the state of its line.
+    let now = if now == message { String::new() } else { now };
+    (format!("{} {message}", subject(cx, alarm.id)), now)
 }
 
 /// `UNACK 00:41`: the state and how long it lasts.

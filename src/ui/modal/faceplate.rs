@@ -235,11 +235,16 @@ fn command_of(cx: &ViewContext, tag: TagId) -> Option<TagId> {
     (actuator.output == tag).then_some(actuator.command)
 }
 
+/// Why nothing is known of a device: it was not polled yet, or its master was not heard.
+pub fn unknown_text(cx: &ViewContext, device: DeviceId) -> &'static str {
+    if cx.def().listens_on(cx.def().device(device).line) { t!("not heard yet") } else { t!("not polled yet") }
+}
+
 /// How a device stands, in words.
 pub fn device_text(cx: &ViewContext, device: DeviceId) -> String {
     let status = cx.snapshot.device(device);
     match status.state {
-        DeviceState::Unknown => t!("not polled yet").to_owned(),
+        DeviceState::Unknown => unknown_text(cx, device).to_owned(),
         DeviceState::Responding => match status.response_time {
             Some(reply) => t!("OK, {reply} ms", reply = reply.as_millis()),
             None => t!("OK").to_owned(),

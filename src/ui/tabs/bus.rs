@@ -119,7 +119,7 @@ impl TabView for Bus {
         if self.page(cx) == Page::Registers && self.registers.handles(cx, event) {
             return self.registers.on_key(&below(cx), event);
         }
-        let action = find(&table(cx, self.page(cx)), event);
+        let action = find(&table(cx, self.page(cx), self.line), event);
         let (Some(action), Some(at)) = (action, LineView::new(cx, self.line)) else { return Vec::new() };
         self.frames.dismiss();
         match action {
@@ -154,7 +154,7 @@ impl TabView for Bus {
         if self.page(cx) == Page::Registers && self.registers.has_graph() {
             return self.registers.hints(&below(cx));
         }
-        let mut keys = table(cx, self.page(cx));
+        let mut keys = table(cx, self.page(cx), self.line);
         let is_testing = LineView::new(cx, self.line).is_some_and(|at| at.is_testing());
         hide(&mut keys, &[(Action::Stop, !is_testing)]);
         if 1 < cx.def().lines.len() {

@@ -50,8 +50,14 @@ pub(super) fn exchange_rows(
     let old = !cx.snapshot.sample(def.id).quality.is_good() && exchange.outcome.is_ok();
     rows.push(Row::new("", t!("{summary}, at {at}", summary = request.summary, at), theme.dim()));
     if exchange.answer.is_empty() {
-        let timeout = settings(cx, def).timeout;
-        rows.push(Row::new(t!("response"), t!("none within {span}", span = span(timeout)), theme.trouble()));
+        let line = settings(cx, def);
+        // How long the other master waits is not known.
+        let none = if line.listens {
+            t!("none heard").to_owned()
+        } else {
+            t!("none within {span}", span = span(line.timeout))
+        };
+        rows.push(Row::new(t!("response"), none, theme.trouble()));
     } else {
         for (n, text) in frame(&exchange.answer, found.map(|found| &found.range)).into_iter().enumerate() {
             rows.push(hex(if n == 0 { t!("response") } else { "" }, text, theme.normal()));
@@ -59,8 +65,13 @@ pub(super) fn exchange_rows(
         rows.push(Row { wraps: false, ..Row::new("", answer.summary.clone(), theme.dim()) });
     }
     let reply = exchange.response_time.map(|reply| t!(", after {span}", span = span(reply))).unwrap_or_default();
-    let tries =
-        if 1 < exchange.tries { t!(", second attempt: the first response was corrupt") } else { t!(", first attempt") };
+    let tries = if settings(cx, def).listens {
+        ""
+    } else if 1 < exchange.tries {
+        t!(", second attempt: the first response was corrupt")
+    } else {
+        t!(", first attempt")
+    };
     let (verdict, style) = match exchange.outcome {
         Ok(()) if old => {
             let ago = running(elapsed(exchange.at, cx.now));

@@ -101,7 +101,10 @@ fn settings(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     let (tx, rx) = (recent(counters.last_tx), recent(counters.last_rx));
     let deaf = tx && !rx;
     let nothing = if deaf { t!(" no response") } else { "" };
-    let lamps = t!("TX {lamp} RX {lamp2}{value}", lamp = lamp(tx), lamp2 = lamp(rx), value = nothing);
+    let lamps = match line.listens {
+        true => t!("RX {lamp}", lamp = lamp(rx)),
+        false => t!("TX {lamp} RX {lamp2}{value}", lamp = lamp(tx), lamp2 = lamp(rx), value = nothing),
+    };
     parts.push(plain(lamps, if deaf { theme.trouble() } else { theme.normal() }));
     flow(t!("settings"), theme.dim(), width, parts)
 }
@@ -160,12 +163,17 @@ fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) ->
     parts.extend([count(t!("late"), counters.late), count(t!("unexpected"), counters.unexpected)]);
     let mut rows = flow(if listens { t!("heard") } else { t!("requests") }, dim, width, parts);
     let lost = at.status.state != LineState::Connected;
-    let parts = [
-        value(cx, t!("bytes out"), &grouped(counters.sent_bytes)),
-        value(cx, t!("in"), &grouped(counters.received_bytes)),
+    let bytes = match listens {
+        true => vec![value(cx, t!("bytes in"), &grouped(counters.received_bytes))],
+        false => vec![
+            value(cx, t!("bytes out"), &grouped(counters.sent_bytes)),
+            value(cx, t!("in"), &grouped(counters.received_bytes)),
+        ],
+    };
+    let parts = bytes.into_iter().chain([
         value(cx, t!("frames"), &grouped(counters.frames)),
         self::count(cx, t!("reconnects"), counters.opens.saturating_sub(1), lost),
-    ];
+    ]);
     rows.extend(flow(t!("traffic"), dim, width, parts));
     if let Some(uart) = counters.uart {
         let kinds = [
@@ -231,7 +239,8 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
         number(t!("reply"), 1),
         number("p99", 3),
         number(t!("max"), 3),
-        words(t!("of the timeout"), 5),
+        // How long the other master waits is not known.
+        words(if at.settings.listens { "" } else { t!("of the timeout") }, 5),
     ];
     let mut styles = Vec::new();
     let mut lines = Vec::new();
@@ -247,7 +256,6 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
         styles.push(if ill { cx.theme.trouble() } else { cx.theme.normal() });
         let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
         let (failed, of) = stats.recent();
-        // How long the other master waits is not known.
         let p99 = stats.response_time.p99().filter(|_| !at.settings.listens);
         let share = p99.map(|p99| p99.as_secs_f64() / report.settings.timeout.as_secs_f64());
         lines.push([
@@ -272,6 +280,7 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
 
 fn state(cx: &ViewContext, device: &DeviceDef) -> String {
     match cx.snapshot.device(device.id).state {
+        DeviceState::Unknown if cx.def().listens_on(device.line) => t!("not heard").to_owned(),
         DeviceState::Unknown => t!("not polled").to_owned(),
         DeviceState::Responding => t!("OK").to_owned(),
         DeviceState::Failing(times) => t!("failing {times}×", times),

@@ -6,7 +6,7 @@ use crate::plant::{
     snapshot::ActiveAlarm,
     tag::{Access, Poll},
 };
-use crate::ui::tabs::prelude::*;
+use crate::ui::{modal::faceplate::unknown_text, tabs::prelude::*};
 
 /// Widths that depend on the plant and the screen.
 struct Columns {
@@ -218,7 +218,7 @@ pub fn state(cx: &ViewContext, device: DeviceId) -> (String, String, Style) {
     match (status.diagnosis, status.state) {
         (Some(reason), _) => (signal_mark(reason.signal()), reason.to_string(), cx.theme.trouble()),
         (None, DeviceState::Responding) => ("✓".to_owned(), t!("good").to_owned(), cx.theme.dim()),
-        (None, DeviceState::Unknown) => ("?".to_owned(), t!("not polled yet").to_owned(), cx.theme.dim()),
+        (None, DeviceState::Unknown) => ("?".to_owned(), unknown_text(cx, device).to_owned(), cx.theme.dim()),
         (None, DeviceState::Failing(n)) => ("✗".to_owned(), t!("failing, {n} in a row", n), cx.theme.trouble()),
         (None, DeviceState::Down { .. }) => ("✗".to_owned(), t!("not responding").to_owned(), cx.theme.trouble()),
     }

@@ -6,6 +6,7 @@ use super::{Registers, view};
 use crate::{
     access::right::needs_for_query,
     plant::{
+        command::Refusal,
         live::{AddressSpan, LiveRead},
         number::to_u32,
     },
@@ -66,7 +67,8 @@ impl Registers {
         let relearn = std::mem::take(&mut self.relearn);
         let spans = std::iter::once(span).chain(self.watched_spans(span)).collect();
         let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
-        if let Some(why) = rights::lacks(cx, needs_for_query(&query)) {
+        let silent = cx.def().listens_on(self.line).then(|| Refusal::OnlyListens.to_string());
+        if let Some(why) = silent.or_else(|| rights::lacks(cx, needs_for_query(&query))) {
             self.trouble = Some(why);
             return Vec::new();
         }
