@@ -35,7 +35,9 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     check_names(tables, problems);
     check_order(tables, problems);
     let of_devices = defs.devices.iter().map(|device| (&device.name, not_responding(device)));
-    let timed = defs.devices.iter().filter(|device| device.response_time.is_some());
+    // What another master polls has no worst case here.
+    let is_polled = |device: &DeviceDef| defs.lines.get(device.line.index()).is_none_or(|line| !line.listens);
+    let timed = defs.devices.iter().filter(|device| device.response_time.is_some() && is_polled(device));
     let of_timed = timed.map(|device| (&device.name, slower_than_stated(device)));
     let of_lines =
         defs.lines.iter().map(|line| (&line.name, if line.listens { no_traffic(line) } else { overloaded(line) }));
@@ -159,62 +161,85 @@ fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
     }
 }
 
-fn not_responding(device: &DeviceDef) -> AlarmDef {
-    let guidance = [
-        "the device has no power, its cable is open, or its unit address or serial parameters differ",
-        "its values are unknown and it cannot be operated",
-        "check the device; then supply, cable, terminator and the Bus tab",
-    ];
-    AlarmDef {
-        class: AlarmClass::System,
-        // The link has already asked more than once; the delay keeps a single lost frame quiet.
-        on_delay: Duration::from_secs(3),
-        guidance: Guidance::new(guidance, Some(Duration::from_secs(600))),
-        ..AlarmDef::new(AlarmId(0), Subject::Device(device.id), Condition::NotResponding, "not responding")
+/// The alarms that devices and lines have by themselves.
+#[derive(Clone, Copy)]
+enum Own {
+    NotResponding,
+    SlowerThanStated,
+    NoTraffic,
+    Overloaded,
+}
+
+impl Own {
+    fn message(self) -> &'static str {
+        match self {
+            Own::NotResponding => "not responding",
+            Own::SlowerThanStated => "slower than its profile states",
+            Own::NoTraffic => "no traffic heard",
+            Own::Overloaded => "line overloaded",
+        }
+    }
+
+    /// Likely cause, effect, action.
+    fn guidance(self) -> [&'static str; 3] {
+        match self {
+            Own::NotResponding => [
+                "the device has no power, its cable is open, or its unit address or serial parameters differ",
+                "its values are unknown and it cannot be operated",
+                "check the device; then supply, cable, terminator and the Bus tab",
+            ],
+            Own::SlowerThanStated => [
+                "the device takes longer than `response_time_ms` of its profile, or adapter, gateway or computer delay it",
+                "its values are right; the worst case of its polls was too low, so polls of its line may be late",
+                "raise `response_time_ms` of the device ([device.limits] in the plant file), or poll it less often; Bus tab",
+            ],
+            Own::NoTraffic => [
+                "the other master has stopped or is off, or the wire to this port is broken",
+                "none of the values of this line is known",
+                "check whether the other master runs; then the wires and the settings of the port; Bus tab",
+            ],
+            Own::Overloaded => [
+                "the line is polled more often than it can carry, or its devices answer more slowly",
+                "alarm inputs are polled on time, other values less often; no device is faulty",
+                "see the Bus tab; poll less often, increase the baud rate, or split the line",
+            ],
+        }
+    }
+
+    fn alarm(self, subject: Subject, condition: Condition, response_time: Option<Duration>) -> AlarmDef {
+        AlarmDef {
+            class: AlarmClass::System,
+            guidance: Guidance::new(self.guidance(), response_time),
+            ..AlarmDef::new(AlarmId(0), subject, condition, self.message())
+        }
     }
 }
 
+/// How soon to respond where values are unknown.
+const UNKNOWN_RESPONSE: Option<Duration> = Some(Duration::from_secs(600));
+
+fn not_responding(device: &DeviceDef) -> AlarmDef {
+    let subject = Subject::Device(device.id);
+    // The link has already asked more than once; the delay keeps a single lost frame quiet.
+    let on_delay = Duration::from_secs(3);
+    AlarmDef { on_delay, ..Own::NotResponding.alarm(subject, Condition::NotResponding, UNKNOWN_RESPONSE) }
+}
+
 fn slower_than_stated(device: &DeviceDef) -> AlarmDef {
-    let guidance = [
-        "the device takes longer than `response_time_ms` of its profile, or adapter, gateway or computer delay it",
-        "its values are right; the worst case of its polls was too low, so polls of its line may be late",
-        "raise `response_time_ms` of the device ([device.limits] in the plant file), or poll it less often; Bus tab",
-    ];
-    let (subject, condition) = (Subject::Device(device.id), Condition::SlowerThanStated);
-    AlarmDef {
-        priority: Priority::Low,
-        class: AlarmClass::System,
-        guidance: Guidance::new(guidance, None),
-        ..AlarmDef::new(AlarmId(0), subject, condition, "slower than its profile states")
-    }
+    let subject = Subject::Device(device.id);
+    AlarmDef { priority: Priority::Low, ..Own::SlowerThanStated.alarm(subject, Condition::SlowerThanStated, None) }
 }
 
 /// The line of another master: nothing is known of its devices while it is silent.
 fn no_traffic(line: &LineDef) -> AlarmDef {
-    let guidance = [
-        "the other master has stopped or is off, or the wire to this port is broken",
-        "none of the values of this line is known",
-        "see whether the other master runs, then the wires and the settings of the port; Bus tab",
-    ];
-    AlarmDef {
-        class: AlarmClass::System,
-        guidance: Guidance::new(guidance, Some(Duration::from_secs(600))),
-        ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), Condition::NotConnected, "no traffic heard")
-    }
+    Own::NoTraffic.alarm(Subject::Line(line.id), Condition::NotConnected, UNKNOWN_RESPONSE)
 }
 
 fn overloaded(line: &LineDef) -> AlarmDef {
-    let guidance = [
-        "the line is polled more often than it can carry, or its devices answer more slowly",
-        "alarm inputs are polled on time, other values less often; no device is faulty",
-        "see the Bus tab; poll less often, increase the baud rate, or split the line",
-    ];
     AlarmDef {
         priority: Priority::Low,
-        class: AlarmClass::System,
         // The schedule has already seen more than a short peak.
         on_delay: Duration::from_secs(10),
-        guidance: Guidance::new(guidance, None),
-        ..AlarmDef::new(AlarmId(0), Subject::Line(line.id), Condition::Overloaded, "line overloaded")
+        ..Own::Overloaded.alarm(Subject::Line(line.id), Condition::Overloaded, None)
     }
 }
