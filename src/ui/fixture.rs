@@ -161,6 +161,13 @@ impl Fixture {
         plant
     }
 
+    /// The same line, polled by another master: only heard.
+    pub fn listening() -> Fixture {
+        let mut plant = Fixture::traffic();
+        traffic::heard(&mut plant);
+        plant
+    }
+
     /// The id of a tag of the fixture.
     pub fn tag(&self, name: &str) -> TagId {
         self.def.tag_named(name).unwrap_or_else(|| panic!("the fixture has no tag {name}"))

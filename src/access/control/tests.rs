@@ -1,6 +1,8 @@
 //! What a user at a terminal sees of access control: logins, lockouts, locks, roles, reauthentication, in virtual time.
 #![allow(clippy::unwrap_used)]
 
+mod live_reads;
+
 use std::time::Duration;
 
 use proptest::prelude::*;

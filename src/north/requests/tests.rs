@@ -6,7 +6,7 @@ use crate::{
         payload::tests::mqtt,
         request::tests::{at, json, message},
     },
-    plant::{command::Refusal, event::Fault, fixture},
+    plant::{Plant, command::Refusal, event::Fault, fixture},
 };
 
 const TERMINAL: u32 = 7;
@@ -80,6 +80,20 @@ fn a_request_that_expires_while_the_list_is_written_is_not_sent() {
     };
     assert_eq!(passed_on(29), Ok(1));
     assert_eq!(passed_on(30), Err(MqttRefusal::Expired), "the disk took half a minute");
+}
+
+#[test]
+fn a_request_for_a_listening_line_is_refused_by_the_plant() {
+    let mut def = fixture::plant();
+    def.lines[0].listens = true;
+    let mut plant = Plant::new(def.into(), at(0), 1.0);
+    let mut requests = requests(Ok(RequestLog::default()));
+    decide(&mut requests, &message(&json("a", "50")), 0);
+    let status = snapshot(1, Outcome::Pending).commands.remove(0);
+    assert!(plant.on_command(status, at(0)).bus.is_empty(), "nothing goes to the line");
+    let answers = requests.on_snapshot(&plant.snapshot(), TERMINAL, now(1));
+    assert_eq!(results(&answers), ["refused"]);
+    assert_eq!(answer(&answers[0])["reason"], Refusal::OnlyListens.to_string());
 }
 
 #[test]

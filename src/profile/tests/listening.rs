@@ -56,3 +56,47 @@ fn what_makes_no_sense_on_a_listening_line_has_a_place() {
         }
     }
 }
+
+const PROCEDURE: &str = r#"
+[[procedure]]
+name = "heat"
+steps = [{ write = "M1.MODE", value = "on" }]
+safe = [{ write = "M1.MODE", value = "off" }]
+"#;
+
+#[test]
+fn a_procedure_writes_nothing_on_a_listening_line() {
+    let meter = format!("{METER}\n[faceplate]\npv = \"T\"\nsv = \"MODE\"\n");
+    let plant = |from: &str, to: &str| load((HEARD.replace(from, to) + PROCEDURE).as_bytes(), &meter, PLC);
+    let errors = plant("", "").expect_err("it writes").to_string();
+    for piece in ["small.toml:19:20", "M1.MODE is on a line that only listens", "nothing can be written"] {
+        assert!(errors.contains(piece), "no `{piece}` in\n{errors}");
+    }
+    assert_eq!(errors.matches("only listens").count(), 2, "the step and the safe state:\n{errors}");
+    let polled = plant("mode = \"listen\"", "mode = \"rtu\"");
+    assert!(polled.is_ok(), "{:?}", polled.err().map(|errors| errors.to_string()));
+}
+
+#[test]
+fn an_interlock_on_a_listening_line_is_a_warning() {
+    let interlock =
+        "\n[[interlock]]\ntag = \"M1.MODE\"\nvalue = \"on\"\nof = \"M1.T\"\nabove = 80.0\nmessage = \"hot\"\n";
+    let plant = HEARD.to_owned() + interlock;
+    let warned = |plant: &str| pictures::warnings(plant, METER).join("\n");
+    let words = warned(&plant);
+    assert!(words.contains("small.toml:18:7: M1.MODE is on a line that only listens"), "{words}");
+    let polled = warned(&plant.replace("mode = \"listen\"", "mode = \"rtu\""));
+    assert!(!polled.contains("only listens"), "{polled}");
+}
+
+#[test]
+fn only_what_is_polled_has_alarms_about_its_polls() {
+    let meter = METER.replace("[limits]", "[limits]\nresponse_time_ms = 30");
+    let own = |from: &str, to: &str| -> Vec<String> {
+        let plant = load(HEARD.replace(from, to).as_bytes(), &meter, PLC).unwrap_or_else(|errors| panic!("{errors}"));
+        plant.alarms.iter().map(|alarm| alarm.message.clone()).collect()
+    };
+    let slow = "slower than its profile states".to_owned();
+    assert!(!own("", "").contains(&slow));
+    assert!(own("mode = \"listen\"", "mode = \"rtu\"").contains(&slow));
+}

@@ -208,7 +208,7 @@ fn what_cannot_be_drawn_is_shown_in_the_picture() {
 }
 
 /// The warnings of a plant file, whose meters have this profile.
-fn warnings(plant: &str, meter: &str) -> Vec<String> {
+pub(super) fn warnings(plant: &str, meter: &str) -> Vec<String> {
     let plant = Text { file: "small.toml".to_owned(), bytes: plant.as_bytes().to_vec() };
     let find = |name: &str| {
         let text = if name == "meter" { meter } else { PLC };

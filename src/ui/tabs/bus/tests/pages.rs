@@ -258,3 +258,42 @@ fn no_signal_is_set_where_the_driver_has_it_or_there_is_none() {
     });
     assert!(shown.contains("the driver switches RTS on this line"), "{shown}");
 }
+
+#[test]
+fn a_listening_line_shows_only_what_is_heard() {
+    let mut model = bus(&Fixture::listening(), Theme::FULL, "l");
+    let shown = screen(&mut model, 80, 24);
+    insta::assert_snapshot!("line_heard_80x24", shown);
+    for words in ["TX", "bytes out", "timeout ", "retry", "c settings", "cycle"] {
+        assert!(!shown.contains(words), "{words}:\n{shown}");
+    }
+    for key in ["r", "c"] {
+        assert_eq!(type_keys(&mut model, key), []);
+        assert!(model.modal.is_none(), "{key}");
+    }
+    type_keys(&mut model, "R");
+    let shown = screen(&mut model, 80, 24);
+    assert!(shown.contains("unit 1   this line only listens: another master polls it"), "{shown}");
+}
+
+#[test]
+fn a_silent_master_is_said_once() {
+    use crate::plant::{
+        alarm::AlarmState,
+        def::{AlarmDef, AlarmId, Condition, Subject},
+        snapshot::ActiveAlarm,
+    };
+    let mut fixture = Fixture::listening();
+    fixture.line.state = LineState::NoTraffic;
+    for device in &mut fixture.devices {
+        (device.state, device.diagnosis) = (DeviceState::Unknown, Some(Reason::NoTraffic));
+    }
+    let id = AlarmId(u16::try_from(fixture.def.alarms.len()).expect("a few"));
+    let alarm = AlarmDef::new(id, Subject::Line(L1), Condition::NotConnected, "no traffic heard");
+    fixture.def.alarms.push(alarm);
+    fixture.alarms = vec![ActiveAlarm::new(id, AlarmState::Unacknowledged, now())];
+    let shown = screen(&mut bus(&fixture, Theme::FULL, "l"), 80, 24);
+    let banner = shown.lines().nth(2).expect("a banner");
+    assert_eq!(banner.matches("no traffic heard").count(), 1, "{shown}");
+    assert!(!shown.contains("not polled") && shown.contains("not heard"), "{shown}");
+}
