@@ -251,6 +251,7 @@ fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> 
             diagnosed || is_ill(cx, device) || (!at.settings.listens && near(stats, report.settings.timeout).is_some());
         let mark = match cx.snapshot.device(device.id).diagnosis {
             Some(reason) => signal_mark(reason.signal()),
+            None if cx.snapshot.device(device.id).state == DeviceState::Unknown => "?".to_owned(),
             None => if ill { "!" } else { "✓" }.to_owned(),
         };
         styles.push(if ill { cx.theme.trouble() } else { cx.theme.normal() });
