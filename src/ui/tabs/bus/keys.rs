@@ -85,12 +85,9 @@ const REGISTERS_KEY: Key<Action> =
 /// The keys of a page here, for the line that is shown.
 pub(super) fn table(cx: &ViewContext, page: Page, line: LineId) -> Vec<Key<Action>> {
     let mut keys = all(page);
-    keys.retain(|key| match key.action {
-        Action::Show(Page::Registers) => Page::offered(cx).contains(&Page::Registers),
-        // Nothing is sent on the line of another master, and it has no settings to try.
-        Action::Retry | Action::Settings => !cx.def().listens_on(line),
-        _ => true,
-    });
+    keys.retain(|key| key.action != REGISTERS_KEY.action || Page::offered(cx).contains(&Page::Registers));
+    // Nothing is sent on the line of another master, and it has no settings to try.
+    keys.retain(|key| ![Action::Retry, Action::Settings].contains(&key.action) || !cx.def().listens_on(line));
     keys
 }
 
