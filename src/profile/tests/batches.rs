@@ -58,10 +58,14 @@ fn a_controller_has_runs_and_the_plant_file_refines_them() {
         ("2min", "5s", "this is not the time of a run"),
         ("[\"soup\"]", "[\"soap\"]", "unknown batch `soap`"),
         ("tags = [\"D1.T\"]", "energy = \"D1.T\"", "D1.T has the unit `°C`"),
+        ("tags = [\"D1.T\"]", "tags = []", "a run without a tag"),
+        ("tags = [\"D1.T\"]", "tags = [\"D1.T\", \"D1.T\"]", "tag D1.T is named twice"),
+        ("[\"soup\"]", "[]", "a run without a batch"),
+        ("[\"soup\"]", "[\"soup\", \"soup\"]", "batch soup is named twice"),
         ("band", "bandwidth", "unknown key `bandwidth`"),
     ] {
         let text = controller(&table.replace(from, to)).expect_err(to).to_string();
-        assert!(text.contains(expect), "{to}: {text}");
+        assert!(text.contains(expect) && text.contains("small.toml:"), "{to}: {text}");
     }
     let text = controller(&format!("{table}{table}")).expect_err("twice").to_string();
     assert!(text.contains("duplicate run of `D1`"), "{text}");
