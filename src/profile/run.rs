@@ -70,10 +70,10 @@ fn each<'a>(list: &'a At<Texts>, what: &str, problems: &mut Problems) -> Vec<&'a
         problems.add(list.at, format!("a run without a {what}")).label("expected at least one, or no such key");
     }
     let mut seen = Unique::default();
-    let mut is_new = |name: &&At<String>| {
+    let mut is_new = |name: &At<String>, problems: &mut Problems| {
         seen.insert(&name.value, name.at, format!("{what} {} is named twice", name.value), problems)
     };
-    list.value.0.iter().filter(|name| is_new(name)).collect()
+    list.value.0.iter().filter(|name| is_new(name, problems)).collect()
 }
 
 /// Batches that summarise a tag of the controller begin its runs, and their energy is that of the run.
