@@ -1,5 +1,5 @@
 //! What the audit log gets of the refusals of requests before the plant: the first of each kind at once, then one entry a minute
-//! with their number, so that no flood can fill it.
+//! with their number, so that no flood can fill it; the rest when the station ends.
 
 use std::{mem::discriminant, time::Duration};
 
@@ -57,6 +57,11 @@ impl Refusals {
         })
         .collect()
     }
+
+    /// All that was counted since the last entry of its kind.
+    pub fn take_all(&mut self) -> Vec<Refusal> {
+        self.kinds.drain(..).map(|kind| kind.latest).filter(|refusal| 0 < refusal.count).collect()
+    }
 }
 
 impl Refusal {
@@ -98,7 +103,14 @@ mod tests {
                 _ => assert!(found.len() <= usize::from(second % 60 < 2), "{second}: {found:?}"),
             }
         }
-        assert_eq!(recorded(&mut refusals, 2_000).len(), 2, "the rest");
+        let rest: Vec<String> = refusals.take_all().iter().map(Refusal::outcome).collect();
+        assert_eq!(
+            rest,
+            ["refused: 39 requests, the last: it has expired", "refused: 38 requests, the last: not a request: 999"]
+        );
+        assert!(refusals.take_all().is_empty(), "each is handed out once");
+        refuse(&mut refusals, "c", MqttRefusal::Expired);
+        assert_eq!(recorded(&mut refusals, 2_000).len(), 1);
         assert!(recorded(&mut refusals, 3_000).is_empty() && refusals.kinds.is_empty(), "and nothing is kept");
     }
 }

@@ -152,6 +152,11 @@ impl Requests {
         self.refusals.take(now.plant)
     }
 
+    /// All that are not recorded yet: the station ends.
+    pub fn last_refusals(&mut self) -> Vec<Refusal> {
+        self.refusals.take_all()
+    }
+
     /// They could not be recorded now.
     pub fn on_refusal_not_recorded(&mut self, refusal: Refusal) {
         self.refusals.count(refusal);

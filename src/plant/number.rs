@@ -75,6 +75,17 @@ pub(crate) fn to_f32(number: f64) -> f32 {
     number as f32
 }
 
+/// The digits of a number; of one that is so large or small that most of them say nothing, those that do and its exponent.
+pub(crate) fn digits(number: f64, decimals: Option<u8>) -> String {
+    let size = number.abs();
+    match decimals {
+        _ if 1e15 <= size && size.is_finite() => format!("{number:e}"),
+        Some(decimals) => format!("{number:.*}", usize::from(decimals)),
+        None if size < 1e-9 && number != 0.0 => format!("{number:e}"),
+        None => number.to_string(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -86,5 +97,21 @@ mod tests {
         assert_eq!((to_u64(1e30), to_u64(-0.5), to_u64(u128::MAX)), (u64::MAX, 0, u64::MAX));
         assert_eq!((to_i64(f64::INFINITY), to_usize(-1_isize), to_u16(7_f32)), (i64::MAX, 0, 7));
         assert_eq!((to_f32(0.1), to_f32(1e300)), (0.1_f32, f32::INFINITY));
+    }
+
+    #[test]
+    fn digits_that_say_nothing_are_not_written() {
+        for (number, decimals, expect) in [
+            (1e308, Some(1), "1e308"),
+            (-1e308, None, "-1e308"),
+            (1e-300, None, "1e-300"),
+            (1e-300, Some(2), "0.00"),
+            (123_456_789_012.25, Some(1), "123456789012.2"),
+            (72.4, None, "72.4"),
+            (0.0, None, "0"),
+            (f64::INFINITY, Some(1), "inf"),
+        ] {
+            assert_eq!(digits(number, decimals), expect);
+        }
     }
 }

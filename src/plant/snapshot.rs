@@ -22,7 +22,7 @@ use super::{
     line_report::LineReport,
     ne107,
     north_def::NorthStatus,
-    number::to_u32,
+    number::{digits, to_u32},
     parameter_set::StoredSet,
     procedure::ProcedureRun,
     process_load::ProcessLoad,
@@ -153,7 +153,7 @@ impl Snapshot {
     pub fn format(&self, tag: TagId, value: f64) -> String {
         match self.def.tag(tag).label_of(value) {
             Some(label) => label.to_owned(),
-            None => format!("{value:.*}", usize::from(self.decimals[tag.index()])),
+            None => digits(value, Some(self.decimals[tag.index()])),
         }
     }
     /// A value as the device will hold it once it is written; as it is where it cannot be sent.

@@ -12,7 +12,8 @@ use super::{
     units,
 };
 use crate::plant::{
-    def::{ActionDef, Faceplate, Limits, Probe},
+    def::{ActionDef, Faceplate, Limits, Probe, TagId},
+    output::Output,
     tag::{Access, Point, Poll, TagDef},
 };
 
@@ -320,6 +321,15 @@ pub(super) fn signature(table: &SignatureTable, scope: &Scope, problems: &mut Pr
         probes.push(Probe { tag: tag.id, ranges, bits: bits.map(|bit| bit.id) });
     }
     probes
+}
+
+/// What an output is at its terminals is calculated from percent.
+pub(super) fn check_output(output: Option<At<Output>>, mv: Option<TagId>, tags: &[TagDef], problems: &mut Problems) {
+    let (Some(output), Some(mv)) = (output, mv.map(|mv| &tags[mv.index()])) else { return };
+    if mv.unit != "%" || mv.unit_from.is_some() {
+        let problem = problems.add(output.at, format!("{} has the unit `{}`", mv.name, mv.unit));
+        problem.label("expected a faceplate whose `mv` is in %");
+    }
 }
 
 /// The actions of a device.

@@ -17,10 +17,13 @@ use crate::plant::{
 
 /// The lines in the order of the file.
 pub(super) fn lines(tables: &[At<Raw>], problems: &mut Problems) -> Vec<LineDef> {
-    let mut seen = Unique::default();
+    let (mut seen, mut ports) = (Unique::default(), Unique::default());
     let mut lines = Vec::new();
     for (index, table) in tables.iter().enumerate() {
         let raw = table.value.clone();
+        if let Some((_, At { value: Node::Text(port), at })) = raw.table.get("port") {
+            ports.insert(port, *at, format!("another line has the port {port}"), problems);
+        }
         let Some(mode) = kind_of::<Mode>(&raw, "a line", "mode", problems) else { continue };
         let id = LineId(to_u16(index));
         let Some((is_tcp, framing)) = mode.transport() else {

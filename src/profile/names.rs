@@ -8,8 +8,9 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
+    number::digits,
     scale,
-    tag::{Decimals, TagDef},
+    tag::{Decimals, Encoding, TagDef},
 };
 
 /// The full names of all tags, known before the tags themselves are, since tags refer to each other.
@@ -162,11 +163,13 @@ pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Proble
     let known = match &choice.value {
         Choice::Word(word) => tag.enum_labels.iter().find(|(_, text)| text == word).map(|(number, _)| *number as f64),
         Choice::Number(number) => Some(*number).filter(|n| tag.enum_labels.is_empty() || tag.label_of(*n).is_some()),
+        Choice::Flag(flag) => Some(f64::from(u8::from(*flag))).filter(|_| has_two_states(tag)),
     };
     if known.is_none() {
         let written = match &choice.value {
             Choice::Word(word) => word.clone(),
-            Choice::Number(number) => number.to_string(),
+            Choice::Number(number) => digits(*number, None),
+            Choice::Flag(flag) => flag.to_string(),
         };
         let problem = problems.add(choice.at, format!("`{written}` is not a state of {}", tag.name));
         if tag.enum_labels.is_empty() {
@@ -178,11 +181,26 @@ pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Proble
     known
 }
 
+/// Can a tag be true or false: a bit, states 0 and 1, or an expression?
+fn has_two_states(tag: &TagDef) -> bool {
+    let is_bit = tag.point.kind.encoding() == Encoding::Bit || tag.point.field.is_some_and(|(_, bits)| bits == 1);
+    let is_flag = |number: i64| (0..=1).contains(&number);
+    let labels = !tag.enum_labels.is_empty() && tag.enum_labels.iter().all(|(number, _)| is_flag(*number));
+    is_bit || labels || tag.calculation.is_some()
+}
+
 /// The same, as the device will hold it.
 pub(crate) fn held_number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
     let number = number_of(choice, tag, problems)?;
+    // Decimals that the device announces only make the raw number greater.
+    let held = scale::rounded_to_device(tag, number, 0);
+    if held.is_none() {
+        let problem =
+            problems.add(choice.at, format!("{} does not fit the register of {}", digits(number, None), tag.name));
+        problem.label("expected a value that its type can hold");
+    }
     match tag.decimals {
-        Decimals::Fixed(_) => Some(scale::rounded_to_device(tag, number, 0).unwrap_or(number)),
-        Decimals::From(_) => Some(number),
+        Decimals::Fixed(_) => held,
+        Decimals::From(_) => held.map(|_| number),
     }
 }

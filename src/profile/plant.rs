@@ -190,6 +190,8 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         let scope = Scope { names: &names, tags: &tags, device: device.name };
         let face = device.profile.faceplate.as_ref().map(|face| &face.value);
         def.faceplate = face.and_then(|face| device::faceplate(face, &scope, problems));
+        let mv = def.faceplate.as_ref().and_then(|face| face.mv);
+        device::check_output(device.table.output.or(device.profile.output), mv, &tags, problems);
         def.actions = device::actions(&device.profile.actions, &scope, problems);
         let program = device.profile.program.as_ref().map(|program| &program.value);
         def.program = program.and_then(|table| program::program(table, &scope, problems));

@@ -6,7 +6,7 @@ use super::{
     batch,
     diagnostic::Problems,
     names::{Defs, Unique},
-    reader::At,
+    reader::{At, Texts},
     schema::RunTable,
 };
 use crate::plant::{
@@ -49,17 +49,31 @@ pub(super) fn runs(tables: &[At<RunTable>], batches: &[BatchDef], defs: &Defs, p
         if let Some(energy) = energy {
             run.energy = batch::energy_tag(energy, defs, problems);
         }
-        if !named.is_empty() {
-            run.batches = named.iter().filter_map(|name| place(name, batches, problems)).collect();
+        if let Some(named) = named {
+            run.batches =
+                each(named, "batch", problems).into_iter().filter_map(|name| place(name, batches, problems)).collect();
         }
-        if !tags.is_empty() {
-            run.tags = tags.iter().filter_map(|tag| batch::stored(tag, defs, problems)).collect();
-        }
-        if let Some(tag) = tags.get(TAGS_MAX) {
-            problems.add(tag.at, "too many tags of a run").label(format!("expected at most {TAGS_MAX}"));
+        if let Some(tags) = tags {
+            run.tags =
+                each(tags, "tag", problems).into_iter().filter_map(|tag| batch::stored(tag, defs, problems)).collect();
+            if let Some(tag) = tags.value.0.get(TAGS_MAX) {
+                problems.add(tag.at, "too many tags of a run").label(format!("expected at most {TAGS_MAX}"));
+            }
         }
     }
     runs
+}
+
+/// The names of a list that is written to have some, each once.
+fn each<'a>(list: &'a At<Texts>, what: &str, problems: &mut Problems) -> Vec<&'a At<String>> {
+    if list.value.0.is_empty() {
+        problems.add(list.at, format!("a run without a {what}")).label("expected at least one, or no such key");
+    }
+    let mut seen = Unique::default();
+    let mut is_new = |name: &At<String>, problems: &mut Problems| {
+        seen.insert(&name.value, name.at, format!("{what} {} is named twice", name.value), problems)
+    };
+    list.value.0.iter().filter(|name| is_new(name, problems)).collect()
 }
 
 /// Batches that summarise a tag of the controller begin its runs, and their energy is that of the run.

@@ -240,8 +240,8 @@ toml_tables! {
         opt "steady_for" steady_for: Duration,
         opt "duration_max" duration_max: Duration,
         opt "energy" energy: String,
-        list "batches" batches: String,
-        list "tags" tags: String,
+        opt "batches" batches: Texts,
+        opt "tags" tags: Texts,
     }
 
     /// A `[[procedure]]`.

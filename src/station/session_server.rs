@@ -29,6 +29,8 @@ use crate::{
 pub const LIFECYCLE_REQUESTS_MAX: usize = 4;
 /// How often timeouts are checked: idle terminals, ends of lockouts, closed terminals.
 const TICK: Duration = Duration::from_millis(500);
+/// How long requests from outside have to hand over the refusals that are not on record when the station ends.
+const LAST_REFUSALS_MAX: Duration = Duration::from_secs(1);
 
 /// What a terminal has requested of the station as a whole.
 #[derive(Debug)]
@@ -77,6 +79,8 @@ pub struct SessionServer {
     clock: Clock,
     outputs: Outputs,
     terminals: BTreeMap<u32, watch::Sender<Arc<SessionStatus>>>,
+    /// The session of requests from outside.
+    delegate: Option<u32>,
     tickets: BTreeMap<u64, oneshot::Sender<Result<Durability, String>>>,
     /// Reloads whose outcome is awaited, with their tickets.
     reloads: JoinSet<(u64, Result<(), String>)>,
@@ -96,6 +100,7 @@ impl SessionServer {
             clock,
             outputs,
             terminals: BTreeMap::new(),
+            delegate: None,
             tickets: BTreeMap::new(),
             reloads: JoinSet::new(),
             history_jobs: JoinSet::new(),
@@ -122,7 +127,10 @@ impl SessionServer {
                     self.terminals.insert(request.terminal, request.status);
                     let (terminal, peer, now) = (request.terminal, request.peer, self.clock.now());
                     let effects = match &request.acts_as {
-                        Some(user) => self.access.open_delegate(terminal, user, &peer.from, now),
+                        Some(user) => {
+                            self.delegate = Some(terminal);
+                            self.access.open_delegate(terminal, user, &peer.from, now)
+                        }
                         None => self.access.open(terminal, peer, now),
                     };
                     self.apply_effects(effects);
@@ -159,7 +167,21 @@ impl SessionServer {
                 }
             }
         }
-        // The users are written by now, so the audit log must say so: nothing else is begun any more.
+        self.end(requests).await;
+    }
+
+    /// Completes what the audit log must have: nothing else is begun any more.
+    async fn end(mut self, mut requests: mpsc::Receiver<(u32, Request)>) {
+        if let Some(delegate) = self.delegate.and_then(|terminal| self.terminals.get(&terminal)) {
+            // A task that hangs does not keep the station from ending.
+            let _ = tokio::time::timeout(LAST_REFUSALS_MAX, delegate.closed()).await;
+            while let Ok((terminal, request)) = requests.try_recv() {
+                if matches!(request, Request::RecordRefusal { .. }) {
+                    self.on_session_message(terminal, request);
+                }
+            }
+        }
+        // The users are written by now, so the audit log must say so.
         if let Some(result) = self.jobs.end().await {
             let mut effects = self.access.on_saved(result, self.clock.now());
             effects.retain(|effect| matches!(effect, Effect::Record(_) | Effect::Reply(..)));

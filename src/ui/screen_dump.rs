@@ -26,6 +26,8 @@ pub struct ScreenDump {
     files: Vec<(PathBuf, Vec<u8>)>,
     /// The number of the request that puts the next one on record.
     number: u32,
+    /// One of them was not written: no later one hides that.
+    failed: bool,
 }
 
 /// Takes the screen as it is and asks for it to be put on record.
@@ -38,7 +40,7 @@ pub(super) fn begin(model: &mut Model) -> Vec<UiAction> {
     let drawing = drawing(&drawn);
     let mut files = vec![(path("txt"), text(&drawn).into_bytes()), (path("svg"), drawing.svg())];
     files.extend(drawing.png().map(|png| (path("png"), png)));
-    model.screen_dump.files = files;
+    (model.screen_dump.files, model.screen_dump.failed) = (files, false);
     next(model)
 }
 
@@ -67,8 +69,16 @@ pub(super) fn on_request_done(model: &mut Model, number: u32, answer: Result<(),
     std::iter::once(save).chain(next(model)).collect()
 }
 
-/// A file was written, or not.
+/// A file was written, or not. After one that was not, no other one is begun.
 pub(super) fn on_saved(model: &mut Model, result: Result<PathBuf, String>) {
+    let dump = &mut model.screen_dump;
+    if dump.failed {
+        return;
+    }
+    if result.is_err() {
+        dump.failed = true;
+        dump.files.clear();
+    }
     model.note = Some(match result {
         Ok(path) => {
             let (name, folder) = (path.file_name().unwrap_or_default(), path.parent().unwrap_or(&path));

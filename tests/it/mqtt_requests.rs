@@ -253,7 +253,8 @@ fn refusals_before_the_plant_are_on_record_in_bounds() {
     assert_eq!(station.end(), Some(0));
     let log = std::fs::read_to_string(place.path("tank.audit.jsonl")).expect("the audit log");
     let entries: Vec<_> = log.lines().filter(|line| line.contains("request from outside")).collect();
-    assert_eq!(entries.len(), 2, "{entries:?}");
+    assert_eq!(entries.len(), 3, "{entries:?}");
+    assert!(entries[2].contains("refused: 11 requests, the last: not a request"), "the rest, at the end: {entries:?}");
     assert!(entries[0].contains("not a request") && entries[1].contains("no tag is called TIC-7.SV"), "{entries:?}");
 }
 

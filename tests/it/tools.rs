@@ -213,6 +213,12 @@ fn a_plug_returns_every_byte() {
 }
 
 #[test]
+fn a_plug_has_no_unit() {
+    let (code, said) = run(&["loopback", "/dev/ttyS99", "--plug", "--unit", "3"]);
+    assert!(code == Some(2) && said.contains("'--plug' cannot be used with '--unit"), "{code:?} {said}");
+}
+
+#[test]
 fn a_bad_plug_and_none_are_distinguished() {
     if !have("socat", "socat") {
         return;

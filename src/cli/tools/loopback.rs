@@ -23,7 +23,7 @@ pub struct Args {
     #[arg(long, short, default_value = "10", value_parser = clap::value_parser!(u16).range(1..=1000))]
     count: u16,
     /// Send patterns that a loopback plug returns (RX joined to TX), instead of asking a unit; at most 500
-    #[arg(long)]
+    #[arg(long, conflicts_with = "unit")]
     plug: bool,
 }
 

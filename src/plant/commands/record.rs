@@ -4,6 +4,7 @@ use crate::plant::{
     alarm::{AlarmCommand, manager::subject_name},
     command::{CommandKind, CommandStatus},
     def::{AlarmId, PlantDef},
+    number::digits,
     procedure,
     process_image::ProcessImage,
     record::ActionRecord,
@@ -97,7 +98,7 @@ pub(super) fn value_text(image: &ProcessImage, tag: &TagDef, value: f64) -> Stri
         Some(label) => label.to_owned(),
         None => {
             let unit = tag.unit_now(|tag| image.sample(tag));
-            format!("{value:.*} {unit}", usize::from(image.shown_decimals(tag))).trim_end().to_owned()
+            format!("{} {unit}", digits(value, Some(image.shown_decimals(tag)))).trim_end().to_owned()
         }
     }
 }

@@ -155,10 +155,11 @@ impl Value for Texts {
     }
 }
 
-/// A number, or a word that stands for one: `value = "RUN"`.
+/// A number, or what stands for one: a word (`value = "RUN"`), or `true` and `false` for 1 and 0 of two states.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
     Number(f64),
+    Flag(bool),
     Word(String),
 }
 
@@ -166,7 +167,7 @@ impl Value for Choice {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
         match value {
             Node::Text(word) => Some(Choice::Word(word.clone())),
-            Node::Flag(flag) => Some(Choice::Number(f64::from(u8::from(*flag)))),
+            Node::Flag(flag) => Some(Choice::Flag(*flag)),
             Node::Whole(_) | Node::Number(_) => f64::read(value, at, problems).map(Choice::Number),
             Node::Time(_) | Node::Array(_) | Node::Table(_) => wrong_type(value, at, "a number or a word", problems),
         }

@@ -17,7 +17,7 @@ use crate::{
 pub(super) fn bit_field(field: &At<Choice>, kind: DataType, table: Table, problems: &mut Problems) -> Option<(u8, u8)> {
     let bounds = match &field.value {
         Choice::Number(bit) if bit.fract() == 0.0 && (0.0..64.0).contains(bit) => Some((to_u8(*bit), to_u8(*bit))),
-        Choice::Number(_) => None,
+        Choice::Number(_) | Choice::Flag(_) => None,
         Choice::Word(word) => match word.split_once('-') {
             Some((high, low)) => high.trim().parse().ok().zip(low.trim().parse().ok()),
             None => word.trim().parse().ok().map(|bit: u8| (bit, bit)),

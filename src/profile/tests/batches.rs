@@ -39,6 +39,22 @@ fn controller(table: &str) -> Result<PlantDef, Errors> {
 }
 
 #[test]
+fn an_output_at_its_terminals_is_that_of_a_percentage() {
+    let load = |unit: &str| {
+        let mv =
+            format!("[[tag]]\nname = \"MV\"\ntable = \"holding\"\naddress = 1010\ntype = \"int16\"\nunit = \"{unit}\"");
+        let meter =
+            format!("output = \"4-20 mA\"\n{METER}\n{mv}\n[faceplate]\npv = \"T\"\nsv = \"MODE\"\nmv = \"MV\"\n");
+        load(PLANT.as_bytes(), &meter, PLC)
+    };
+    assert!(load("%").unwrap().devices[0].output.is_some());
+    for unit in ["kW", ""] {
+        let text = load(unit).expect_err(unit).to_string();
+        assert!(text.contains("meter.toml:1:10") && text.contains(&format!("D1.MV has the unit `{unit}`")), "{text}");
+    }
+}
+
+#[test]
 fn a_controller_has_runs_and_the_plant_file_refines_them() {
     let plant = controller("").unwrap();
     let [run] = plant.runs.as_slice() else { panic!("{:?}", plant.runs) };
@@ -58,10 +74,14 @@ fn a_controller_has_runs_and_the_plant_file_refines_them() {
         ("2min", "5s", "this is not the time of a run"),
         ("[\"soup\"]", "[\"soap\"]", "unknown batch `soap`"),
         ("tags = [\"D1.T\"]", "energy = \"D1.T\"", "D1.T has the unit `°C`"),
+        ("tags = [\"D1.T\"]", "tags = []", "a run without a tag"),
+        ("tags = [\"D1.T\"]", "tags = [\"D1.T\", \"D1.T\"]", "tag D1.T is named twice"),
+        ("[\"soup\"]", "[]", "a run without a batch"),
+        ("[\"soup\"]", "[\"soup\", \"soup\"]", "batch soup is named twice"),
         ("band", "bandwidth", "unknown key `bandwidth`"),
     ] {
         let text = controller(&table.replace(from, to)).expect_err(to).to_string();
-        assert!(text.contains(expect), "{to}: {text}");
+        assert!(text.contains(expect) && text.contains("small.toml:"), "{to}: {text}");
     }
     let text = controller(&format!("{table}{table}")).expect_err("twice").to_string();
     assert!(text.contains("duplicate run of `D1`"), "{text}");

@@ -43,6 +43,15 @@ fn a_listening_line_is_a_serial_port_or_a_mirror() {
 }
 
 #[test]
+fn two_lines_never_have_one_serial_port() {
+    for mode in ["listen", "rtu"] {
+        let second = "[[line]]\nname = \"L2\"\nmode = \"MODE\"\nport = \"/dev/ttyUSB0\"\nbaud = 9600\nparity = \"N\"\n\n[[device]]";
+        let errors = heard("[[device]]", &second.replace("MODE", mode)).expect_err(mode).to_string();
+        assert!(errors.contains("small.toml:14:8") && errors.contains("another line has the port"), "{errors}");
+    }
+}
+
+#[test]
 fn what_makes_no_sense_on_a_listening_line_has_a_place() {
     for (to, expect) in [
         ("parity = \"N\"\ntimeout_ms = 500", &["small.toml:10:1", "unknown key `timeout_ms`", "a listening line"][..]),

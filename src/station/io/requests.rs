@@ -26,6 +26,7 @@ use crate::{
             task::RequestChannels,
         },
         payload::Message,
+        refusals::Refusal,
         request::{self, Received},
         requests::{Decision, Now, PassOn, Requests},
     },
@@ -94,10 +95,11 @@ impl RequestTask {
                 shown.clone_from(self.requests.status());
                 is_news
             });
-            self.record_refusals();
+            let due = self.requests.refusals(self.now());
+            self.record(due);
             tokio::select! {
                 biased;
-                () = has_stopped(&mut stopped) => return,
+                () = has_stopped(&mut stopped) => break,
                 Ok(()) = self.session.status.changed() => {
                     let status = self.session.status.borrow_and_update().clone();
                     let answers = self.requests.on_session(&status, self.session.terminal, self.now());
@@ -112,10 +114,14 @@ impl RequestTask {
                 _ = tick.tick() => self.requests.on_lost(self.lost.swap(0, Ordering::Relaxed)),
             }
         }
+        // The session server waits for these before it ends.
+        self.requests.on_lost(self.lost.swap(0, Ordering::Relaxed));
+        let rest = self.requests.last_refusals();
+        self.record(rest);
     }
 
-    fn record_refusals(&mut self) {
-        for refusal in self.requests.refusals(self.now()) {
+    fn record(&mut self, refusals: Vec<Refusal>) {
+        for refusal in refusals {
             let record = Request::RecordRefusal { what: refusal.what.clone(), outcome: refusal.outcome() };
             if self.session.send(record).is_err() {
                 self.requests.on_refusal_not_recorded(refusal);

@@ -65,6 +65,24 @@ fn a_screen_is_put_on_record_and_saved_thrice() {
 }
 
 #[test]
+fn a_file_that_is_not_written_is_said_to_the_end() {
+    let mut model = model(&Fixture::alarm(), Theme::FULL);
+    screen(&mut model, 80, 24);
+    let (id, _) = request(&type_keys(&mut model, "P")).expect("a request");
+    let effects = update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
+    let (id, _) = request(&effects).expect("a second request");
+    update(&mut model, Msg::Saved(None, Err("No space left on device".to_owned())));
+    let effects = update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
+    assert_eq!((saved(&effects), request(&effects)), (None, None), "no other one is begun");
+    // What was under way comes back well.
+    update(&mut model, Msg::Saved(None, Ok("screen.svg".into())));
+    assert!(screen(&mut model, 80, 24).contains("The screen was not saved: No space left on device"));
+    assert!(request(&type_keys(&mut model, "P")).is_some());
+    update(&mut model, Msg::Saved(None, Ok("screen.txt".into())));
+    assert!(screen(&mut model, 80, 24).contains("Screen saved: "), "the next screen is another one");
+}
+
+#[test]
 fn a_window_that_only_shows_is_saved_too() {
     let mut model = model(&Fixture::alarm(), Theme::FULL);
     screen(&mut model, 80, 24);

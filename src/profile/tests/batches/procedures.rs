@@ -55,6 +55,38 @@ fn steps_of_an_earlier_procedure_are_part_of_another() {
 }
 
 #[test]
+fn a_value_of_another_kind_or_beyond_its_register_is_an_error() {
+    let meter = |bounds: &str| {
+        let level = format!("[[tag]]\nname = \"LEVEL\"\ntable = \"holding\"\naddress = 1010\n{bounds}");
+        format!("{METER}\n{level}\n[faceplate]\npv = \"T\"\nsv = \"MODE\"\n")
+    };
+    let written = |bounds: &str, value: &str| {
+        let soup = SOUP.replacen("\"D1.MODE\", value = \"on\"", &format!("\"D1.LEVEL\", value = {value}"), 1);
+        load(PLANT.replace("[mimic]", &format!("{soup}\n[mimic]")).as_bytes(), &meter(bounds), PLC)
+    };
+    let word = "type = \"uint16\"\naccess = \"rw\"\nmax_from = \"DP\"\n";
+    let float = "type = \"float32\"\naccess = \"rw\"\nmax_from = \"DP\"\n";
+    let scaled = "type = \"int16\"\naccess = \"rw\"\ndecimals_from = \"DP\"\n";
+    for (bounds, value, expect) in [
+        (word, "true", "`true` is not a state of D1.LEVEL"),
+        (word, "1e308", "1e308 does not fit the register of D1.LEVEL"),
+        (word, "70000", "70000 does not fit the register of D1.LEVEL"),
+        (word, "-1", "-1 does not fit the register of D1.LEVEL"),
+        (float, "1e308", "1e308 does not fit the register of D1.LEVEL"),
+        (scaled, "-40000", "-40000 does not fit the register of D1.LEVEL"),
+    ] {
+        let text = written(bounds, value).expect_err(value).to_string();
+        assert!(text.contains(expect) && text.contains("small.toml:"), "{value}: {text}");
+    }
+    for (bounds, value) in [(word, "65535"), (float, "1e38"), (scaled, "-3276.8")] {
+        written(bounds, value).unwrap_or_else(|errors| panic!("{value}: {errors}"));
+    }
+    let flag = with(&SOUP.replacen("value = \"on\"", "value = true", 1)).unwrap();
+    let mode = flag.tag_named("D1.MODE").unwrap();
+    assert_eq!(flag.procedures[0].steps[0], ProcedureStep::Write { tag: mode, value: 1.0 }, "of two states");
+}
+
+#[test]
 fn each_mistake_of_a_procedure_has_its_place_and_name() {
     for (from, to, expect) in [
         ("name = \"soup\"", "name = \"hot soup\"", "`hot soup` is not a name for a procedure"),
