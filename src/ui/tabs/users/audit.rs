@@ -192,7 +192,7 @@ impl Audit {
             Some(trouble) => canvas.text(x, 0, &fit(trouble, room), theme.trouble()),
             None => canvas.text(x, 0, &fit(&self.summary(cx), room), theme.normal()),
         };
-        let names = [t!("no"), t!("time"), t!("who"), t!("from"), t!("action"), t!("target")];
+        let names = [t!("no."), t!("time"), t!("who"), t!("from"), t!("action"), t!("target")];
         let names = draw::columns(widths(columns), names);
         canvas.text(1, 1, &format!("{names} {}", t!("old → new, outcome")), theme.dim());
         if self.rows().is_empty() {
