@@ -60,6 +60,8 @@ fn words() -> &'static [&'static str] {
         ": it belongs to the group {name} (usermod -aG {name} USER, then log in again)",
         "another program",
         "this program, on another line",
+        "this process",
+        "unknown",
     ]
 }
 
@@ -105,6 +107,7 @@ mod tests {
         assert_eq!(thai("wrong name or password; wait 8 s"), "ชื่อผู้ใช้\u{200b}หรือรหัสผ่าน\u{200b}ไม่ถูกต้อง; รอ 8 s");
         assert!(thai("this is for a supervisor, you are viewer").contains("supervisor"));
         assert_eq!(thai("the disk is full"), "the disk is full");
+        assert_eq!(thai("this process"), "โปรแกรมนี้");
         let held = thai("/dev/ttyUSB0: in use by another program");
         assert!(held.starts_with("/dev/ttyUSB0") && !held.contains("use by") && !held.contains("program"), "{held}");
     }

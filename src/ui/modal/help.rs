@@ -13,7 +13,7 @@ use crate::ui::{
     tabs::{Tab, Tabs},
     widgets::{
         list::{Motion, first, on_screen},
-        text::{pad, width},
+        text::{fit_words, pad, width},
     },
 };
 
@@ -65,7 +65,8 @@ pub(super) fn view(selected: usize, cx: &ViewContext, tabs: &Tabs, frame: &mut F
         } else {
             let mark = if n == selected { cx.theme.pick("▸", ">") } else { " " };
             let x = canvas.text(0, y, &pad(&format!("{mark} {}", hint.key), keys + 4), cx.theme.strong());
-            canvas.text(x, y, &hint.help, if n == selected { cx.theme.focus() } else { cx.theme.normal() });
+            let help = fit_words(&hint.help, canvas.width().saturating_sub(x));
+            canvas.text(x, y, &help, if n == selected { cx.theme.focus() } else { cx.theme.normal() });
         }
     }
 }

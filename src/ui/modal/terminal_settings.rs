@@ -125,31 +125,31 @@ impl TerminalSettings {
     /// What the choice means.
     fn note(&self, cx: &ViewContext, field: Field) -> &'static str {
         match field {
-            Field::Theme if cx.theme.colours == Colours::None => t!("this terminal has no colours"),
+            Field::Theme if cx.theme.colours == Colours::None => t!("no colours here"),
             Field::Theme => match self.chosen.theme {
-                ThemeName::Grey => t!("colour for what is abnormal (ISA-101)"),
-                ThemeName::Dark => t!("more colour on near black"),
+                ThemeName::Grey => t!("abnormal in colour"),
+                ThemeName::Dark => t!("more colour on black"),
                 ThemeName::Light => t!("for bright rooms"),
-                ThemeName::HighContrast => t!("strong contrast, bright text"),
+                ThemeName::HighContrast => t!("bright on black"),
                 ThemeName::Mono => t!("without hue"),
             },
             Field::Characters => match cx.theme.glyphs {
-                Glyphs::Braille => t!("shown with braille dots"),
-                Glyphs::Block => t!("shown with blocks"),
-                Glyphs::Ascii => t!("shown with ASCII characters"),
+                Glyphs::Braille => t!("as braille dots"),
+                Glyphs::Block => t!("as blocks"),
+                Glyphs::Ascii => t!("as ASCII characters"),
             },
             Field::Pictures => match cx.theme.graphics.protocol(self.chosen.pictures) {
-                Ok((Protocol::Kitty, _)) => t!("i in Trends, as Kitty graphics"),
-                Ok((Protocol::Sixel, _)) => t!("i in Trends, as Sixel"),
-                Err(_) => t!("trends are drawn with characters only"),
+                Ok((Protocol::Kitty, _)) => t!("i in Trends: Kitty"),
+                Ok((Protocol::Sixel, _)) => t!("i in Trends: Sixel"),
+                Err(_) => t!("characters only"),
             },
-            Field::Motion => t!("moving agitators and flow arrows"),
+            Field::Motion => t!("agitators and arrows"),
             Field::Bell => match self.chosen.bell {
-                Bell::Off => t!("alarms make no sound here"),
+                Bell::Off => t!("alarms make no sound"),
                 Bell::Once | Bell::Repeated => t!("Ctrl-S silences"),
             },
             Field::Mouse if self.chosen.mouse => t!("Shift selects text"),
-            Field::Mouse => t!("selects text, as in any terminal"),
+            Field::Mouse => t!("selects text"),
             Field::Language => "",
         }
     }

@@ -100,3 +100,23 @@ fn settings_at_all_sizes() {
         insta::assert_snapshot!(format!("settings_{width}x{height}"), screen(&mut model, width, height));
     }
 }
+
+#[test]
+fn no_note_of_a_choice_is_cut_at_60_columns() {
+    let mut model = settings(&Fixture::alarm());
+    for language in Language::all() {
+        model.preferences.language = Some(language);
+        for row in 0..FIELDS.len() {
+            for choice in 0..5 {
+                let mut window = TerminalSettings::new(&model);
+                window.chosen.language = Some(language);
+                window.row = row;
+                model.modal = Some(Modal::TerminalSettings(window));
+                type_keys(&mut model, &"→".repeat(choice));
+                let shown = screen(&mut model, 60, 20);
+                let cut = shown.lines().skip(4).take(FIELDS.len() + 1).find(|row| row.contains('…'));
+                assert_eq!(cut, None, "{shown}");
+            }
+        }
+    }
+}

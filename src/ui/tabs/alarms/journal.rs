@@ -161,9 +161,14 @@ impl Journal {
         let area = self.area.as_ref().map(|area| InArea::new(cx.def(), area));
         let alarms = alarms.iter().filter(|row| area.as_ref().is_none_or(|area| area.has_alarm(row)));
         let actions = actions.iter().filter(|row| area.as_ref().is_none_or(|area| area.has_action(row)));
-        let alarms = alarms.map(|row| (row.at, alarm_text(cx, row), cx.theme.normal()));
+        let alarms = alarms.filter_map(|row| {
+            let text = alarm_text(cx, row);
+            // What is cut off is found too.
+            let whole = format!("{text} {} {}", row.subject, translate(&row.message));
+            self.words.fit(&whole).then_some((row.at, text, cx.theme.normal()))
+        });
         let actions = actions.map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
-        let mut rows: Vec<_> = alarms.chain(actions).filter(|(_, text, _)| self.words.fit(text)).collect();
+        let mut rows: Vec<_> = alarms.chain(actions.filter(|(_, text, _)| self.words.fit(text))).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.0));
         rows
     }
@@ -206,13 +211,18 @@ fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     let by = row.by.as_ref().map(|by| t!(" by {by}", by)).unwrap_or_default();
     let reason = row.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
     let mark = cx.theme.priority_mark(row.priority);
-    // Texts are cut only where there is no room.
-    let (message, event) = if cx.size < Size::Wide { (22, 12) } else { (44, 22) };
+    // Texts are cut only where there is no room, what happened last.
+    let (message, event) = match cx.area.width {
+        ..80 => (14, 12),
+        _ if cx.size < Size::Wide => (22, 12),
+        _ => (44, 22),
+    };
+    let word = translate(row.event.word());
     format!(
         "{mark} {} {} {}{number}{by}{reason}",
         pad(&row.subject, 12),
         pad(translate(&row.message), message),
-        pad(translate(row.event.word()), event)
+        pad(word, event.max(width(word)))
     )
 }
 

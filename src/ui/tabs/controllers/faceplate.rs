@@ -19,6 +19,8 @@ use crate::{
 pub const WINDOW: std::time::Duration = std::time::Duration::from_secs(1_800);
 /// Columns of the small trend beside the bars.
 const TREND: u16 = 22;
+/// Columns of bars with the ends of their scales behind them; in less, a bar would tell nothing.
+const ROW: u16 = 48;
 
 /// Rows that [`strip`] takes.
 pub fn strip_height(cx: &ViewContext, device: &DeviceDef) -> u16 {
@@ -33,7 +35,9 @@ pub fn strip(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     let wide = canvas.width();
     let rows = 2 + u16::from(faceplate.mv.is_some());
     let bars = wide.saturating_sub(TREND + 2);
-    self::bars(cx, &mut canvas.part(0, 0, bars, rows), faceplate, Bars::Row);
+    // The table below has the ranges too.
+    let layout = if bars < ROW { Bars::Bare } else { Bars::Row };
+    self::bars(cx, &mut canvas.part(0, 0, bars, rows), faceplate, layout);
     let at = Bounds { x: bars + 1, y: 0, width: TREND, height: rows };
     trend::view(cx, canvas, at, faceplate.pv, WINDOW, series, false);
     states(cx, &mut canvas.part(0, rows, wide, 1), device, faceplate);
@@ -132,7 +136,12 @@ pub fn bars(cx: &ViewContext, canvas: &mut Canvas, faceplate: &Faceplate, layout
         } else {
             let words = ends.map_or(t!("range unknown").to_owned(), |(low, high)| format!("{low} … {high}"));
             let words = if layout == Bars::Row { apart.unwrap_or(words) } else { apart.unwrap_or_default() };
-            let behind = if layout == Bars::Row { 18 } else { width(&words) };
+            let behind = match layout {
+                Bars::Tall | Bars::Row => 18,
+                // Bars of one scale are equally long.
+                Bars::Bare if scale == faceplate.pv => sv_difference(cx, faceplate).map_or(0, |words| width(&words)),
+                Bars::Bare => width(&words),
+            };
             let wide = canvas.width().saturating_sub(5 + values + 1 + behind);
             canvas.text(5 + values + wide + 1, y, &words, cx.theme.dim());
             (5 + values, y, wide)

@@ -145,6 +145,7 @@ pub fn default_text(cx: &ViewContext, tag: &TagDef) -> Option<String> {
 struct Columns {
     short: u16,
     name: u16,
+    range: u16,
     default: u16,
     meaning: u16,
 }
@@ -154,17 +155,23 @@ impl Columns {
     const UNIT: u16 = 6;
     const RANGE: u16 = 16;
     const AGE: u16 = 6;
+    /// Of a label, at least.
+    const LABEL: u16 = 8;
 
     fn new(cx: &ViewContext, device: DeviceId, wide: u16) -> Columns {
         let tags = || cx.def().tags_of(device);
         let short = tags().map(|tag| width(&tag.short)).max().unwrap_or(0).min(10);
         let label = tags().map(|tag| width(&tag.label)).max().unwrap_or(0);
-        let free = wide.saturating_sub(3 + Columns::VALUE + Columns::UNIT + Columns::RANGE + Columns::AGE + 5);
+        let fixed = 3 + Columns::VALUE + Columns::UNIT + Columns::AGE + 5;
+        // Before a name is a stump, the range gives way: the window of a change has it.
+        let is_narrow = wide < fixed + Columns::RANGE + short + 1 + Columns::LABEL.min(label);
+        let range = if is_narrow { 0 } else { Columns::RANGE };
+        let free = wide.saturating_sub(fixed + range);
         let name = (short + 1 + label).min(free);
         let left = free - name;
         let any = tags().any(|tag| tag.default.is_some());
         let default = if any && left >= 8 { 7 } else { 0 };
-        Columns { short, name, default, meaning: left.saturating_sub(default + 1) }
+        Columns { short, name, range, default, meaning: left.saturating_sub(default + 1) }
     }
     fn value_at(&self) -> u16 {
         2 + self.name + 1
@@ -172,13 +179,13 @@ impl Columns {
     fn row(&self, [pen, name, value, unit, range, default, age, meaning]: [&str; 8]) -> String {
         // The line below the table has the selected meaning in full: a stump in the table does not help.
         let meaning = if self.meaning < 12 { "" } else { meaning };
+        let range = if self.range == 0 { String::new() } else { format!("{} ", pad(range, self.range)) };
         let default = if self.default == 0 { String::new() } else { format!("{} ", pad_left(default, self.default)) };
         format!(
-            "{pen:1} {} {} {} {} {default}{} {}",
+            "{pen:1} {} {} {} {range}{default}{} {}",
             pad(name, self.name),
             pad_left(value, Columns::VALUE),
             pad(unit, Columns::UNIT),
-            pad(range, Columns::RANGE),
             pad_left(age, Columns::AGE),
             pad(meaning, self.meaning)
         )

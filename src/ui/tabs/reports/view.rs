@@ -122,6 +122,7 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
         }
         (false, _) => t!("closed").to_owned(),
     };
+    let state = fit_words(&state, canvas.width().saturating_sub(x + 3));
     let x = canvas.text(x + 3, 0, &state, if running { theme.strong() } else { theme.normal() });
     if reports.report.value.is_some() {
         let right = canvas.width().saturating_sub(1);
@@ -324,9 +325,10 @@ fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'stat
         (None, Some(number)) => pad_left(value(number).trim(), 10),
         (None, None) => String::new(),
     };
-    let text = 21 + (cx.area.width.saturating_sub(68 + width(&time)) / 2).min(20);
+    let half = cx.area.width.saturating_sub(68 + width(&time)) / 2;
+    let (text, event) = (21 + half.min(20), 13 + half.min(10));
     let words = draw::columns(
-        [12, text.cast_signed(), 13],
+        [12, text.cast_signed(), event.cast_signed()],
         [&alarm.subject, translate(&alarm.message), translate(alarm.event.word())],
     );
     let mark = if active { theme.severity(alarm.priority) } else { theme.dim() };

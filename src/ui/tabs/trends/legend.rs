@@ -30,7 +30,7 @@ struct Columns {
 
 impl Columns {
     fn new(width: u16) -> Columns {
-        let name = 13 + width.saturating_sub(80).min(30) / 2;
+        let name = 13 + width.saturating_sub(80).min(40) / 2;
         // Where the share of good time would stand outside, the value has less room.
         let value = 4 + name + 13 + width.saturating_sub(80).min(40) / 4 - 63_u16.saturating_sub(width).min(4);
         Columns { name, value, min: value + 8, mean: value + 16, max: value + 24, good: value + 33, hour: value + 36 }

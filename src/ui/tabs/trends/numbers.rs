@@ -24,7 +24,11 @@ pub(super) fn draw_numbers(trends: &Trends, cx: &ViewContext, canvas: &mut Canva
     let pens = trends.drawn(cx);
     let (width, height) = (canvas.width(), canvas.height());
     let columns = if Size::is_wide(width) && 2 < pens.len() { 2 } else { 1 };
-    let rows = to_u16(pens.len().div_ceil(columns).max(1)).min((height / (4 + AROUND)).max(1));
+    let rows_in = |height: u16| to_u16(pens.len().div_ceil(columns).max(1)).min((height / (4 + AROUND)).max(1));
+    // What there is no room for is said in a row of its own.
+    let is_all = pens.len() <= usize::from(rows_in(height)) * columns;
+    let height = height.saturating_sub(u16::from(!is_all));
+    let rows = rows_in(height);
     let (wide, high) = (width / to_u16(columns), height / rows);
     for (n, (_, pen)) in pens.iter().take(usize::from(rows) * columns).enumerate() {
         let (x, y) = (to_u16(n % columns) * wide, to_u16(n / columns) * high);
@@ -34,7 +38,7 @@ pub(super) fn draw_numbers(trends: &Trends, cx: &ViewContext, canvas: &mut Canva
     if more > 0 {
         canvas.text_right(
             width.saturating_sub(1),
-            0,
+            height,
             &t!("enlarge the screen for more pens: {more}", more),
             cx.theme.strong(),
         );

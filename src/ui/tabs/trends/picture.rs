@@ -1,5 +1,7 @@
 //! The chart as a page to print, or as the terminal's own picture: what is on the screen, in pixels.
 
+mod limits;
+
 use ratatui::layout::Rect;
 
 use unicode_width::UnicodeWidthStr;
@@ -240,14 +242,7 @@ fn axes(page: &mut Drawing, cx: &ViewContext, chart: &Chart, scales: &[(Axis, Sc
         }
     }
     page.line(corners.to_vec(), Ink::Text, thin, false);
-    for limit in &chart.limits {
-        let Some((_, scale)) = scales.get(limit.curve) else { continue };
-        if (scale.low..=scale.high).contains(&limit.value) {
-            let y = frame.y(*scale, limit.value);
-            page.line(vec![(left, y), (right, y)], Ink::Text, frame.thick(0.7), true);
-            page.text((right - 4.0, y - frame.text.0 / 2.0), Anchor::End, limit.text.as_str(), Ink::Text);
-        }
-    }
+    limits::draw(page, cx, chart, scales, frame);
 }
 
 /// The columns that lie on the scale, at least in part: a value beyond it is not drawn at its end.

@@ -93,8 +93,11 @@ pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas
             canvas.text(1, y, mark(theme, pen), theme.pen(pen));
         }
         canvas.text(2, y, &pad(&def.name, name.saturating_sub(1)), style);
-        canvas.text(2 + name, y, &fit(&def.label, label - name - 2), theme.dim());
-        canvas.text_right(value, y, &shown.within(value - label), shown.style);
+        let text = shown.within(value - label);
+        canvas.text_right(value, y, &text, shown.style);
+        // What the value leaves is the label's.
+        let room = value.saturating_sub(width(&text) + name + 4);
+        canvas.text(2 + name, y, &fit(&def.label, room), theme.dim());
         let Some(series) = hour(trends, *tag) else { continue };
         if let Some((min, _, max)) = series.summary.filter(|_| has_room && def.enum_labels.is_empty()) {
             for (end, value) in [(low, min), (high, max)] {

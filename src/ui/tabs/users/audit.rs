@@ -192,7 +192,7 @@ impl Audit {
             Some(trouble) => canvas.text(x, 0, &fit(trouble, room), theme.trouble()),
             None => canvas.text(x, 0, &fit(&self.summary(cx), room), theme.normal()),
         };
-        let names = [t!("no"), t!("time"), t!("who"), t!("from"), t!("action"), t!("target")];
+        let names = [t!("no."), t!("time"), t!("who"), t!("from"), t!("action"), t!("target")];
         let names = draw::columns(widths(columns), names);
         canvas.text(1, 1, &format!("{names} {}", t!("old → new, outcome")), theme.dim());
         if self.rows().is_empty() {
@@ -249,7 +249,14 @@ fn rows_on(height: u16) -> usize {
 
 /// Widths of the columns; none for where it was done from on a narrow screen, where the window of the entry shows it.
 fn widths(columns: u16) -> [i16; 6] {
-    [-5, 9, 9, if columns >= 110 { 21 } else { 0 }, 11, 11]
+    let (from, action) = if columns >= 110 {
+        (21, 13)
+    } else if columns >= 80 {
+        (0, 13)
+    } else {
+        (0, 11)
+    };
+    [-5, 9, 9, from, action, 11]
 }
 
 /// An entry in one row; where it is too long, its outcome is kept.

@@ -242,3 +242,27 @@ fn a_wide_screen_shows_guidance_beside_the_list() {
         assert!(row.contains('▄') && row.contains('·'), "the ribbon of an acknowledged alarm: {row}");
     }
 }
+
+#[test]
+fn a_narrow_journal_says_what_happened() {
+    let event =
+        |event| AlarmRecord::new(ago(60), "TIC-1.PV", "no temperature change while heating", Priority::High, event);
+    let rows = vec![event(AlarmEvent::Raised), event(AlarmEvent::ReturnedToNormal)];
+    let mut model = model(&Fixture::alarm(), Theme::FULL);
+    screen(&mut model, 60, 20);
+    let mut shown = |keys: &str| {
+        for effect in type_keys(&mut model, keys) {
+            let (id, answer) = match effect {
+                Effect::Query(id, Query::Journal { .. }) => (id, Answer::Journal(rows.clone())),
+                Effect::Query(id, Query::Actions { .. }) => (id, Answer::Actions(Vec::new())),
+                _ => continue,
+            };
+            update(&mut model, Msg::Answer(id, Ok(answer)));
+        }
+        screen(&mut model, 60, 20)
+    };
+    let all = shown("3vvv");
+    assert!(all.contains("… raised") && all.contains("… RTN"), "{all}");
+    let found = shown("/while heating⏎");
+    assert!(found.contains("… raised"), "what is cut off is found: {found}");
+}

@@ -77,3 +77,20 @@ fn only_the_curves_on_the_screen_are_asked_for() {
     let (_, next) = asked(&type_keys(&mut model, &"↓".repeat(8)));
     assert_ne!(first, next, "others have come onto the screen");
 }
+
+#[test]
+fn bars_of_one_scale_are_equally_long() {
+    let mut fixture = trouble(8);
+    fixture.set("TIC-1.SV", 66.0);
+    let mut model = model(&fixture, Theme::FULL);
+    type_keys(&mut model, "4⏎");
+    let shown = screen(&mut model, 60, 20);
+    let ends = |name: &str| {
+        let row = shown.lines().find(|row| row.starts_with(name)).unwrap_or_default();
+        ['├', '┤'].map(|end| row.chars().position(|letter| letter == end))
+    };
+    let [pv, sv] = [" PV", " SV"].map(ends);
+    assert_eq!(pv, sv, "{shown}");
+    assert!(pv[0].zip(pv[1]).is_some_and(|(begin, end)| end - begin >= 10), "{shown}");
+    assert!(shown.contains("setpoint"), "labels are no stumps: {shown}");
+}

@@ -34,3 +34,14 @@ fn no_curve_is_asked_for_that_is_not_shown() {
     assert!(stand.asked.is_empty(), "{:?}", stand.asked);
     assert!(!stand.screen().contains("next tag   "));
 }
+
+#[test]
+fn a_wide_screen_has_the_whole_state_of_an_alarm() {
+    let mut stand = Stand::new(Theme::FULL, 200, 60);
+    stand.answer(true);
+    let mut report = stand.model.tabs.reports.report.value.take().expect("answered");
+    report.alarms[0].event = AlarmEvent::SuppressedByDesign;
+    stand.model.tabs.reports.report.value = Some(report);
+    let shown = stand.screen();
+    assert!(shown.contains("suppressed by design"), "{shown}");
+}

@@ -127,3 +127,21 @@ fn another_plot_is_not_exported_as_a_time_chart() {
     assert_eq!(requested(&effects(&mut stand, key('E'))), None);
     assert!(stand.screen().contains("only the chart over time"), "{}", stand.screen());
 }
+
+#[test]
+fn the_name_of_a_limit_stands_where_no_curve_runs() {
+    let place = |pv: f64| {
+        let mut stand = Stand::new(Theme::FULL, 120, 40);
+        stand.answer();
+        stand.live(40, |_| Some(pv));
+        let (id, _) = requested(&effects(&mut stand, key('E'))).expect("the SVG is recorded");
+        let written = effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Recorded)));
+        let (_, bytes) = saved(&written).expect("written");
+        let svg = String::from_utf8(bytes).expect("SVG is text");
+        let label = svg.lines().find(|line| line.contains("HH 90.0")).unwrap_or_default().to_owned();
+        assert!(!label.is_empty(), "{svg}");
+        label
+    };
+    assert_eq!(place(64.0), place(80.0), "at the right");
+    assert_ne!(place(64.0), place(92.0), "the curve ends in it");
+}

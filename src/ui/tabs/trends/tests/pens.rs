@@ -79,6 +79,8 @@ fn large_numbers_are_good_numbers() {
         let screen = stand.screen();
         assert!(blocks(&screen), "{width}x{height}:\n{screen}");
         assert!(screen.contains("TIC-1.PV  process value") && screen.contains("RUN   good"), "{screen}");
+        let more = screen.lines().find(|row| row.contains("enlarge")).unwrap_or_default();
+        assert!(!more.contains("TIC-1"), "the names of the pens are beside nothing else: {more}");
         let mut bad = Fixture::line_down();
         let tags: Vec<String> = bad.def.tags.iter().map(|tag| tag.name.clone()).collect();
         for name in tags {
@@ -145,4 +147,14 @@ fn no_number_of_the_list_of_values_is_cut_at_60_columns() {
     let row = screen.lines().find(|line| line.contains("▸ TIC-1.PV")).expect("the first value");
     assert!(row.split_whitespace().filter(|word| *word == max).count() >= 1, "{max} in {row}");
     assert!(screen.contains("1 h max"), "{screen}");
+}
+
+#[test]
+fn a_label_of_the_list_takes_what_its_value_leaves() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("v");
+    stand.answer();
+    let screen = stand.screen();
+    let row = screen.lines().find(|row| row.contains("PLC-1.LEFT")).unwrap_or_default();
+    assert!(row.contains("seconds left in step "), "{screen}");
 }
