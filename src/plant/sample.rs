@@ -54,7 +54,7 @@ keyword_enum! {
         NotStored = 14 => "not stored",
         /// Written since it was read, and not read back.
         NotReadBack = 15 => "written, not read back",
-        /// The master of a line that is only listened to has not read it for too long, see [`Heard`](super::heard::Heard).
+        /// The master of a line that is only listened to has not read it for too long.
         NotHeard = 16 => "not heard",
     }
 }
