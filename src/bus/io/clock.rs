@@ -116,6 +116,14 @@ impl Clock {
         tokio::time::sleep_until(self.start + self.real_span(ahead)).await;
     }
 
+    /// The same; for ever without a moment.
+    pub async fn sleep_until_if_any(&self, at: Option<Timestamp>) {
+        match at {
+            Some(at) => self.sleep_until(at).await,
+            None => std::future::pending().await,
+        }
+    }
+
     /// Sleeps for a span of plant time.
     pub async fn sleep(&self, plant: Duration) {
         tokio::time::sleep(self.real_span(plant)).await;

@@ -66,15 +66,9 @@ impl LiveReads {
             return;
         }
         let next = self.waiting.iter().map(|request| request.read.not_before.unwrap_or_default()).min();
-        let sleep = async {
-            match next {
-                Some(at) => clock.sleep_until(at).await,
-                None => std::future::pending().await,
-            }
-        };
         tokio::select! {
             biased;
-            () = sleep => {}
+            () = clock.sleep_until_if_any(next) => {}
             request = self.queue.recv() => match request {
                 Some(request) => self.waiting.push(request),
                 // The station is ending.

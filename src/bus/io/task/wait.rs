@@ -15,18 +15,12 @@ impl Task<'_> {
     /// Waits without a port until a moment, or until an operator opens the line; refuses writes meanwhile.
     pub(super) async fn wait(&mut self, mut until: Option<Timestamp>) -> Result<(), LinkExit> {
         loop {
-            let (clock, wake) = (self.clock, until);
-            let pause = async {
-                match wake {
-                    Some(until) => clock.sleep_until(until).await,
-                    None => std::future::pending().await,
-                }
-            };
+            let clock = self.clock;
             let request = tokio::select! {
                 biased;
                 _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
                 request = self.requests.recv() => request?,
-                () = pause => return Ok(()),
+                () = clock.sleep_until_if_any(until) => return Ok(()),
             };
             match request {
                 BusRequest::Write(job) => {

@@ -83,7 +83,7 @@ async fn what_is_heard_is_a_value_and_nothing_is_ever_sent() {
             let raw = now.samples[tag].good_value();
             assert_eq!(raw, Some(address), "{mode:?} {:?}", now.samples[tag]);
         }
-        assert_eq!(now.samples[4].quality, Quality::Bad(Cause::NotRead), "nobody has asked for it");
+        assert_eq!(now.samples[4].quality, Quality::Bad(Cause::NotRead), "the other master never asks for it");
         assert_eq!(now.devices[0].state, DeviceState::Responding);
         let source: &Exchange = now.source_frames[0].as_deref().expect("it has a source");
         assert_eq!(frame::unwrap(mode.framing(), &source.request).as_deref(), Ok(&READ[..]));
