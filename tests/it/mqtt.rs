@@ -123,6 +123,20 @@ impl Place {
         }
     }
 
+    /// Waits until all that was stored before a moment is sent. The numbers do not say it: a deadband keeps values back.
+    fn wait_until_sent(&self, moment: Timestamp) {
+        self.wait_until("all of before is sent", |status| {
+            status["north"]["sent_until"].as_str().and_then(|at| at.parse().ok()) > Some(moment)
+        });
+    }
+
+    /// Waits until so many rows more are stored.
+    fn wait_for_rows(&self, more: u64) {
+        let rows = |status: &Value| status["history"]["rows"].as_u64();
+        let before = self.wait_until("the history answers", |status| rows(status).is_some());
+        self.wait_until("the history goes on", |status| rows(status) > rows(&before).map(|before| before + more));
+    }
+
     /// What is stored.
     fn stored(&self) -> BTreeSet<Row> {
         let def = Arc::new(profile::load(&self.path("tank.toml"), &Search::shipped()).unwrap());
@@ -190,14 +204,14 @@ fn every_sample_arrives_through_kills_of_broker_and_station() {
     let mut subscriber = place.subscriber();
     let mut station = place.station();
     subscriber.expect(r#"status {"state":"online"}"#);
-    let first = sent(&place.wait_until("samples arrive", |status| sent(status) > 20));
+    place.wait_until("samples arrive", |status| sent(status) > 20);
 
     // A broker that stands still, and goes on.
     broker.signal("STOP");
-    let stored =
-        place.wait_until("the history goes on", |status| status["history"]["rows"].as_u64() > Some(first + 50));
+    place.wait_for_rows(50);
+    let stood_still = Timestamp::now();
     broker.signal("CONT");
-    place.wait_until("the rest arrives", |status| sent(status) > stored["history"]["rows"].as_u64().unwrap());
+    place.wait_until_sent(stood_still);
 
     // A broker that ends, and comes back.
     broker.signal("TERM");
@@ -205,8 +219,7 @@ fn every_sample_arrives_through_kills_of_broker_and_station() {
     broker.end();
     let gone = place.wait_until("it is noticed", |status| status["north"]["connected"] == false);
     assert!(gone["north"]["error"].is_string(), "{}", gone["north"]);
-    let rows = gone["history"]["rows"].as_u64().unwrap();
-    place.wait_until("the history goes on", |status| status["history"]["rows"].as_u64() > Some(rows + 50));
+    place.wait_for_rows(50);
     let _broker = place.broker("allow_anonymous true\n");
     place.wait_until("it is connected again", |status| status["north"]["connected"] == true);
 
@@ -217,9 +230,7 @@ fn every_sample_arrives_through_kills_of_broker_and_station() {
     subscriber.wait_for(r#"status {"state":"offline"}"#);
     let mut station = place.station();
     let complete = Timestamp::now();
-    place.wait_until("all of before is there", |status| {
-        status["north"]["sent_until"].as_str().and_then(|at| at.parse().ok()) > Some(complete)
-    });
+    place.wait_until_sent(complete);
     station.signal("TERM");
     assert_eq!(station.end(), Some(0), "{}", station.said.join("\n"));
     place.catch_up(&mut subscriber, "the end");
@@ -309,9 +320,7 @@ fn what_the_broker_may_not_take_is_not_skipped() {
     broker.signal("HUP");
     let mut subscriber = place.subscriber();
     let complete = Timestamp::now();
-    place.wait_until("all of before is there", |status| {
-        status["north"]["sent_until"].as_str().and_then(|at| at.parse().ok()) > Some(complete)
-    });
+    place.wait_until_sent(complete);
     station.signal("TERM");
     assert_eq!(station.end(), Some(0));
     place.catch_up(&mut subscriber, "the end");
