@@ -201,3 +201,39 @@ async fn stated_decimals_scale_until_the_device_says_others() {
     assert_eq!(now.sample(first).quality, Quality::Bad(Cause::Unscaled));
     assert_eq!(now.alarms.len(), 1, "it stands until the device agrees");
 }
+
+#[tokio::test(start_paused = true)]
+async fn what_is_no_answer_of_the_device_changes_no_value() {
+    let mut bench = Bench::new(Mode::Rtu);
+    for _ in 0..3 {
+        bench.ask(Mode::Rtu, &READ, false).await;
+    }
+    let framed = |message: &[u8]| frame::wrap(Mode::Rtu.framing(), 0, message);
+    // A strange unit, half frames, and a response that nobody has asked for.
+    bench.ask(Mode::Rtu, &[9, 3, 0, 10, 0, 4], false).await;
+    for bytes in [&framed(&READ)[..5], &framed(&correct(&READ))[..9], &framed(&[1, 3, 8, 9, 9, 9, 9, 9, 9, 9, 9])] {
+        bench.port.write_all(bytes).await.expect("the port is open");
+        let now = bench.pass(1).await;
+        assert!(matches!(now.sample(FIRST).value, Some(10.0)), "{:?}", now.sample(FIRST));
+        bench.ask(Mode::Rtu, &READ, false).await;
+    }
+    while !bench.ask(Mode::Rtu, &READ, false).await.sample(FIRST).quality.is_good() {}
+    // An exception says that there is no value.
+    bench.port.write_all(&framed(&READ)).await.expect("the port is open");
+    sleep(20 * MS).await;
+    bench.port.write_all(&framed(&[1, 0x83, 2])).await.expect("the port is open");
+    assert_eq!(bench.pass(1).await.sample(FIRST).quality, Quality::Bad(Cause::Exception));
+    assert!(bench.ask(Mode::Rtu, &READ, false).await.sample(FIRST).quality.is_good());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_broadcast_write_leaves_no_old_value_good() {
+    let mut bench = Bench::new(Mode::Rtu);
+    for _ in 0..3 {
+        bench.ask(Mode::Rtu, &READ, false).await;
+    }
+    let now = bench.ask(Mode::Rtu, &[0, 6, 0, 10, 0, 99], true).await;
+    assert_eq!(now.sample(FIRST).quality, Quality::Uncertain(Cause::NotReadBack));
+    assert!(now.sample(TagId(1)).quality.is_good(), "it was not written");
+    assert!(bench.ask(Mode::Rtu, &READ, false).await.sample(FIRST).quality.is_good());
+}
