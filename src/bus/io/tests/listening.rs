@@ -209,7 +209,7 @@ async fn what_is_no_answer_of_the_device_changes_no_value() {
         bench.ask(Mode::Rtu, &READ, false).await;
     }
     let framed = |message: &[u8]| frame::wrap(Mode::Rtu.framing(), 0, message);
-    // A strange unit, half frames, and a response that nobody has asked for.
+    // A strange unit, half frames, and an unsolicited response.
     bench.ask(Mode::Rtu, &[9, 3, 0, 10, 0, 4], false).await;
     for bytes in [&framed(&READ)[..5], &framed(&correct(&READ))[..9], &framed(&[1, 3, 8, 9, 9, 9, 9, 9, 9, 9, 9])] {
         bench.port.write_all(bytes).await.expect("the port is open");
