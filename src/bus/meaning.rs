@@ -159,7 +159,7 @@ fn valued(snapshot: &Snapshot, tag: &TagDef, span: &Span) -> String {
     else {
         return t!("{name} = no value", name);
     };
-    let known = |tag| snapshot.sample(tag).good_value();
+    let known = |tag| snapshot.sample(tag).scaling_value();
     let source = tag.decimals.source().map(|source| snapshot.def.tag(source).short.as_str());
     let Some(decimals) = tag.scaling_decimals(known) else {
         let source = source.unwrap_or_default();

@@ -1,13 +1,14 @@
 //! The line of another master: how long a value stands without being heard again, and what is refused there.
 
-use std::time::Duration;
+use std::{collections::BTreeSet, time::Duration};
 
 use jiff::Timestamp;
 
 use super::{
     command::{CommandKind, Refusal},
-    def::PlantDef,
-    tag::Poll,
+    def::{PlantDef, TagId},
+    sample::{Cause, Sample},
+    tag::{Poll, TagDef},
     time::elapsed,
 };
 
@@ -63,6 +64,25 @@ impl Heard {
             Poll::Once | Poll::Never => None,
         };
         heard.max(stated).unwrap_or(UNKNOWN)
+    }
+}
+
+/// What the plant file states of registers that the other master may never read: the tags of which the device has last said
+/// something else.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Stated(BTreeSet<TagId>);
+
+impl Stated {
+    /// The sample that a tag gets: what is stated stands for what is not good, until the device contradicts it.
+    pub fn instead_of(&mut self, tag: &TagDef, sample: Sample) -> Sample {
+        let Some(stated) = tag.stated else { return sample };
+        match sample.good_value() {
+            Some(value) if value == stated => _ = self.0.remove(&tag.id),
+            Some(_) => _ = self.0.insert(tag.id),
+            None if !self.0.contains(&tag.id) => return Sample::good(stated, sample.at).uncertain(Cause::Stated),
+            None => {}
+        }
+        sample
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
     calculation::Calculator,
     def::{DeviceId, PlantDef, TagId},
     event::{ExceptionCode, Fault, FaultKind},
-    heard::Heard,
+    heard::{Heard, Stated},
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
@@ -37,6 +37,7 @@ pub struct ProcessImage {
     decimals_seen: Vec<u8>,
     /// How often each tag comes, by tag.
     heard: Vec<Heard>,
+    stated: Stated,
     /// What the history last got, by tag.
     stored: Vec<Option<Sample>>,
     /// Tags whose sample was set since records were last taken; a tag may be here twice.
@@ -64,19 +65,23 @@ impl ProcessImage {
                 dependents[from.index()].push(tag.id);
             }
         }
-        ProcessImage {
+        let mut image = ProcessImage {
             raw: vec![None; count],
             samples: vec![Sample::bad(Cause::NotRead, at); count],
             texts: Arc::new(vec![None; count]),
             decimals_seen: vec![0; count],
             heard: vec![Heard::default(); count],
+            stated: Stated::default(),
             stored: vec![None; count],
             // That nothing is known is a fact to store too.
             touched: def.tags.iter().map(|tag| tag.id).collect(),
             dependents,
             calculator: Calculator::new(&def.tags),
-            def,
-        }
+            def: def.clone(),
+        };
+        let stated = def.tags.iter().filter(|tag| tag.stated.is_some());
+        stated.for_each(|tag| image.set(tag.id, Sample::bad(Cause::NotRead, at)));
+        image
     }
 
     /// Takes the values of all tags from elsewhere.
@@ -196,7 +201,7 @@ impl ProcessImage {
                 Poll::Never => continue,
             };
             let age = elapsed(sample.at, at);
-            if sample.quality.is_bad() {
+            if sample.quality.is_bad() || sample.is_stated() {
                 continue;
             } else if period * PERIODS_BAD < age {
                 self.drop_value(tag.id, cause, at);
@@ -273,7 +278,7 @@ impl ProcessImage {
 
     /// Decimals that the device announces for a tag: they scale its raw number. 0 for tags with fixed decimals.
     pub fn scaling_decimals(&self, tag: &TagDef) -> Option<u8> {
-        tag.scaling_decimals(|from| self.sample(from).good_value())
+        tag.scaling_decimals(|from| self.sample(from).scaling_value())
     }
 
     /// Decimals to show a tag with: those that the device announces, or announced last.
@@ -314,7 +319,8 @@ impl ProcessImage {
     /// A value that stays bad for the same cause keeps the time at which it became bad.
     fn set(&mut self, tag: TagId, sample: Sample) {
         let before = self.samples[tag.index()];
-        let lasts = sample.quality.is_bad() && sample.quality == before.quality;
+        let sample = self.stated.instead_of(self.def.tag(tag), sample);
+        let lasts = (sample.quality.is_bad() || sample.is_stated()) && sample.quality == before.quality;
         self.samples[tag.index()] = if lasts { Sample { at: before.at, ..sample } } else { sample };
         self.touched.push(tag);
     }

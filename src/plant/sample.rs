@@ -56,6 +56,8 @@ keyword_enum! {
         NotReadBack = 15 => "written, not read back",
         /// The master of a line that is only listened to has not read it for too long.
         NotHeard = 16 => "not heard",
+        /// It is not read from the device: the plant file states it.
+        Stated = 17 => "stated in the plant file",
     }
 }
 
@@ -155,6 +157,16 @@ impl Sample {
     /// The value only if it is good.
     pub fn good_value(self) -> Option<f64> {
         self.value.filter(|_| self.quality.is_good())
+    }
+
+    /// The value only if others may be scaled by it: it is good, or the plant file states it.
+    pub fn scaling_value(self) -> Option<f64> {
+        self.value.filter(|_| self.quality.is_good() || self.is_stated())
+    }
+
+    /// Does the plant file say so, and not the device?
+    pub fn is_stated(self) -> bool {
+        self.quality == Quality::Uncertain(Cause::Stated)
     }
 }
 

@@ -99,6 +99,8 @@ pub struct TagDef {
     pub default: Option<f64>,
     /// Part of a parameter set: a setting, not a command and not a measurement.
     pub in_sets: bool,
+    /// What the plant file states that it is while its device has not said it: on the line of another master only.
+    pub stated: Option<f64>,
 }
 
 impl TagDef {
@@ -144,6 +146,7 @@ impl TagDef {
             calculation: None,
             default: None,
             in_sets: false,
+            stated: None,
         }
     }
     /// Is it the total of an expression?

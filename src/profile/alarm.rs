@@ -15,6 +15,7 @@ use crate::plant::{
     def::{AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Guidance, LineDef, Priority, Subject},
     number::to_u16,
     station::StationFault,
+    tag::TagDef,
 };
 
 /// The longest that alarms may be shelved for, whatever a plant file says.
@@ -41,7 +42,8 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     let of_timed = timed.map(|device| (&device.name, slower_than_stated(device)));
     let of_lines =
         defs.lines.iter().map(|line| (&line.name, if line.listens { no_traffic(line) } else { overloaded(line) }));
-    for (name, alarm) in of_devices.chain(of_timed).chain(of_lines) {
+    let of_stated = defs.tags.iter().filter_map(|tag| Some((&tag.name, other_than_stated(tag)?)));
+    for (name, alarm) in of_devices.chain(of_timed).chain(of_lines).chain(of_stated) {
         if !alarms.iter().any(|own| (own.subject, own.condition) == (alarm.subject, alarm.condition)) {
             check_generated(tables, name, &alarm.message, problems);
             alarms.push(AlarmDef { id: AlarmId(to_u16(alarms.len())), ..alarm });
@@ -166,6 +168,7 @@ fn check_order(tables: &[At<AlarmTable>], problems: &mut Problems) {
 enum Own {
     NotResponding,
     SlowerThanStated,
+    OtherThanStated,
     NoTraffic,
     Overloaded,
 }
@@ -175,6 +178,7 @@ impl Own {
         match self {
             Own::NotResponding => "not responding",
             Own::SlowerThanStated => "slower than its profile states",
+            Own::OtherThanStated => "other than the plant file states",
             Own::NoTraffic => "no traffic heard",
             Own::Overloaded => "line overloaded",
         }
@@ -186,17 +190,22 @@ impl Own {
             Own::NotResponding => [
                 "the device has no power, its cable is open, or its unit address or serial parameters differ",
                 "its values are unknown and it cannot be operated",
-                "check the device; then supply, cable, terminator and the Bus tab",
+                "check the device; then supply, cable and terminator; look at the counters of the device in the Bus tab",
             ],
             Own::SlowerThanStated => [
                 "the device takes longer than `response_time_ms` of its profile, or adapter, gateway or computer delay it",
                 "its values are right; the worst case of its polls was too low, so polls of its line may be late",
-                "raise `response_time_ms` of the device ([device.limits] in the plant file), or poll it less often; Bus tab",
+                "raise `response_time_ms` of the device ([device.limits] in the plant file), or poll it less often",
+            ],
+            Own::OtherThanStated => [
+                "the device is set up differently, or `[device.stated]` of the plant file is wrong",
+                "values up to now were wrong by it; from now on what the device says counts",
+                "correct `[device.stated]` in the plant file, and tell who uses the values stored before",
             ],
             Own::NoTraffic => [
                 "the other master has stopped or is off, or the wire to this port is broken",
                 "none of the values of this line is known",
-                "check whether the other master runs; then the wires and the settings of the port; Bus tab",
+                "check whether the other master runs; then the wires and the settings of the port; look at RX and the frames in the Bus tab",
             ],
             Own::Overloaded => [
                 "the line is polled more often than it can carry, or its devices answer more slowly",
@@ -228,6 +237,11 @@ fn not_responding(device: &DeviceDef) -> AlarmDef {
 fn slower_than_stated(device: &DeviceDef) -> AlarmDef {
     let subject = Subject::Device(device.id);
     AlarmDef { priority: Priority::Low, ..Own::SlowerThanStated.alarm(subject, Condition::SlowerThanStated, None) }
+}
+
+fn other_than_stated(tag: &TagDef) -> Option<AlarmDef> {
+    let condition = Condition::OtherThanStated { stated: tag.stated? };
+    Some(Own::OtherThanStated.alarm(Subject::Tag(tag.id), condition, None))
 }
 
 /// The line of another master: nothing is known of its devices while it is silent.

@@ -6,7 +6,7 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Names, Scope, Unique, check_number, held_number_of, number_of},
     reader::{At, Node, OptionalKey, Raw, text},
-    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, SignatureTable},
+    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, SignatureTable, Stated},
     simulate::simulate,
     tag::Defined,
     units,
@@ -14,7 +14,7 @@ use super::{
 use crate::plant::{
     def::{ActionDef, Faceplate, Limits, Probe, TagId},
     output::Output,
-    tag::{Access, Point, Poll, TagDef},
+    tag::{Access, Decimals, Point, Poll, TagDef},
 };
 
 /// The keys of a device profile that stand in the plant file itself; `None` where there is no map at all.
@@ -330,6 +330,30 @@ pub(super) fn check_output(output: Option<At<Output>>, mv: Option<TagId>, tags: 
         let problem = problems.add(output.at, format!("{} has the unit `{}`", mv.name, mv.unit));
         problem.label("expected a faceplate whose `mv` is in %");
     }
+}
+
+/// What the plant file states of registers that are never heard: by nothing else may it be known how values are scaled.
+pub(super) fn stated(stated: &Stated, scope: &Scope, listens: bool, problems: &mut Problems) -> Vec<(TagId, f64)> {
+    let mut found = Vec::new();
+    for (name, choice) in &stated.0 {
+        let Some(tag) = scope.tag(name, problems) else { continue };
+        let is_unit = |other: &TagDef| other.unit_from.as_ref().is_some_and(|(from, _)| *from == tag.id);
+        let scales = scope.tags.iter().any(|other| other.decimals.source() == Some(tag.id));
+        if !listens {
+            let problem = problems.add(name.at, format!("{} is read from the device", tag.name));
+            problem.label("`stated` is for devices of a line that only listens");
+        } else if !scales && !scope.tags.iter().any(is_unit) {
+            let problem = problems.add(name.at, format!("no value is scaled by {}", tag.name));
+            problem.label("expected a tag that is named in `decimals_from` or `unit_from`");
+        } else if let Some(value) = number_of(choice, tag, problems) {
+            if scales && Decimals::announced(value).is_none() {
+                let problem = problems.add(choice.at, format!("{value} is no number of decimals"));
+                problem.label(format!("expected 0 to {}", Decimals::MAX));
+            }
+            found.push((tag.id, value));
+        }
+    }
+    found
 }
 
 /// The actions of a device.

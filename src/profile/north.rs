@@ -63,7 +63,7 @@ fn mqtt_of(plant: &str, table: &MqttTable, defs: &Defs, problems: &mut Problems)
         commands_as: table
             .commands_as
             .as_ref()
-            .map(|user| commands_as(user, tls.is_some() || is_local(table), problems)),
+            .map(|user| commands_as(user, tls.is_some() || is_local(table), defs, problems)),
         tls,
         topic,
         deadbands: deadbands(table, defs, problems),
@@ -73,7 +73,11 @@ fn mqtt_of(plant: &str, table: &MqttTable, defs: &Defs, problems: &mut Problems)
 }
 
 /// The user as whom requests from outside act. Whether that user exists is known to the station alone, which says so.
-fn commands_as(user: &At<String>, is_private: bool, problems: &mut Problems) -> String {
+fn commands_as(user: &At<String>, is_private: bool, defs: &Defs, problems: &mut Problems) -> String {
+    if !defs.lines.is_empty() && defs.lines.iter().all(|line| line.listens) {
+        let problem = problems.warn(user.at, "every line only listens: no request is ever carried out");
+        problem.label("other masters poll them: nothing can be written");
+    }
     if user.value.trim().is_empty() {
         problems
             .add(user.at, "requests need a user as whom they act")

@@ -186,6 +186,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     let written = defined.iter().map(|defined| defined.in_sets).collect::<Vec<_>>();
     let mut tags = device::link(defined, &names, problems);
     check_broadcasts(&devices, &known, lines, &tags, problems);
+    let mut stated = Vec::new();
     for (def, device) in devices.iter_mut().zip(&known) {
         let scope = Scope { names: &names, tags: &tags, device: device.name };
         let face = device.profile.faceplate.as_ref().map(|face| &face.value);
@@ -197,7 +198,12 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         def.program = program.and_then(|table| program::program(table, &scope, problems));
         let signature = device.profile.signature.as_ref().map(|signature| &signature.value);
         def.signature = signature.map_or(Vec::new(), |table| device::signature(table, &scope, problems));
+        if let Some(table) = &device.table.stated {
+            let listens = lines.get(def.line.index()).is_some_and(|line| line.listens);
+            stated.extend(device::stated(&table.value, &scope, listens, problems));
+        }
     }
+    stated.into_iter().for_each(|(tag, value)| tags[tag.index()].stated = Some(value));
     sets::mark(&devices, &mut tags, &written, problems);
     Some(Devices { devices, tags, names, classes, exprs })
 }

@@ -8,7 +8,7 @@ use jiff::civil::Time;
 
 pub(super) use self::device::{
     ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Roles, Scheme,
-    SignatureTable, SimulateTable, StepTable, TagTable,
+    SignatureTable, SimulateTable, Stated, StepTable, TagTable,
 };
 use super::{
     condition::AlarmTable,
@@ -132,6 +132,8 @@ toml_tables! {
         opt "exception_status" exception_status: Numbered,
         /// What its output is at the terminals, which the order code says; it stands for that of the profile.
         opt "output" output: Output,
+        /// Values of registers that the other master of a listening line never reads: decimals and units.
+        opt "stated" stated: Stated,
         // What follows belongs to a device without a profile.
         opt "vendor" vendor: String,
         opt "model" model: String,

@@ -44,7 +44,7 @@ impl DeviceContext<'_> {
     /// The least role that may write the tags of a group.
     fn role_of(&self, group: &str) -> Role {
         let mut listed = self.roles.iter().flatten().flat_map(|roles| &roles.0);
-        listed.find(|(name, _)| name.value == group).map_or(Role::Technician, |(_, role)| role.0)
+        listed.find(|(name, _)| name.value == group).map_or(Role::Technician, |(_, role)| role.value.0)
     }
 }
 

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{Heard, Role};
+use super::{Heard, HeardFrame, Role};
 use crate::{
     bus::{
         codec, frame,
@@ -12,7 +12,7 @@ use crate::{
     },
     plant::{
         Plant, PlantDef, Snapshot,
-        def::{DeviceId, LineId},
+        def::{DeviceId, Framing, LineId},
         event::{Event, Fault},
         id::TagId,
         tag::Poll,
@@ -117,6 +117,13 @@ pub fn silent_after(def: &PlantDef, line: LineId) -> Duration {
 /// What was heard on a line, for its devices. A response that may be a late one to another request gives no values, and what
 /// was written is uncertain until it is read.
 pub fn events(def: &PlantDef, line: LineId, at: Timestamp, heard: &Heard) -> Vec<Event> {
+    if let Some(request) = broadcast(heard) {
+        let spans = meaning::spans(&request, None).unwrap_or_default();
+        let devices = def.devices.iter().filter(|device| device.line == line);
+        let pairs = devices.flat_map(|device| spans.iter().filter(|span| span.writes).map(|span| (device.id, span)));
+        let tags: Vec<TagId> = pairs.flat_map(|(device, span)| span.tags(def, device).map(|tag| tag.id)).collect();
+        return vec![Event::ForeignWrite { at, tags, fault: None }];
+    }
     let Some((exchange, message)) = exchange_of(heard) else { return Vec::new() };
     let (request, response) = message;
     let spans = meaning::spans(&request, response.as_deref()).unwrap_or_default();
@@ -124,6 +131,15 @@ pub fn events(def: &PlantDef, line: LineId, at: Timestamp, heard: &Heard) -> Vec
     let pairs = devices.flat_map(|device| spans.iter().map(|span| (device.id, span)));
     let exchange = Arc::new(exchange);
     pairs.flat_map(|(device, span)| events_of(def, at, device, span, &exchange)).collect()
+}
+
+/// A request to all devices of a serial line, which none of them answers.
+fn broadcast(heard: &Heard) -> Option<Vec<u8>> {
+    let Heard::Frame(HeardFrame { frame, role: Role::Request }) = heard else { return None };
+    if frame.framing == Framing::Mbap {
+        return None;
+    }
+    frame::unwrap(frame.framing, &frame.bytes).ok().filter(|message| message.first() == Some(&0))
 }
 
 /// A request and its response, without frames.

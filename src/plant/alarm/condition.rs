@@ -19,6 +19,8 @@ pub enum Condition {
     Deviation { from: TagId, limit: f64, deadband: f64 },
     /// A discrete tag has this abnormal value.
     State { is: f64 },
+    /// A tag is not what the plant file states, see [`TagDef::stated`](crate::plant::tag::TagDef::stated).
+    OtherThanStated { stated: f64 },
     /// This bit of a word is set; bit 0 is the lowest.
     Bit { bit: u8 },
     /// The value rises faster than a limit above 0, or falls faster than one below: limit and deadband per minute, measured
@@ -80,7 +82,9 @@ impl Condition {
     pub fn text(self, number: impl Fn(f64) -> String, name: impl Fn(TagId) -> String) -> String {
         let traits = self.traits();
         match (self, traits.sign) {
-            (Condition::State { is }, sign) => format!("{sign} {}", number(is)),
+            (Condition::State { is: known } | Condition::OtherThanStated { stated: known }, sign) => {
+                format!("{sign} {}", number(known))
+            }
             (Condition::Rate { limit, .. }, sign) => format!("{sign} {limit}/min"),
             (_, sign) => match (traits.limit, traits.reference) {
                 (Some(limit), Some(from)) => format!("{sign} {} off {}", number(limit), name(from)),
@@ -101,6 +105,7 @@ impl Condition {
             }
             Condition::Deviation { from, limit, .. } => Traits { limit: Some(limit), reference: Some(from), ..none },
             Condition::State { .. } => Traits { sign: "=", ..none },
+            Condition::OtherThanStated { .. } => Traits { sign: "≠", ..none },
             Condition::Rate { limit, .. } => {
                 Traits { limit: Some(limit), looks_back: true, sign: if limit < 0.0 { "<" } else { ">" }, ..none }
             }
@@ -235,6 +240,7 @@ pub fn holds(
             Some(limit - back(deadband) < distance)
         }
         Condition::State { is } => facts.value.map(|value| value == is),
+        Condition::OtherThanStated { stated } => facts.value.map(|value| value != stated),
         Condition::Bit { bit } => facts.value.map(|value| is_set(value, bit)),
         Condition::Rate { limit, over, deadband } => {
             let rate = memory.rate(facts.value?, now, over)?;

@@ -278,18 +278,23 @@ impl Value for WriteRole {
     }
 }
 
-/// A table with the names of groups for keys: `{ PID = "supervisor" }`.
+/// A table with names for keys.
 #[derive(Debug, Clone)]
-pub(crate) struct Roles(pub Vec<(At<String>, WriteRole)>);
+pub(crate) struct ByName<T>(pub Vec<(At<String>, At<T>)>);
 
-impl Value for Roles {
+/// The names are those of groups: `{ PID = "supervisor" }`.
+pub(crate) type Roles = ByName<WriteRole>;
+/// The names are those of tags: `{ P-DP = 1 }`.
+pub(crate) type Stated = ByName<Choice>;
+
+impl<T: Value> Value for ByName<T> {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
         let raw = Raw::read(value, at, problems)?;
-        let mut of_group = |(group, (at, role)): (&String, &(Span, At<Node>))| {
-            let role = WriteRole::read(&role.value, role.at, problems)?;
-            Some((At { value: group.clone(), at: *at }, role))
+        let mut of_name = |(name, (at, node)): (&String, &(Span, At<Node>))| {
+            let value = T::read(&node.value, node.at, problems)?;
+            Some((At { value: name.clone(), at: *at }, At { value, at: node.at }))
         };
-        Some(Roles(raw.table.iter().filter_map(&mut of_group).collect()))
+        Some(ByName(raw.table.iter().filter_map(&mut of_name).collect()))
     }
 }
 

@@ -109,3 +109,37 @@ fn only_what_is_polled_has_alarms_about_its_polls() {
     assert!(!own("", "").contains(&slow));
     assert!(own("mode = \"listen\"", "mode = \"rtu\"").contains(&slow));
 }
+
+#[test]
+fn what_is_never_heard_is_stated_for_a_listening_line_only() {
+    let plant = |stated: &str, mode: &str| {
+        let text = format!("{}stated = {{ {stated} }}\n", HEARD.replace("mode = \"listen\"", mode));
+        load(text.as_bytes(), METER, PLC)
+    };
+    let known = plant("DP = 2", "mode = \"listen\"").unwrap_or_else(|errors| panic!("{errors}"));
+    let stated: Vec<_> = known.tags.iter().filter_map(|tag| Some((tag.name.as_str(), tag.stated?))).collect();
+    assert_eq!(stated, [("M1.DP", 2.0)]);
+    assert!(known.alarms.iter().any(|alarm| alarm.message == "other than the plant file states"));
+    for (stated, mode, expect) in [
+        ("DP = 2", "mode = \"rtu\"", ["small.toml:16:12", "M1.DP is read from the device"]),
+        ("DP = 9", "mode = \"listen\"", ["small.toml:16:17", "9 is no number of decimals"]),
+        ("DP = 0.5", "mode = \"listen\"", ["small.toml:16:17", "no number of decimals"]),
+        ("MODE = 1", "mode = \"listen\"", ["small.toml:16:12", "no value is scaled by M1.MODE"]),
+        ("X = 1", "mode = \"listen\"", ["small.toml:16:12", "unknown tag `X`"]),
+    ] {
+        let errors = plant(stated, mode).expect_err(stated).to_string();
+        for piece in expect {
+            assert!(errors.contains(piece), "{stated}: no `{piece}` in\n{errors}");
+        }
+    }
+}
+
+#[test]
+fn requests_where_every_line_only_listens_are_a_warning() {
+    let plant = format!("{HEARD}\n[north.mqtt]\nhost = \"localhost\"\ncommands_as = \"anna\"\n");
+    let warned = |plant: &str| pictures::warnings(plant, METER).join("\n");
+    let words = warned(&plant);
+    assert!(words.contains("small.toml:19:15: every line only listens"), "{words}");
+    let polled = warned(&plant.replace("mode = \"listen\"", "mode = \"rtu\""));
+    assert!(!polled.contains("only listens"), "{polled}");
+}

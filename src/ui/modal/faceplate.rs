@@ -289,6 +289,7 @@ pub fn line_state_text(cx: &ViewContext, line: crate::plant::def::LineId) -> Str
         LineState::Connecting => t!("connecting").to_owned(),
         LineState::Connected => match status.report.as_ref().and_then(|report| report.strain.as_deref()) {
             Some(strain) => strain.trim_start_matches("line overloaded: ").to_owned(),
+            None if cx.def().listens_on(line) => t!("listening").to_owned(),
             None => t!("connected").to_owned(),
         },
         LineState::Disconnected => t!("disconnected by an operator").to_owned(),

@@ -7,7 +7,9 @@ use tokio::{
 
 use super::{slave::correct, *};
 use crate::plant::{
-    Plant, Snapshot,
+    Plant, PlantDef, Snapshot,
+    def::{AlarmDef, AlarmId, Condition, Subject},
+    number::to_u16,
     sample::{Cause, Quality},
     snapshot::DeviceState,
     tag::Decimals,
@@ -27,9 +29,15 @@ struct Bench {
 
 impl Bench {
     fn new(mode: Mode) -> Bench {
+        Bench::with(mode, |_| {})
+    }
+
+    /// The same with other tags.
+    fn with(mode: Mode, change: impl FnOnce(&mut PlantDef)) -> Bench {
         let mut def = plant(mode);
         def.lines[0].listens = true;
         def.tags.iter_mut().for_each(|tag| (tag.decimals, tag.quality_from) = (Decimals::Fixed(0), None));
+        change(&mut def);
         let line = line(def.clone());
         let port = plug(&line);
         Bench { line, plant: Plant::new(Arc::new(def), Timestamp::UNIX_EPOCH, 1.0), port, states: Vec::new() }
@@ -159,4 +167,73 @@ async fn a_device_that_does_not_answer_its_master_is_down() {
     // What the master writes is not known until it reads it.
     let now = bench.ask(Mode::Rtu, &[1, 6, 0, 10, 0, 10], false).await;
     assert_eq!(now.sample(FIRST).quality, Quality::Uncertain(Cause::NotReadBack));
+}
+
+#[tokio::test(start_paused = true)]
+async fn stated_decimals_scale_until_the_device_says_others() {
+    let mut bench = Bench::with(Mode::Rtu, |def| {
+        // Registers 10 and 11: the first is scaled by the second, which holds 11 ...
+        def.tags[0].decimals = Decimals::From(def.tags[1].id);
+        def.tags[1].stated = Some(1.0);
+        let subject = Subject::Tag(def.tags[1].id);
+        let condition = Condition::OtherThanStated { stated: 1.0 };
+        def.alarms.push(AlarmDef::new(AlarmId(to_u16(def.alarms.len())), subject, condition, "other"));
+    });
+    let only_first = [1, 3, 0, 10, 0, 1];
+    let (first, second) = (TagId(0), TagId(1));
+    let now = bench.pass(1).await;
+    assert_eq!(now.sample(second).quality, Quality::Uncertain(Cause::Stated));
+    bench.ask(Mode::Rtu, &only_first, false).await;
+    let now = bench.ask(Mode::Rtu, &only_first, false).await;
+    assert_eq!((now.sample(first).good_value(), now.decimals[0]), (Some(1.0), 1));
+    assert!(now.alarms.is_empty(), "{:?}", now.alarms);
+    // ... which is no number of decimals: what the device says counts, then and after it was heard last.
+    bench.ask(Mode::Rtu, &READ, false).await;
+    let now = bench.ask(Mode::Rtu, &READ, false).await;
+    assert_eq!(now.sample(second).good_value(), Some(11.0));
+    assert_eq!(now.sample(first).quality, Quality::Bad(Cause::Unscaled));
+    assert_eq!(now.alarms.len(), 1);
+    for _ in 0..30 {
+        bench.ask(Mode::Rtu, &only_first, false).await;
+    }
+    let now = bench.ask(Mode::Rtu, &only_first, false).await;
+    assert_eq!(now.sample(second).quality, Quality::Bad(Cause::NotHeard), "what is stated is known to be wrong");
+    assert_eq!(now.sample(first).quality, Quality::Bad(Cause::Unscaled));
+    assert_eq!(now.alarms.len(), 1, "it stands until the device agrees");
+}
+
+#[tokio::test(start_paused = true)]
+async fn what_is_no_answer_of_the_device_changes_no_value() {
+    let mut bench = Bench::new(Mode::Rtu);
+    for _ in 0..3 {
+        bench.ask(Mode::Rtu, &READ, false).await;
+    }
+    let framed = |message: &[u8]| frame::wrap(Mode::Rtu.framing(), 0, message);
+    // A strange unit, half frames, and an unsolicited response.
+    bench.ask(Mode::Rtu, &[9, 3, 0, 10, 0, 4], false).await;
+    for bytes in [&framed(&READ)[..5], &framed(&correct(&READ))[..9], &framed(&[1, 3, 8, 9, 9, 9, 9, 9, 9, 9, 9])] {
+        bench.port.write_all(bytes).await.expect("the port is open");
+        let now = bench.pass(1).await;
+        assert!(matches!(now.sample(FIRST).value, Some(10.0)), "{:?}", now.sample(FIRST));
+        bench.ask(Mode::Rtu, &READ, false).await;
+    }
+    while !bench.ask(Mode::Rtu, &READ, false).await.sample(FIRST).quality.is_good() {}
+    // An exception says that there is no value.
+    bench.port.write_all(&framed(&READ)).await.expect("the port is open");
+    sleep(20 * MS).await;
+    bench.port.write_all(&framed(&[1, 0x83, 2])).await.expect("the port is open");
+    assert_eq!(bench.pass(1).await.sample(FIRST).quality, Quality::Bad(Cause::Exception));
+    assert!(bench.ask(Mode::Rtu, &READ, false).await.sample(FIRST).quality.is_good());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_broadcast_write_leaves_no_old_value_good() {
+    let mut bench = Bench::new(Mode::Rtu);
+    for _ in 0..3 {
+        bench.ask(Mode::Rtu, &READ, false).await;
+    }
+    let now = bench.ask(Mode::Rtu, &[0, 6, 0, 10, 0, 99], true).await;
+    assert_eq!(now.sample(FIRST).quality, Quality::Uncertain(Cause::NotReadBack));
+    assert!(now.sample(TagId(1)).quality.is_good(), "it was not written");
+    assert!(bench.ask(Mode::Rtu, &READ, false).await.sample(FIRST).quality.is_good());
 }

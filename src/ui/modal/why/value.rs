@@ -112,7 +112,8 @@ fn because(
         | Cause::NotAuthorised
         | Cause::Unreadable
         | Cause::NotStored
-        | Cause::NotReadBack => None,
+        | Cause::NotReadBack
+        | Cause::Stated => None,
     }
 }
 
@@ -148,6 +149,9 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
             Poll::Never => Some(t!("read it now: tab 4, u").to_owned()),
         },
         Cause::NotAuthorised => Some(t!("log in: tab 0").to_owned()),
+        Cause::Stated => {
+            Some(t!("compare it with the device: the other master of this line has not read it").to_owned())
+        }
         Cause::Undefined => Some(t!("see its inputs: a division by zero, or a number that is too large").to_owned()),
         Cause::StationOff | Cause::Unreadable | Cause::NotStored | Cause::NotReadBack => None,
     }
@@ -202,6 +206,9 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     words += &format!(" = {result} {}", cx.snapshot.unit(def.id));
     let mut words = words.trim_end().to_owned();
     match def.decimals {
+        Decimals::From(from) if cx.snapshot.sample(from).is_stated() => {
+            words += &t!(", decimals as the plant file states {name}", name = cx.def().tag(from).name);
+        }
         Decimals::From(from) => words += &t!(", decimals from {name}", name = cx.def().tag(from).name),
         Decimals::Fixed(_) if def.scale == 1.0 && def.offset == 0.0 && def.enum_labels.is_empty() => {
             words += t!(", not scaled")

@@ -68,7 +68,7 @@ pub fn state_text(cx: &ViewContext, at: &LineView) -> String {
         .since
         .map_or(String::new(), |since| t!(" since {moment}", moment = text::moment(since, cx.now, zone)));
     match &at.status.state {
-        LineState::Connected if at.settings.listens => t!("listening{since}, another master polls", since),
+        LineState::Connected if at.settings.listens => t!("listening{since}", since),
         LineState::Connected => t!("connected{since}", since),
         LineState::NoTraffic => t!("NO TRAFFIC HEARD{since}", since),
         LineState::Connecting => t!("connecting").to_owned(),

@@ -114,7 +114,11 @@ impl Controllers {
         if let Some(device) = device {
             let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
             let copies = matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. }));
+            // Nothing is sent on the line of another master, and it has no settings to try.
+            let listens = cx.def().listens_on(device.line);
             let lacking = [
+                (Action::Refresh, listens),
+                (Action::Settings, listens),
                 (Action::Tune, faceplate.is_none_or(|faceplate| faceplate.tune.is_none())),
                 (Action::Run, faceplate.is_none_or(|faceplate| faceplate.run.is_none())),
                 (Action::Lamps, !lamps::has_any(cx, device)),

@@ -145,6 +145,7 @@ fn is_trouble(cause: Cause) -> bool {
         | Cause::Unreadable => true,
         Cause::NotRead
         | Cause::NotReadBack
+        | Cause::Stated
         | Cause::DeviceDown
         | Cause::NotConnected
         | Cause::StationOff

@@ -79,7 +79,7 @@ impl Registers {
 
 /// Decimals and unit of a tag now; `None` while the device has not said them.
 fn scaling(snapshot: &Snapshot, tag: &TagDef) -> Option<(u8, String)> {
-    let value = |of| snapshot.sample(of).good_value();
+    let value = |of| snapshot.sample(of).scaling_value();
     let decimals = match tag.decimals {
         Decimals::Fixed(decimals) => decimals,
         Decimals::From(_) => tag.scaling_decimals(value)?,

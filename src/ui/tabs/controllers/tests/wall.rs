@@ -94,3 +94,18 @@ fn bars_of_one_scale_are_equally_long() {
     assert!(pv[0].zip(pv[1]).is_some_and(|(begin, end)| end - begin >= 10), "{shown}");
     assert!(shown.contains("setpoint"), "labels are no stumps: {shown}");
 }
+
+#[test]
+fn the_keys_that_send_are_hidden_on_a_listening_line() {
+    for (listens, expect) in [(false, true), (true, false)] {
+        let mut fixture = Fixture::normal();
+        fixture.def.lines[0].listens = listens;
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "4");
+        let shown = screen(&mut model, 200, 60);
+        let footer = shown.lines().last().expect("a footer");
+        for key in ["u refresh", "c settings"] {
+            assert_eq!(footer.contains(key), expect, "{key}:\n{shown}");
+        }
+    }
+}
