@@ -208,6 +208,14 @@ impl Loop {
                     self.draw()?;
                     false
                 }
+                encoded = self.painter.encoded() => {
+                    match encoded {
+                        Some((picture, bytes)) => self.screen.paint(picture, &bytes)?,
+                        // Another one may be due.
+                        None => self.redraw_at = self.redraw_at.or(Some(Instant::now() + FRAME)),
+                    }
+                    false
+                }
                 changed = self.session.snapshots.changed() => {
                     changed.map_err(|_| UiError::StationGone)?;
                     self.heard_at = Instant::now();

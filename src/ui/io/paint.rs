@@ -1,41 +1,66 @@
 //! Frames, and the terminal's own picture over them: painted when it has changed, every few seconds at most, and taken away
-//! by drawing the cells again.
+//! by drawing the cells again. It is encoded beside the terminal's task, one at a time: that takes longer than a frame.
 
 use std::time::Duration;
 
-use tokio::time::Instant;
+use tokio::{
+    task::{JoinHandle, spawn_blocking},
+    time::Instant,
+};
 
 use super::{Loop, UiError, own, question};
-use crate::ui::{self, Msg, graphics::Picture, update, view};
+use crate::ui::{
+    self, Msg,
+    graphics::{Graphics, Picture},
+    update, view,
+};
 
 /// Least time between two pictures of one chart.
 const PAUSE: Duration = Duration::from_secs(5);
 
-/// What was painted last.
+/// What was painted last, or is about to be.
 #[derive(Debug, Default)]
-pub(super) struct Painter(Option<(Picture, Instant)>);
+pub(super) struct Painter {
+    painted: Option<(Picture, Instant)>,
+    /// Its bytes on their way.
+    encoding: Option<JoinHandle<Option<Vec<u8>>>>,
+}
 
 impl Painter {
     /// The picture must go: another place is wanted, another protocol, or none.
     pub fn must_clear(&self, wanted: Option<&Picture>) -> bool {
         let place = |picture: &Picture| (picture.protocol, picture.area);
-        self.0.as_ref().is_some_and(|(painted, _)| Some(place(painted)) != wanted.map(place))
+        self.painted.as_ref().is_some_and(|(painted, _)| Some(place(painted)) != wanted.map(place))
     }
 
-    /// The terminal shows it no more.
+    /// The terminal shows it no more, nor what is still encoded.
     pub fn forget(&mut self) {
-        self.0 = None;
+        self.painted = None;
+    }
+
+    /// Begins to encode a picture.
+    fn encode(&mut self, graphics: Graphics, picture: Picture) {
+        self.encoding = Some(spawn_blocking(move || graphics.encode(&picture)));
+    }
+
+    /// Waits for the bytes of the picture; `None`: it was forgotten meanwhile, or has no size.
+    pub async fn encoded(&mut self) -> Option<(&Picture, Vec<u8>)> {
+        let Some(encoding) = &mut self.encoding else { return std::future::pending().await };
+        // What a panic had to say is in the log.
+        let bytes = encoding.await.ok().flatten();
+        self.encoding = None;
+        self.painted.as_ref().map(|(picture, _)| picture).zip(bytes)
     }
 
     /// The picture, if it is to be painted now.
     pub fn due(&mut self, wanted: Option<Picture>, now: Instant) -> Option<&Picture> {
-        let wanted = wanted?;
+        let wanted = wanted.filter(|_| self.encoding.is_none())?;
         let rests = |(painted, at): &(Picture, Instant)| *painted == wanted || now.duration_since(*at) < PAUSE;
-        if self.0.as_ref().is_some_and(rests) {
+        if self.painted.as_ref().is_some_and(rests) {
             return None;
         }
-        self.0 = Some((wanted, now));
-        self.0.as_ref().map(|(picture, _)| picture)
+        self.painted = Some((wanted, now));
+        self.painted.as_ref().map(|(picture, _)| picture)
     }
 }
 
@@ -63,8 +88,8 @@ impl Loop {
             self.screen.clear_picture()?;
         }
         self.screen.draw(|frame| view(&self.model, frame))?;
-        if let Some(picture) = self.painter.due(picture, Instant::now()) {
-            self.screen.paint(&self.model.limits.graphics, picture)?;
+        if let Some(picture) = self.painter.due(picture, Instant::now()).cloned() {
+            self.painter.encode(self.model.limits.graphics, picture);
         }
         own(|| update(&mut self.model, Msg::Drawn));
         self.drawn_at = Some(Instant::now());
@@ -98,6 +123,22 @@ mod tests {
         assert!(due(2.0, 9));
         assert!(!due(3.0, 13), "too soon");
         assert!(due(3.0, 14));
+    }
+
+    #[tokio::test]
+    async fn a_picture_is_encoded_alone_and_not_shown_once_forgotten() {
+        let (mut painter, start) = (Painter::default(), Instant::now());
+        let first = painter.due(Some(picture(1.0, 0)), start).cloned().expect("it is due");
+        painter.encode(Graphics::NONE, first.clone());
+        assert_eq!(painter.due(Some(picture(2.0, 0)), start + 2 * PAUSE), None, "one at a time");
+        let (shown, bytes) = painter.encoded().await.expect("bytes");
+        assert_eq!((shown, Some(bytes)), (&first, Graphics::NONE.encode(&first)));
+        let second = painter.due(Some(picture(2.0, 0)), start + 2 * PAUSE).cloned().expect("it is due");
+        painter.encode(Graphics::NONE, second);
+        painter.forget();
+        assert_eq!(painter.due(Some(picture(3.0, 0)), start + 2 * PAUSE), None, "one at a time");
+        assert_eq!(painter.encoded().await, None, "its place is gone");
+        assert!(painter.due(Some(picture(3.0, 0)), start + 2 * PAUSE).is_some());
     }
 
     #[test]

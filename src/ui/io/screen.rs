@@ -19,7 +19,7 @@ use ratatui::{Frame, Terminal, backend::Backend};
 use tokio::time::Instant;
 
 use super::{question, wire::Wire};
-use crate::ui::graphics::{Graphics, Picture, Protocol, kitty};
+use crate::ui::graphics::{Picture, Protocol, kitty};
 
 /// The terminal is in raw mode and shows our screen.
 static RAISED: AtomicBool = AtomicBool::new(false);
@@ -87,9 +87,8 @@ impl Screen {
         self.terminal.resize(ratatui::layout::Rect::new(0, 0, area.width, area.height))
     }
 
-    /// Shows a picture over the cells, in place of the one before.
-    pub fn paint(&mut self, graphics: &Graphics, picture: &Picture) -> io::Result<()> {
-        let Some(bytes) = own(|| graphics.encode(picture)) else { return Ok(()) };
+    /// Shows a picture, which is encoded as these bytes, over the cells, in place of the one before.
+    pub fn paint(&mut self, picture: &Picture, bytes: &[u8]) -> io::Result<()> {
         PICTURED.store(picture.protocol == Protocol::Kitty, Ordering::SeqCst);
         let wire = self.terminal.backend_mut();
         crossterm::queue!(wire.bytes, cursor::MoveTo(picture.area.x, picture.area.y))?;

@@ -51,6 +51,8 @@ pub enum Action {
     Made,
     /// The rows of the record.
     Rows,
+    /// The other columns of the figures.
+    Columns,
     /// The chart of the tag so many rows further on.
     Tag(isize),
 }
@@ -69,6 +71,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('r'), "automatic", "the reports that the station makes by itself", Action::Made),
     Key::new(char('t'), "tag", "chart of the next tag (110 columns or more)", Action::Tag(1)),
     Key::new(char('T'), "", "chart of the previous tag", Action::Tag(-1)),
+    Key::new(char('c'), "", "the other columns (narrower than 80)", Action::Columns),
     Key::new(char('u'), "", "refresh the figures", Action::Refresh),
     Key::new(char('w'), "", "explain its current values", Action::Why),
 ];
@@ -109,6 +112,8 @@ pub struct Reports {
     /// The CSV that waits for the station's word.
     outgoing: Option<Outgoing>,
     scroll: Scroll,
+    /// On a narrow screen the last columns of the figures are shown.
+    later_columns: bool,
     number: u32,
 }
 
@@ -129,6 +134,7 @@ impl TabView for Reports {
             export: Export::Not,
             outgoing: None,
             scroll: Scroll::default(),
+            later_columns: false,
             number: 0,
         }
     }
@@ -295,6 +301,7 @@ impl Reports {
                 self.dialect = self.dialect.toggled(cx.def().report.csv);
                 self.export = Export::Not;
             }
+            Action::Columns => self.later_columns = !self.later_columns,
             Action::Refresh => self.report.query.want(),
             Action::Tag(by) => {
                 let rows = self.report.value.as_ref().map_or(0, |report| report.tags.len());
@@ -348,7 +355,7 @@ impl Reports {
 
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
         let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
-        let figures = |report: &ShiftReport| view::lines(cx, report, None).len();
+        let figures = |report: &ShiftReport| view::lines(cx, report, None, false).len();
         let lines = match (&self.preview, &self.report.value) {
             (Some(lines), _) => lines.len(),
             (None, Some(report)) => figures(report),

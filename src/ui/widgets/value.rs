@@ -66,15 +66,20 @@ pub fn line(cx: &ViewContext, tag: TagId) -> String {
     [def.name.clone(), shown.text, shown.unit, quality, text::stamp(sample.at, &cx.def().time_zone)].join("\t")
 }
 
-/// The value in words; a status word as the names of its set bits.
+/// The value in words.
 fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let def = cx.def().tag(tag);
     if def.is_text() {
         return cx.snapshot.text(tag);
     }
-    let value = cx.snapshot.sample(tag).value?;
+    cx.snapshot.sample(tag).value.map(|value| number(cx, tag, value))
+}
+
+/// A number of a tag in words: a state by its name, a status word as the names of its set bits.
+pub fn number(cx: &ViewContext, tag: TagId, value: f64) -> String {
+    let def = cx.def().tag(tag);
     if def.bit_labels.is_empty() {
-        return Some(cx.snapshot.format(tag, value));
+        return cx.snapshot.format(tag, value);
     }
     let set: Vec<&str> = def
         .bit_labels
@@ -82,7 +87,7 @@ fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
         .filter(|(bit, _)| to_u64(value) >> (*bit).min(63) & 1 == 1)
         .map(|(_, name)| name.as_str())
         .collect();
-    Some(if set.is_empty() { t!("none").to_owned() } else { set.join(", ") })
+    if set.is_empty() { t!("none").to_owned() } else { set.join(", ") }
 }
 
 impl Shown {

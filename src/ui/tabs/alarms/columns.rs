@@ -52,6 +52,16 @@ impl Columns {
         let seen = rows.iter().take(room).map(|row| self::width(&subject(cx, row.alarm.id)));
         let tag = seen.max().unwrap_or(8).min(left / 2);
         let what = left.saturating_sub(tag + 1);
+        // What the messages leave is for values in words.
+        let seen = || rows.iter().take(room);
+        let message = |row: &Row| match row.first || row.under || row.folded {
+            true => u16::MAX,
+            false => self::width(translate(&cx.def().alarm(row.alarm.id).message)),
+        };
+        let texts = seen().map(message).max().unwrap_or(0).max(8);
+        let values = seen().filter_map(|row| Some(self::width(&value_text(cx, row.alarm)?.whole()))).max();
+        let moved = what.saturating_sub(texts).min(values.unwrap_or(0).saturating_sub(value));
+        let (what, value) = if value > 0 { (what - moved, value + moved) } else { (what, 0) };
         Columns { time, tag, what, value, ribbon: ribbon + more, respond, state, since, by }
     }
 
@@ -84,10 +94,7 @@ impl Columns {
     pub fn cells(&self, tab: &Alarms, cx: &ViewContext, row: &Row) -> [String; 3] {
         let alarm: &ActiveAlarm = row.alarm;
         let def = cx.def().alarm(alarm.id);
-        let now = match def.subject {
-            Subject::Tag(tag) => value::show(cx, tag).within(10),
-            Subject::Device(_) | Subject::Line(_) | Subject::Station => "–".to_owned(),
-        };
+        let now = value_text(cx, alarm).map_or("–".to_owned(), |shown| shown.within(self.value));
         let left = guidance::response(def, alarm, cx.now);
         let respond = left.map(|left| format!("{} {}", left.bar(cx, RESPOND), left.short())).unwrap_or_default();
         let cells = [
@@ -103,6 +110,14 @@ impl Columns {
             alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default().to_owned(),
         ];
         self.row(cx.theme.priority_mark(def.priority), cells.each_ref().map(String::as_str))
+    }
+}
+
+/// The value that the alarm watches, as it is now.
+fn value_text(cx: &ViewContext, alarm: &ActiveAlarm) -> Option<value::Shown> {
+    match cx.def().alarm(alarm.id).subject {
+        Subject::Tag(tag) => Some(value::show(cx, tag)),
+        Subject::Device(_) | Subject::Line(_) | Subject::Station => None,
     }
 }
 

@@ -169,7 +169,7 @@ pub fn now_text(cx: &ViewContext, alarm: &ActiveAlarm) -> String {
     let zone = &cx.def().time_zone;
     let mut words = match cx.def().alarm(alarm.id).subject {
         Subject::Tag(tag) => {
-            let raised = alarm.value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
+            let raised = alarm.value.map_or("–".to_owned(), |value| value::number(cx, tag, value));
             t!("{whole}, raised at {raised}", whole = value::show(cx, tag).whole(), raised)
         }
         Subject::Device(device) => device_alarm_text(cx, alarm.id, device),

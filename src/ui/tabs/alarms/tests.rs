@@ -1,6 +1,7 @@
 //! Tests of the alarms tab: what the operator sees, and what the keys do.
 
 mod actions;
+mod columns;
 mod steps;
 
 use std::{collections::HashSet, sync::Arc, time::Duration};

@@ -1,6 +1,7 @@
 //! The reports tab in the whole terminal, with a made-up report behind it.
 
 mod batches;
+mod columns;
 mod made;
 mod chart;
 mod rows;

@@ -44,7 +44,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             draw_chart(reports, cx, &mut canvas.part(left, 1, columns - left, rows + 1));
             let cx = &ViewContext { area: Rect { width: left, ..cx.area }, ..*cx };
             let charted = (left < columns).then_some(reports.charted);
-            let lines = lines(cx, report, charted);
+            let lines = lines(cx, report, charted, reports.later_columns);
             let first = reports.scroll.first(lines.len(), usize::from(rows));
             let mut part = canvas.part(0, 2, left, rows);
             let area = part.area();
@@ -52,7 +52,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
                 part.buffer().set_line(area.x, area.y + y, line, area.width);
             }
             let hidden = lines.len().saturating_sub(first + usize::from(rows));
-            canvas.text(0, 1, &heading(left), cx.theme.dim());
+            canvas.text(0, 1, &heading(left, reports.later_columns), cx.theme.dim());
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         (None, _) => {
@@ -186,26 +186,40 @@ fn widths(width: u16) -> (u16, u16) {
     (15 + wide / 4, 9 + wide / 10)
 }
 
-fn heading(width: u16) -> String {
+/// The columns that are shown: on a narrow screen the first or the last ones.
+fn shown_columns(width: u16, later: bool) -> std::ops::Range<usize> {
+    match (width, later) {
+        (FIGURES.., _) => 0..6,
+        (_, false) => 0..4,
+        (_, true) => 3..6,
+    }
+}
+
+fn heading(width: u16, later: bool) -> String {
     let (tag, figure) = widths(width);
-    let mut text = format!("  {}{}", pad(t!("tag"), tag), pad(t!("unit"), 7));
+    let page = match (width, later) {
+        (FIGURES.., _) => "",
+        (_, false) => "  c 1/2",
+        (_, true) => "  c 2/2",
+    };
+    let mut text = format!("  {}{}", pad(&format!("{}{page}", t!("tag")), tag), pad(t!("unit"), 7));
     let names = [t!("min"), t!("mean/+"), t!("max"), t!("last"), t!("in alarm"), t!("good")];
-    for (name, more) in names.into_iter().zip([0, 0, 0, 0, 1, 0]) {
-        text.push_str(&pad_left(name, figure + more));
+    for n in shown_columns(width, later) {
+        text.push_str(&pad_left(names[n], figure + u16::from(n == 4)));
     }
     text
 }
 
 /// Everything below the heading: figures, counts, alarms, actions.
 /// The row whose tag has the chart is marked.
-pub fn lines(cx: &ViewContext, report: &ShiftReport, charted: Option<usize>) -> Vec<Line<'static>> {
+pub fn lines(cx: &ViewContext, report: &ShiftReport, charted: Option<usize>, later: bool) -> Vec<Line<'static>> {
     let theme = cx.theme;
     let mut lines = Vec::new();
     if report.tags.iter().all(|tag| tag.good == 0.0) {
         let words = t!("  no data: no good value was recorded in this period");
         lines.push(Line::styled(words, theme.trouble()));
     }
-    lines.extend(report.tags.iter().enumerate().map(|(n, tag)| figures(cx, tag, charted == Some(n))));
+    lines.extend(report.tags.iter().enumerate().map(|(n, tag)| figures(cx, tag, charted == Some(n), later)));
     lines.push(Line::default());
     lines.push(counts(cx, report));
     // The CSV has the whole hash.
@@ -234,7 +248,7 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport, charted: Option<usize>) -> 
     lines
 }
 
-fn figures(cx: &ViewContext, tag: &TagFigures, charted: bool) -> Line<'static> {
+fn figures(cx: &ViewContext, tag: &TagFigures, charted: bool, later: bool) -> Line<'static> {
     let (theme, (name, figure)) = (cx.theme, widths(cx.area.width));
     let value = |value: Option<f64>| match value {
         Some(value) => pad_left(&format!("{value:.*}", usize::from(tag.decimals)), figure),
@@ -244,17 +258,22 @@ fn figures(cx: &ViewContext, tag: &TagFigures, charted: bool) -> Line<'static> {
     let alarm = if tag.in_alarm.is_zero() { "–".to_owned() } else { long(tag.in_alarm) };
     let good =
         if tag.good >= 1.0 { "100 %".to_owned() } else { format!("{:.1} %", (tag.good * 1_000.0).floor() / 10.0) };
-    Line::from(vec![
+    let figures = [
+        Span::styled(value(tag.min), theme.normal()),
+        Span::styled(pad_left(&mean, figure), theme.normal()),
+        Span::styled(value(tag.max), theme.normal()),
+        Span::styled(value(tag.last), theme.normal()),
+        Span::styled(pad_left(&alarm, figure + 1), if tag.in_alarm.is_zero() { theme.dim() } else { theme.strong() }),
+        Span::styled(pad_left(&good, figure), if tag.good < 0.9995 { theme.strong() } else { theme.dim() }),
+    ];
+    let names = [
         Span::styled(if charted { theme.pick("▸ ", "> ") } else { "  " }, theme.strong()),
         Span::styled(pad(&tag.tag, name - 1), if charted { theme.strong() } else { theme.normal() }),
         Span::styled(format!(" {}", pad(&tag.unit, 7)), theme.dim()),
-        Span::styled(
-            [value(tag.min), pad_left(&mean, figure), value(tag.max), value(tag.last)].concat(),
-            theme.normal(),
-        ),
-        Span::styled(pad_left(&alarm, figure + 1), if tag.in_alarm.is_zero() { theme.dim() } else { theme.strong() }),
-        Span::styled(pad_left(&good, figure), if tag.good < 0.9995 { theme.strong() } else { theme.dim() }),
-    ])
+    ];
+    let shown = shown_columns(cx.area.width, later);
+    let figures = figures.into_iter().enumerate().filter(|(n, _)| shown.contains(n)).map(|(_, span)| span);
+    Line::from_iter(names.into_iter().chain(figures))
 }
 
 /// `alarms 3 (high 1, medium 2)   most TIC-1.PV ×2   operator actions 4`.
@@ -315,7 +334,7 @@ fn suppressed_line(cx: &ViewContext, alarm: &SuppressedSummary) -> Line<'static>
 fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'static> {
     let theme = cx.theme;
     let value = |value: f64| match cx.def().tag_named(&alarm.subject) {
-        Some(tag) => format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)),
+        Some(tag) => format!("{} {}", value::number(cx, tag, value), cx.snapshot.unit(tag)),
         None => format!("{value}"),
     };
     let active = alarm.event == AlarmEvent::Raised;

@@ -124,12 +124,10 @@ impl Trends {
             return Vec::new();
         }
         self.export.user = user(cx);
-        let files = file(|| {
-            let page = picture(self, cx);
-            let png = page.png().map(|png| (self.path(cx, "png"), png));
-            [(self.path(cx, "svg"), page.svg())].into_iter().chain(png).collect()
-        });
-        self.send(files)
+        // For people, in the language that they read on the screen; the CSV is for programs.
+        let page = picture(self, cx);
+        let png = page.png().map(|png| (self.path(cx, "png"), png));
+        self.send([(self.path(cx, "svg"), page.svg())].into_iter().chain(png).collect())
     }
 
     fn send(&mut self, files: Vec<(PathBuf, Vec<u8>)>) -> Vec<UiAction> {

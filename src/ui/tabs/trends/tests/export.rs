@@ -71,6 +71,24 @@ fn the_chart_is_written_as_svg_and_then_as_png() {
     assert!(stand.screen().contains("not exported: audit log full"));
 }
 
+#[test]
+fn an_exported_chart_has_the_language_of_the_terminal() {
+    let mut stand = Stand::new(Theme::FULL, 120, 40);
+    stand.answer();
+    stand.model.locale = crate::text::Language::THAI.locale();
+    let mut written = |letter| {
+        let (id, _) = requested(&effects(&mut stand, key(letter))).expect("recorded");
+        let (path, bytes) =
+            saved(&effects(&mut stand, Msg::RequestDone(id, Ok(Durability::Recorded)))).expect("written");
+        effects(&mut stand, Msg::Saved(Some(Tab::Trends), Ok(path)));
+        String::from_utf8(bytes).expect("text")
+    };
+    let csv = written('e');
+    assert!(csv.starts_with("time,TIC-1.PV") && csv.contains(",good"), "a CSV is the same for every program: {csv}");
+    let svg = written('E');
+    assert!(svg.contains("เฉลี่ย") && !svg.contains("mean "), "{svg}");
+}
+
 fn change_session(stand: &mut Stand, change: impl FnOnce(&mut SessionStatus)) -> Vec<Effect> {
     let mut session = (*stand.model.session).clone();
     change(&mut session);
