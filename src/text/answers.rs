@@ -3,7 +3,7 @@
 
 use super::{fill, translation};
 
-/// Answers by their texts in `access`, `plant` and `bus/io`, with names for what differs. A test finds each of them there.
+/// Answers to requests by their texts in `access` and `plant`, with names for what differs. A test finds each of them there.
 fn words() -> &'static [&'static str] {
     &[
         "wrong name or password",
@@ -31,10 +31,33 @@ fn words() -> &'static [&'static str] {
         "the password must not be the name of the user",
         "this password is too common",
         "the password has {chars} characters, at least {least} are needed; several words are best",
+        "no user is logged in here",
+        "no users exist: the user who started the station creates the first Supervisor",
+        "this station does not require login",
+        "this terminal is already locked",
+        "this terminal is not locked",
+        "there are {most} users, no more can be",
+        "a name has letters, digits, `.`, `_` and `-`, found {letter}",
+        "a name is of one alphabet, found {letter} of {other} beside {first}",
+        "{name} is a user of the operating system who needs no password here",
+        "the operating system identifies you here; no password is needed",
+        "the password has {chars} characters, at most {most} can be",
+        "the password has a character that cannot be typed",
+        "this tag requires a password, and your account has none",
+        "the second user must be another user",
+        "{name} must choose a new password first",
+        "{name} cannot approve this: it is for a {needed}",
+        "found the path `{path}`, expected an absolute one",
         "this tag requires your password again",
         "this tag requires your own password",
         "this tag requires a second user",
         "the station was restarted since this was shown: check and confirm again",
+    ]
+}
+
+/// Why a line is not connected, or a device answers nothing.
+fn line_words() -> &'static [&'static str] {
+    &[
         "no setting of the device could be read",
         "the port accepts no bytes",
         "the port is gone",
@@ -68,7 +91,7 @@ fn words() -> &'static [&'static str] {
 /// An answer of the station in the language of this thread, as it is where it is none of the known ones.
 pub fn said(answer: &str) -> String {
     let known = |pattern: &&'static str| Some((translation(pattern)?, values(pattern, answer)?));
-    let found = words().iter().find_map(known);
+    let found = words().iter().chain(line_words()).find_map(known);
     found.map_or_else(
         || answer.to_owned(),
         |(translated, values)| {

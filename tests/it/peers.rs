@@ -34,15 +34,22 @@ fn slave(python: &Path, kind: &str, place: &str) -> Process {
 
 /// Runs the station headless for a while and gives what it says, with what it prints of each tag at the end.
 fn station(plant: &Path, port: &str, time: &str) -> Vec<String> {
+    station_until(plant, port, &["--for", time], |_| {})
+}
+
+/// The same, where it ends in another way.
+fn station_until(plant: &Path, port: &str, args: &[&str], end: impl FnOnce(&mut Process)) -> Vec<String> {
     let folder = folder();
     let mut station = Process::start(
         sightglass()
             .arg("run")
             .arg(plant)
-            .args(["--print", "--for", time, "--port", &format!("L1={port}"), "--history"])
+            .args(args)
+            .args(["--print", "--port", &format!("L1={port}"), "--history"])
             .arg(folder.path().join("history.duckdb"))
             .env("XDG_STATE_HOME", folder.path()),
     );
+    end(&mut station);
     assert_eq!(station.end(), Some(0), "{}", station.said.join("\n"));
     std::mem::take(&mut station.said)
 }
@@ -221,7 +228,10 @@ fn a_hostile_tcp_peer_costs_values_but_never_shows_a_wrong_one() {
     let file = folder.path().join("hostile.toml");
     fs::write(&file, plant_with(&[WELL], "tcp")).unwrap();
     fs::copy(plant("number.toml"), folder.path().join("number.toml")).unwrap();
-    let said = station(&file, &format!("127.0.0.1:{port}"), "40s");
+    let said = station_until(&file, &format!("127.0.0.1:{port}"), &[], |station| {
+        station.wait_for("WELL (unit 3): responding");
+        station.signal("TERM");
+    });
     assert_eq!(hostile.join().unwrap(), 4, "{}", said.join("\n"));
     check(&said, &[("WELL.N", "10 good")]);
 }
