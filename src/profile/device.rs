@@ -325,11 +325,13 @@ pub(super) fn signature(table: &SignatureTable, scope: &Scope, problems: &mut Pr
 
 /// What an output is at its terminals is calculated from percent.
 pub(super) fn check_output(output: Option<At<Output>>, mv: Option<TagId>, tags: &[TagDef], problems: &mut Problems) {
-    let (Some(output), Some(mv)) = (output, mv.map(|mv| &tags[mv.index()])) else { return };
-    if mv.unit != "%" || mv.unit_from.is_some() {
-        let problem = problems.add(output.at, format!("{} has the unit `{}`", mv.name, mv.unit));
-        problem.label("expected a faceplate whose `mv` is in %");
-    }
+    let Some(output) = output else { return };
+    let found = match mv.map(|mv| &tags[mv.index()]) {
+        None => "this device has no `mv`".to_owned(),
+        Some(mv) if mv.unit != "%" || mv.unit_from.is_some() => format!("{} has the unit `{}`", mv.name, mv.unit),
+        Some(_) => return,
+    };
+    problems.add(output.at, found).label("expected a faceplate whose `mv` is in %");
 }
 
 /// What the plant file states of registers that are never heard: by nothing else may it be known how values are scaled.

@@ -100,7 +100,9 @@ fn a_temperature_needs_its_decimals_unit_and_sensor_state() {
     let id = |name: &str| plant.tag_named(name).unwrap();
     let pv = plant.tag(id("TIC-1.PV"));
     assert_eq!(pv.decimals, Decimals::From(id("TIC-1.P-DP")));
-    assert_eq!(pv.quality_from, Some((id("TIC-1.FAULT"), u64::MAX)));
+    for name in ["TIC-1.PV", "TIC-1.DV"] {
+        assert_eq!(plant.tag(id(name)).quality_from, Some((id("TIC-1.FAULT"), u64::MAX)), "{name}");
+    }
     assert_eq!(pv.unit_from, Some((id("TIC-1.P-F"), vec![(0, "°C".to_owned()), (1, "°F".to_owned())])));
     assert_eq!(pv.unit, "°C");
     assert_eq!((pv.min, pv.max), (Some(Bound::Fixed(0.0)), Some(Bound::Fixed(100.0))), "the plant file's bounds win");

@@ -40,18 +40,21 @@ fn controller(table: &str) -> Result<PlantDef, Errors> {
 
 #[test]
 fn an_output_at_its_terminals_is_that_of_a_percentage() {
+    let load_with = |meter: &str| load(PLANT.as_bytes(), meter, PLC);
     let load = |unit: &str| {
         let mv =
             format!("[[tag]]\nname = \"MV\"\ntable = \"holding\"\naddress = 1010\ntype = \"int16\"\nunit = \"{unit}\"");
         let meter =
             format!("output = \"4-20 mA\"\n{METER}\n{mv}\n[faceplate]\npv = \"T\"\nsv = \"MODE\"\nmv = \"MV\"\n");
-        load(PLANT.as_bytes(), &meter, PLC)
+        load_with(&meter)
     };
     assert!(load("%").unwrap().devices[0].output.is_some());
     for unit in ["kW", ""] {
         let text = load(unit).expect_err(unit).to_string();
         assert!(text.contains("meter.toml:1:10") && text.contains(&format!("D1.MV has the unit `{unit}`")), "{text}");
     }
+    let none = load_with(&format!("output = \"4-20 mA\"\n{METER}\n")).unwrap_err().to_string();
+    assert!(none.contains("meter.toml:1:10") && none.contains("this device has no `mv`"), "{none}");
 }
 
 #[test]
