@@ -198,6 +198,7 @@ pub(super) fn table(runs: &[ControlRun]) -> Table {
         Column::number("final offset"),
         Column::number("IAE, unit min"),
         Column::number("energy kWh"),
+        Column::number("energy good %"),
         Column::number("good %"),
         Column::text("settings"),
     ];
@@ -208,6 +209,7 @@ pub(super) fn table(runs: &[ControlRun]) -> Table {
         Figure::Unknown => Cell::text(t!("unknown")),
     };
     Table::new(columns).with(runs.iter().map(|run| {
+        let (kwh, kwh_good) = run.energy.unzip();
         let changed = if run.settings_changed { t!(" (changed)") } else { "" };
         vec![
             Cell::text(run.label()),
@@ -220,7 +222,8 @@ pub(super) fn table(runs: &[ControlRun]) -> Table {
             Cell::number(run.overshoot, run.decimals),
             Cell::number(run.offset, run.decimals),
             Cell::number(Some(run.iae), run.decimals.saturating_add(1)),
-            Cell::number(run.energy.map(|(kwh, _)| kwh), 3),
+            Cell::number(kwh, 3),
+            Cell::number(kwh_good.map(floor_percent), 1),
             Cell::number(Some(floor_percent(run.good)), 1),
             Cell::text(format!("{}{changed}", run.settings)),
         ]
