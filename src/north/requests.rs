@@ -60,6 +60,8 @@ pub struct Requests {
     last_number: u32,
     /// The list was damaged: nothing is taken before, as it may have been done already.
     closed_until: Option<Timestamp>,
+    /// Nothing more is passed on.
+    is_stopping: bool,
     status: MqttRequestStatus,
     /// What the audit log does not have yet.
     refusals: Refusals,
@@ -114,7 +116,8 @@ impl Requests {
         let status = MqttRequestStatus { user, error, ..MqttRequestStatus::default() };
         let (rate, answers) = (RATE, ANSWERS);
         let (refusals, sent) = (Refusals::default(), Vec::new());
-        Requests { mqtt, log, rate, answers, last_number: 0, closed_until, status, refusals, sent }
+        let (last_number, is_stopping) = (0, false);
+        Requests { mqtt, log, rate, answers, last_number, closed_until, is_stopping, status, refusals, sent }
     }
 
     /// What is shown.
@@ -152,6 +155,11 @@ impl Requests {
         self.refusals.take(now.plant)
     }
 
+    /// The station ends: what still waits is refused.
+    pub fn stop(&mut self) {
+        self.is_stopping = true;
+    }
+
     /// All that are not recorded yet: the station ends.
     pub fn last_refusals(&mut self) -> Vec<Refusal> {
         self.refusals.take_all()
@@ -186,6 +194,7 @@ impl Requests {
         }
         let checked = match self.closed_until.filter(|until| now.utc < *until) {
             Some(until) => Err(MqttRefusal::ListDamaged(until)),
+            None if self.is_stopping => Err(MqttRefusal::Stopping),
             None if !is_permitted => Err(MqttRefusal::ResponseTopic),
             None => request::check(plant, &self.mqtt, &received.topic, &request, now.utc),
         };

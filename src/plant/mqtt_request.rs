@@ -99,6 +99,9 @@ pub enum MqttRefusal {
     /// The list of requests was damaged: what was done before is not known.
     #[error("{}", t!("the list of earlier requests is damaged, none is taken before {until}", until = .0))]
     ListDamaged(Timestamp),
+    /// It waited when the station was stopped.
+    #[error("{}", t!("the station is stopping"))]
+    Stopping,
     /// It did not reach the plant.
     #[error("{0}")]
     NotDelivered(String),

@@ -151,6 +151,18 @@ fn a_flood_is_refused_then_not_even_answered() {
 }
 
 #[test]
+fn what_waits_when_the_station_stops_is_refused_and_recorded() {
+    let mut requests = requests(Ok(RequestLog::default()));
+    let done = message(&json("a", "50"));
+    decide(&mut requests, &done, 0);
+    requests.stop();
+    assert_eq!(decide(&mut requests, &message(&json("b", "50")), 1), "refused: the station is stopping");
+    assert!(decide(&mut requests, &done, 1).starts_with("accepted"), "of a command under way it says so");
+    let [refusal] = &requests.last_refusals()[..] else { panic!("one entry") };
+    assert_eq!(refusal.outcome(), "refused: the station is stopping");
+}
+
+#[test]
 fn what_is_shown_of_a_request_is_short() {
     let mut requests = requests(Ok(RequestLog::default()));
     decide(&mut requests, &message(&json("a", "-1e308")), 0);

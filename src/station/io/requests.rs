@@ -114,6 +114,11 @@ impl RequestTask {
                 _ = tick.tick() => self.requests.on_lost(self.lost.swap(0, Ordering::Relaxed)),
             }
         }
+        self.requests.stop();
+        received.close();
+        while let Ok(waiting) = received.try_recv() {
+            self.on_received(&waiting).await;
+        }
         // The session server waits for these before it ends.
         self.requests.on_lost(self.lost.swap(0, Ordering::Relaxed));
         let rest = self.requests.last_refusals();

@@ -77,8 +77,15 @@ impl TabView for Users {
         }
     }
 
-    fn hints(&self, _cx: &ViewContext) -> Vec<Hint> {
-        if self.audit.is_some() { keys::hints(&audit::keys()) } else { keys::hints(&list_keys()) }
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        if self.audit.is_some() {
+            return keys::hints(&audit::keys());
+        }
+        let mut keys = list_keys();
+        if cx.session.users.is_empty() {
+            keys.retain(|key| key.action == Action::Audit);
+        }
+        keys::hints(&keys)
     }
 
     fn back(&mut self, _cx: &ViewContext) -> bool {
