@@ -19,7 +19,7 @@ use crate::{
     plant::{
         Snapshot,
         alarm::AlarmState,
-        def::{AlarmId, DeviceId, LineId, TagId},
+        def::{AlarmId, DeviceId, LineDef, LineId, TagId},
         event::LineState,
         sample::{Cause, Quality},
         snapshot::DeviceState,
@@ -109,7 +109,7 @@ fn facts(cx: &ViewContext) -> BTreeMap<Fact, (String, Option<Quality>)> {
         matches!(status.state, LineState::Connecting) && status.lost_since.is_some()
     };
     let lines = def.lines.iter().filter(|line| !is_retry(line.id)).map(|line| {
-        let state = line_label(&snapshot.line(line.id).state);
+        let state = line_label(line, &snapshot.line(line.id).state);
         (Fact::Line(line.id), t!("line {name}: {state}", name = line.name, state))
     });
     let devices = def.devices.iter().filter(|device| !is_retry(device.line)).map(|device| {
@@ -157,10 +157,11 @@ fn gone(cx: &ViewContext, fact: Fact, facts: &BTreeMap<Fact, (String, Option<Qua
     (!facts.contains_key(&other)).then(|| t!("alarm: {line}", line))
 }
 
-fn line_label(state: &LineState) -> String {
+fn line_label(line: &LineDef, state: &LineState) -> String {
     match state {
         LineState::Connecting => t!("connecting").to_owned(),
         LineState::NoTraffic => t!("no traffic heard").to_owned(),
+        LineState::Connected if line.listens => t!("listening").to_owned(),
         LineState::Connected => t!("connected").to_owned(),
         LineState::Disconnected => t!("disconnected by an operator").to_owned(),
         LineState::Testing => t!("in use by a test").to_owned(),
@@ -216,6 +217,8 @@ mod tests {
             let has = |line: &String| line.starts_with("2026-11-21T14:0") && line.contains(words);
             assert!(lines.iter().any(has), "{words}: {lines:#?}");
         }
+        let heard = plain().lines(&Fixture::listening().snapshot(), &session());
+        assert!(heard.iter().any(|line| line.contains(": listening")), "{heard:#?}");
         let no_control = |line: &String| !line.chars().any(char::is_control);
         assert!(lines.iter().all(no_control), "{lines:#?}");
     }

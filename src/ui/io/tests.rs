@@ -107,11 +107,16 @@ impl Pty {
     }
     /// Waits until the words stand on the screen, or were sent as they are.
     fn wait_for(&mut self, words: &str) {
+        self.wait_for_times(words, 1);
+    }
+    /// Waits until it was sent so often; once is enough where the screen shows it.
+    fn wait_for_times(&mut self, words: &str, times: usize) {
         let deadline = Instant::now() + TIMEOUT;
         loop {
             let mut screen = vt100::Parser::new(24, 80, 0);
             screen.process(&self.seen);
-            if screen.screen().contents().contains(words) || String::from_utf8_lossy(&self.seen).contains(words) {
+            let sent = String::from_utf8_lossy(&self.seen).matches(words).count();
+            if times <= sent || times == 1 && screen.screen().contents().contains(words) {
                 return;
             }
             match self.sent.recv_timeout(deadline.saturating_duration_since(Instant::now())) {

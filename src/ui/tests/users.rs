@@ -379,7 +379,8 @@ fn the_audit_list_is_searched_by_the_history_and_read_whole() {
 
 #[test]
 fn without_users_no_key_for_one_is_offered() {
-    let mut model = with(&Fixture::normal(), SessionStatus { users: Arc::default(), ..person("sue", Role::Supervisor) });
+    let mut model =
+        with(&Fixture::normal(), SessionStatus { users: Arc::default(), ..person("sue", Role::Supervisor) });
     type_keys(&mut model, "7");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("No users:"), "{shown}");

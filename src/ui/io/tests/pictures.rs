@@ -28,7 +28,7 @@ fn a_terminal_with_kitty_graphics_gets_a_png() {
     pty.press("i");
     pty.wait_for(&delete);
     pty.press("i");
-    pty.wait_for("Esc close");
+    pty.wait_for_times("\x1b_Ga=T", 2);
     pty.signal(Signal::TERM);
     pty.ends_restored("test result: ok");
     let all = seen(&pty);
