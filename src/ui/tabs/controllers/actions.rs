@@ -114,7 +114,7 @@ impl Controllers {
         if let Some(device) = device {
             let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
             let copies = matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. }));
-            // Nothing is sent on the line of another master, and it has no settings to try.
+            // Nothing is written or sent on the line of another master, and it has no settings to try.
             let listens = cx.def().listens_on(device.line);
             let lacking = [
                 (Action::Refresh, listens),
@@ -133,6 +133,7 @@ impl Controllers {
                 (Action::SwapDirection, !copies),
             ];
             hide(&mut keys, &lacking);
+            keys.retain(|key| !listens || self.role_for(cx, device, key.action).is_none());
             keys = needing(keys, |action| self.role_for(cx, device, action));
         }
         let mut hints = hints(&keys);

@@ -106,10 +106,11 @@ impl Table {
         let read = if now || tag.access == Access::Write { String::new() } else { age(cx.age(tag.id)) };
         let range = range_text(cx, tag.id);
         // What is only read needs no range; what can be written says that its range is not known.
-        let none = !tag.writable() && tag.enum_labels.is_empty() && cx.snapshot.range(tag.id).is_none();
+        let writable = tag.writable() && !cx.def().listens_on(cx.def().device(tag.device).line);
+        let none = !writable && tag.enum_labels.is_empty() && cx.snapshot.range(tag.id).is_none();
         let range = if none { "–".to_owned() } else { range };
         let range = range.trim_start_matches(t!("range ")).trim_end_matches(&shown.unit).trim_end().to_owned();
-        let may = tag.writable() && rights::lacks(cx, rights::to_write(cx, [tag.id])).is_none();
+        let may = writable && rights::lacks(cx, rights::to_write(cx, [tag.id])).is_none();
         let pen = match (self.defaults && differs(cx, tag), may) {
             (true, _) => theme.pick("≠", "#"),
             (false, true) => theme.pick("✎", "w"),

@@ -107,5 +107,11 @@ fn the_keys_that_send_are_hidden_on_a_listening_line() {
         for key in ["u refresh", "c settings"] {
             assert_eq!(footer.contains(key), expect, "{key}:\n{shown}");
         }
+        type_keys(&mut model, "⏎↓");
+        let shown = screen(&mut model, 200, 60);
+        let footer = shown.lines().last().expect("a footer");
+        for (place, key) in [(footer, "⏎ edit"), (footer, "T tune"), (&*shown, "✎ SV")] {
+            assert_eq!(place.contains(key), expect, "{key}:\n{shown}");
+        }
     }
 }
