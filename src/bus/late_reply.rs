@@ -11,7 +11,12 @@
 //! A unit that was never asked before may still answer an earlier process that was killed, and one that sends what it was
 //! not asked for may do so again: both are *unproven*, and are first asked something that is no usual block of theirs.
 
+mod unit;
+
 use std::time::Duration;
+
+pub use unit::Proof;
+use unit::Unit;
 
 use super::{
     frame::{ResponseSignature, response_signature},
@@ -124,90 +129,14 @@ pub struct LineReplies {
     timeout: Duration,
     /// Numbers of loopbacks.
     loopbacks: u16,
-}
-
-#[derive(Debug, Clone, Default)]
-struct Unit {
-    outstanding: OutstandingReplies,
-    /// How late an outstanding reply has ever come, its timeout included.
-    late_max: Duration,
-    /// When it last failed to answer in time.
-    failed_at: Option<Duration>,
-    /// When it last sent what it was not asked for, unless it has been resynchronised since.
-    unsolicited_at: Option<Duration>,
-    /// Its last good answer, and whether that came again.
-    answer: Vec<u8>,
-    repeats: bool,
-    /// Outstanding signatures of which one has come late.
-    arrived: Vec<ResponseSignature>,
-    /// What had not come, and since when it was outstanding, when it proved to be in sync: from a unit that answers in order, it
-    /// never comes.
-    disproved: Vec<(ResponseSignature, Duration)>,
-    /// It does not answer in order.
-    reorders: bool,
-    /// More than one answer of a signature may be under way: only time clears what is outstanding.
-    is_unsure: bool,
-}
-
-impl Unit {
-    fn resynchronise(&mut self) {
-        self.outstanding.clear();
-        self.arrived.clear();
-        (self.failed_at, self.unsolicited_at, self.is_unsure) = (None, None, false);
-    }
-
-    /// It has given an answer that cannot have been an older one.
-    fn prove(&mut self, quarantine: Duration, now: Duration) {
-        let (signatures, arrived) =
-            (std::mem::take(&mut self.outstanding.signatures), std::mem::take(&mut self.arrived));
-        let (failed_at, is_unsure) = (self.failed_at, self.is_unsure);
-        self.resynchronise();
-        let Some(failed_at) = failed_at else { return };
-        if self.reorders {
-            (self.outstanding.signatures, self.failed_at, self.is_unsure) = (signatures, Some(failed_at), is_unsure);
-            return;
-        }
-        self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < quarantine);
-        let missing = signatures
-            .into_iter()
-            .filter(|signature| !arrived.contains(signature))
-            .map(|signature| (signature, failed_at));
-        self.disproved.extend(missing.take(OUTSTANDING_MAX.saturating_sub(self.disproved.len())));
-    }
-
-    /// An answer has come late. `true` if it shows that answers overtake each other: nothing of its signature is outstanding but what
-    /// cannot come any more from a unit that answers in order. All of that may still come now.
-    fn detect_reordering(&mut self, message: &[u8], quarantine: Duration, now: Duration) -> bool {
-        let fits = |signature: &&ResponseSignature| signature.fits(message);
-        if let Some(signature) =
-            self.outstanding.signatures.iter().find(fits).filter(|signature| !self.arrived.contains(signature))
-        {
-            self.arrived.push(*signature);
-            return false;
-        }
-        self.disproved.retain(|(_, failed_at)| now.saturating_sub(*failed_at) < quarantine);
-        let Some(place) = self.disproved.iter().position(|(signature, _)| signature.fits(message)) else {
-            return false;
-        };
-        self.disproved.swap_remove(place);
-        (self.reorders, self.is_unsure) = (true, !self.disproved.is_empty() || !self.outstanding.signatures.is_empty());
-        for (signature, failed_at) in std::mem::take(&mut self.disproved) {
-            self.outstanding.add(signature);
-            self.failed_at = self.failed_at.max(Some(failed_at));
-        }
-        true
-    }
-
-    /// It is left alone so long for each outstanding reply, where nothing can prove that it is in sync.
-    fn quarantine(&self, timeout: Duration) -> Duration {
-        (2 * self.late_max).max(10 * timeout)
-    }
+    /// Frames carry transaction ids: no answer is mistaken for another, and nothing is ever outstanding.
+    has_ids: bool,
 }
 
 impl LineReplies {
     /// Nothing is outstanding. The numbers of loopbacks begin behind `seed`, which differs from process to process.
     pub fn new(timeout: Duration, seed: u16) -> LineReplies {
-        LineReplies { units: vec![Unit::default(); 256], timeout, loopbacks: seed }
+        LineReplies { units: vec![Unit::default(); 256], timeout, loopbacks: seed, has_ids: false }
     }
 
     /// These blocks are asked for from now on; a unit that was asked for none before is unproven.
@@ -225,7 +154,7 @@ impl LineReplies {
                     outstanding.usual.push(signature);
                 }
             }
-            outstanding.unproven |= first && !outstanding.usual.is_empty();
+            outstanding.unproven |= first && !outstanding.usual.is_empty() && !self.has_ids;
         }
     }
 
@@ -238,6 +167,8 @@ impl LineReplies {
         let unit = &mut self.units[unit];
         if proof && !unsettled {
             unit.prove(unit.quarantine(timeout), now);
+        } else if !unsettled {
+            unit.settles_from = Some(now);
         }
         answer.clone_into(&mut unit.answer);
         let is_usual = response_signature(request).is_some_and(|signature| unit.outstanding.usual.contains(&signature));
@@ -250,6 +181,7 @@ impl LineReplies {
     /// An unsolicited good frame of this unit came. `true` if that puts what was read of it into doubt.
     pub fn on_unsolicited(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
         let unit = &mut self.units[usize::from(unit)];
+        unit.unsettle(now);
         if unit.answer == message {
             unit.repeats = true;
             let usual = unit.outstanding.usual.iter().any(|signature| signature.fits(message));
@@ -280,9 +212,33 @@ impl LineReplies {
         unsolicited_at.is_some_and(|at| now.saturating_sub(at) < self.timeout)
     }
 
-    /// Other settings: an answer may take this long from now on.
-    pub fn set_timeout(&mut self, timeout: Duration) {
+    /// Other settings: an answer may take this long from now on, and frames carry transaction ids or do not.
+    pub fn set_line(&mut self, timeout: Duration, has_ids: bool) {
         self.timeout = timeout;
+        if std::mem::replace(&mut self.has_ids, has_ids) != has_ids {
+            for unit in &mut self.units {
+                unit.resynchronise();
+                unit.outstanding.unproven = !has_ids && !unit.outstanding.usual.is_empty();
+            }
+        }
+    }
+
+    /// What is tried next to prove that a unit is in sync.
+    pub fn proof(&self, unit: u8) -> Proof {
+        self.units[usize::from(unit)].proof
+    }
+
+    /// That has proved nothing.
+    pub fn proof_failed(&mut self, unit: u8) {
+        let proof = &mut self.units[usize::from(unit)].proof;
+        *proof = proof.next();
+    }
+
+    /// It has answered, and proves to be in sync if nothing more comes of it for so long; `None`: it is not about to.
+    pub fn settles_in(&self, unit: u8, now: Duration) -> Option<Duration> {
+        let unit = &self.units[usize::from(unit)];
+        let since = unit.settles_from.filter(|_| !unit.reorders)?;
+        Some(unit.settling_time(self.timeout).saturating_sub(now.saturating_sub(since)))
     }
 
     /// Outstanding replies of a unit.
@@ -321,12 +277,19 @@ impl LineReplies {
         if !signature.is_some_and(ResponseSignature::is_loopback) {
             unit.failed_at = Some(now);
         }
+        unit.settles_from = None;
+    }
+
+    /// A request was refused while the refusal may have been the answer to an older one: call it after [`LineReplies::failed`].
+    pub fn refused(&mut self, unit: u8, now: Duration) {
+        self.units[usize::from(unit)].settles_from = Some(now);
     }
 
     /// An answer of this unit came that was not waited for any more. `true` if one was outstanding.
     pub fn on_late_reply(&mut self, unit: u8, message: &[u8], now: Duration) -> bool {
         let timeout = self.timeout;
         let unit = &mut self.units[usize::from(unit)];
+        unit.unsettle(now);
         let Some(failed_at) = unit.failed_at.filter(|_| !unit.outstanding.is_clear()) else { return false };
         unit.late_max = unit.late_max.max(now.saturating_sub(failed_at) + timeout);
         if unit.reorders && !unit.is_unsure {
@@ -361,10 +324,11 @@ impl LineReplies {
     /// timeouts at the least: a delay, not a proof, and needed only for devices that do not answer a loopback at all.
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
         let timeout = self.timeout;
+        let settled = self.settles_in(unit, now) == Some(Duration::ZERO);
         let unit = &mut self.units[usize::from(unit)];
         let rest = (unit.quarantine(timeout) * to_u32(unit.outstanding.count().max(1))).min(REST_MAX);
         let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
-        if waited < rest {
+        if waited < rest && !settled {
             return Some(rest - waited);
         }
         unit.resynchronise();

@@ -1,12 +1,12 @@
 //! Live reads as a pure step machine: which request is next, and what its response shows of the unit.
 //!
-//! A unit refuses a whole request when one of its addresses does not exist. The refused span is halved until the address
-//! stands alone; later reads go around it. So a hole costs its requests once.
+//! A refused request is halved as a refused poll is ([`RangeBisection`]); later reads go around what was found.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::VecDeque;
 
 use jiff::Timestamp;
 
+use super::plan::{AddressRange, RangeBisection, UnreadableRanges, may_be_cut};
 use crate::plant::{
     event::{ExceptionCode, Fault},
     live::{AddressSpan, LivePart, LiveRead, LiveReading},
@@ -14,64 +14,22 @@ use crate::plant::{
     tag::Table,
 };
 
-/// What the units of a line have refused to live reads.
-#[derive(Debug, Clone, Default)]
-pub struct KnownHoles {
-    holes: BTreeSet<(u8, Table, u32)>,
-    /// Most registers or bits that a unit gives at once.
-    most: BTreeMap<(u8, Table), u16>,
-}
-
-impl KnownHoles {
-    /// Everything is asked again.
-    pub fn forget(&mut self, unit: u8) {
-        self.holes.retain(|(other, ..)| *other != unit);
-        self.most.retain(|(other, _), _| *other != unit);
-    }
-
-    /// These addresses do not exist.
-    pub fn add(&mut self, unit: u8, span: AddressSpan) {
-        self.holes.extend(span.range().map(|address| (unit, span.table, address)));
-    }
-
-    /// The requests that read a span around its holes.
-    fn requests(&self, unit: u8, span: AddressSpan) -> impl Iterator<Item = AddressSpan> {
-        let most =
-            self.most.get(&(unit, span.table)).copied().unwrap_or(if span.table.is_bits() { 2_000 } else { 125 });
-        let range = span.range();
-        let holes = self.holes.range((unit, span.table, range.start)..(unit, span.table, range.end));
-        let ends: Vec<u32> = holes.map(|(.., hole)| *hole).chain([range.end]).collect();
-        let mut from = range.start;
-        ends.into_iter().flat_map(move |end| {
-            let run = from..end;
-            from = end + 1;
-            run.step_by(usize::from(most.max(1))).map(move |start| AddressSpan {
-                table: span.table,
-                address: to_u16(start),
-                count: most.min(to_u16(end - start)),
-            })
-        })
-    }
-
-    fn holes_in(&self, unit: u8, span: AddressSpan) -> impl Iterator<Item = AddressSpan> {
-        let range = span.range();
-        let holes = self.holes.range((unit, span.table, range.start)..(unit, span.table, range.end));
-        holes.map(move |(.., hole)| AddressSpan { table: span.table, address: to_u16(*hole), count: 1 })
-    }
-}
+/// A table of which so many addresses were refused, and none was read, is asked for no more addresses.
+const BARREN: usize = 8;
 
 /// A live read at work.
 #[derive(Debug)]
 pub struct LiveJob {
     unit: u8,
     queue: VecDeque<AddressSpan>,
+    search: RangeBisection,
     reading: LiveReading,
 }
 
 impl LiveJob {
     /// Ready for its first request, `at` in UTC and `began` by the line's clock; what is known to be refused is in the
     /// reading already.
-    pub fn new(read: &LiveRead, known: &mut KnownHoles, at: Timestamp, began: Timestamp) -> LiveJob {
+    pub fn new(read: &LiveRead, known: &mut UnreadableRanges, at: Timestamp, began: Timestamp) -> LiveJob {
         if read.relearn {
             known.forget(read.unit);
         }
@@ -80,7 +38,8 @@ impl LiveJob {
         let refused = Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS));
         let holes = read.spans.iter().flat_map(|span| known.holes_in(unit, *span));
         let parts = holes.map(|span| LivePart { at, span, words: refused.clone() }).collect();
-        LiveJob { unit, queue, reading: LiveReading { began, parts, ..LiveReading::default() } }
+        let reading = LiveReading { began, parts, ..LiveReading::default() };
+        LiveJob { unit, queue, search: RangeBisection::default(), reading }
     }
 
     /// The next request; `None` when it is done.
@@ -89,28 +48,31 @@ impl LiveJob {
     }
 
     /// The request that was next has ended.
-    pub fn on_outcome(&mut self, known: &mut KnownHoles, at: Timestamp, outcome: Result<Vec<u16>, Fault>) {
+    pub fn on_outcome(&mut self, known: &mut UnreadableRanges, at: Timestamp, outcome: Result<Vec<u16>, Fault>) {
         let Some(span) = self.queue.pop_front() else { return };
         self.reading.requests += 1;
+        let whole = AddressRange::of_span(self.unit, span);
         match outcome {
-            // 02: it does not have all of them; 03: that is more at once than it gives.
-            Err(Fault::Exception(code))
-                if matches!(code, ExceptionCode::ILLEGAL_ADDRESS | ExceptionCode::ILLEGAL_VALUE) && 1 < span.count =>
-            {
+            Err(Fault::Exception(code)) if may_be_cut(code) && 1 < span.count && !self.is_barren(span.table) => {
                 let half = span.count / 2;
-                if code == ExceptionCode::ILLEGAL_VALUE {
-                    known.most.insert((self.unit, span.table), half);
-                }
-                self.queue.push_front(AddressSpan {
+                let second = AddressSpan {
                     address: to_u16(u32::from(span.address) + u32::from(half)),
                     count: span.count - half,
                     ..span
-                });
-                self.queue.push_front(AddressSpan { count: half, ..span });
+                };
+                let parts = [AddressSpan { count: half, ..span }, second];
+                let between = AddressRange::of_span(self.unit, AddressSpan { count: 0, ..second });
+                let ranges = parts.map(|part| AddressRange::of_span(self.unit, part));
+                self.search.refused_range(known, whole, Some((ranges, between)));
+                parts.into_iter().rev().for_each(|part| self.queue.push_front(part));
             }
             words => {
-                if words == Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS)) {
-                    known.holes.insert((self.unit, span.table, u32::from(span.address)));
+                match &words {
+                    Ok(_) => self.search.answered_range(whole),
+                    Err(Fault::Exception(code)) if may_be_cut(*code) && span.count == 1 => {
+                        self.search.refused_range(known, whole, None);
+                    }
+                    Err(_) => {}
                 }
                 // A unit that is silent would cost its timeout for every request.
                 let silent = words == Err(Fault::Timeout);
@@ -121,6 +83,15 @@ impl LiveJob {
                 }
             }
         }
+        if self.queue.is_empty() {
+            self.search.conclude_at_once(known);
+        }
+    }
+
+    fn is_barren(&self, table: Table) -> bool {
+        let mut parts = self.reading.parts.iter().filter(|part| part.span.table == table);
+        let refused = |part: &LivePart| matches!(part.words, Err(Fault::Exception(_)));
+        parts.clone().all(refused) && BARREN <= parts.by_ref().count()
     }
 
     /// What was found.
@@ -135,7 +106,7 @@ mod tests {
     use crate::plant::id::LineId;
 
     /// A unit that has these holding registers and gives so many at once; counts its requests.
-    fn serve(known: &mut KnownHoles, spans: &[(u16, u16)], has: impl Fn(u16) -> bool, most: u16) -> LiveReading {
+    fn serve(known: &mut UnreadableRanges, spans: &[(u16, u16)], has: impl Fn(u16) -> bool, most: u16) -> LiveReading {
         let span =
             |(address, count): &(u16, u16)| AddressSpan { table: Table::Holding, address: *address, count: *count };
         let spans = spans.iter().map(span).collect();
@@ -161,7 +132,7 @@ mod tests {
 
     #[test]
     fn a_hole_is_found_once_and_read_around() {
-        let mut known = KnownHoles::default();
+        let mut known = UnreadableRanges::default();
         let has = |address: u16| address != 40;
         let first = serve(&mut known, &[(0, 125)], has, 125);
         let expect: Vec<u16> = (0..125).filter(|address| has(*address)).collect();
@@ -175,9 +146,57 @@ mod tests {
         assert_eq!(serve(&mut known, &[(0, 125)], |_| true, 125).requests, 1, "what it has now is seen");
     }
 
+    /// A unit that refuses a hole, or too much, with one code for everything.
+    fn serve_with(known: &mut UnreadableRanges, code: u8, missing: &[u32], most: u16) -> LiveReading {
+        let span = AddressSpan { table: Table::Holding, address: 0, count: 125 };
+        let read = LiveRead { line: LineId(0), unit: 1, spans: vec![span], not_before: None, relearn: false };
+        let mut job = LiveJob::new(&read, known, Timestamp::UNIX_EPOCH, Timestamp::UNIX_EPOCH);
+        while let Some(span) = job.next() {
+            let refused = most < span.count || missing.iter().any(|address| span.range().contains(address));
+            let words = span.range().map(to_u16).collect();
+            let outcome = if refused { Err(Fault::Exception(ExceptionCode(code))) } else { Ok(words) };
+            job.on_outcome(known, Timestamp::UNIX_EPOCH, outcome);
+        }
+        job.finish(None)
+    }
+
+    #[test]
+    fn whatever_code_a_hole_is_refused_with_it_costs_once() {
+        for code in 1..=4 {
+            let mut known = UnreadableRanges::default();
+            let first = serve_with(&mut known, code, &[40], 125);
+            assert_eq!(values(&first).len(), 124, "exception {code}");
+            let again = serve_with(&mut known, code, &[40], 125);
+            assert_eq!((values(&again).len(), again.requests), (124, 2), "exception {code}");
+            assert_eq!(known.most(1, Table::Holding), None, "exception {code} was no limit");
+        }
+    }
+
+    #[test]
+    fn a_limit_and_a_hole_are_told_apart() {
+        for code in 1..=4 {
+            let mut known = UnreadableRanges::default();
+            serve_with(&mut known, code, &[100], 50);
+            let again = serve_with(&mut known, code, &[100], 50);
+            assert_eq!(values(&again).len(), 124, "exception {code}");
+            assert!(again.requests <= 6, "exception {code}: {} requests", again.requests);
+        }
+    }
+
+    #[test]
+    fn a_table_that_a_unit_does_not_have_costs_few_requests() {
+        let missing: Vec<u32> = (0..125).collect();
+        for code in 1..=4 {
+            let mut known = UnreadableRanges::default();
+            let reading = serve_with(&mut known, code, &missing, 125);
+            assert!(reading.requests < 40, "exception {code}: {} requests", reading.requests);
+            assert_eq!(known, UnreadableRanges::default(), "a unit that refuses everything is not believed");
+        }
+    }
+
     #[test]
     fn a_unit_that_gives_few_at_once_is_asked_for_few() {
-        let mut known = KnownHoles::default();
+        let mut known = UnreadableRanges::default();
         serve(&mut known, &[(0, 64)], |_| true, 8);
         let again = serve(&mut known, &[(0, 64)], |_| true, 8);
         assert_eq!((values(&again), again.requests), ((0..64).collect(), 8));
@@ -188,7 +207,7 @@ mod tests {
         let span = |address| AddressSpan { table: Table::Input, address, count: 10 };
         let spans = vec![span(0), span(100), span(65_526)];
         let read = LiveRead { line: LineId(0), unit: 1, spans, not_before: None, relearn: false };
-        let mut known = KnownHoles::default();
+        let mut known = UnreadableRanges::default();
         let mut job = LiveJob::new(&read, &mut known, Timestamp::UNIX_EPOCH, Timestamp::UNIX_EPOCH);
         job.on_outcome(&mut known, Timestamp::UNIX_EPOCH, Err(Fault::Timeout));
         assert_eq!(job.next(), None);

@@ -20,7 +20,7 @@ mod alternatives;
 mod tests;
 
 pub use cost::{Wire, cost};
-pub use gaps::{RangeBisection, UnreadableRanges};
+pub use gaps::{AddressRange, RangeBisection, Refused, UnreadableRanges, may_be_cut};
 
 use std::{sync::Arc, time::Duration};
 
@@ -129,8 +129,8 @@ fn readable<'a>(def: &'a PlantDef, device: &DeviceDef, unpolled: bool) -> impl I
 }
 
 fn is_refused(device: &DeviceDef, tag: &TagDef, unreadable: &UnreadableRanges) -> bool {
-    let alone = AddressRange::new(tag.point, end_of(tag.point), device);
-    unreadable.touch(device.id, alone.table, alone.start, alone.end)
+    let alone = Extent::new(tag.point, end_of(tag.point), device);
+    unreadable.touch(device.unit, alone.table, alone.start, alone.end)
 }
 
 /// The block that reads one tag alone.
@@ -141,7 +141,7 @@ pub fn single(device: &DeviceDef, tag: &TagDef) -> Block {
 /// The block that reads these tags, which are sorted by address.
 fn together(device: &DeviceDef, tags: &[&TagDef]) -> Block {
     let first = tags[0];
-    let extent = AddressRange::new(first.point, tags.iter().map(|tag| end_of(tag.point)).max().unwrap_or(0), device);
+    let extent = Extent::new(first.point, tags.iter().map(|tag| end_of(tag.point)).max().unwrap_or(0), device);
     Block {
         device: device.id,
         unit: device.unit,
@@ -159,19 +159,25 @@ fn end_of(point: Point) -> u32 {
     u32::from(point.address) + u32::from(point.len())
 }
 
+/// Most registers or bits of one request, as stated or found.
+fn most(device: &DeviceDef, table: Table, unreadable: &UnreadableRanges) -> u32 {
+    let stated = device.limits.most(table);
+    unreadable.most(device.unit, table).map_or(stated, |found| stated.min(found.into()))
+}
+
 /// The registers or bits of one request, moved outwards to multiples of the alignment (registers only).
 #[derive(Debug, Clone, Copy)]
-struct AddressRange {
+struct Extent {
     table: Table,
     start: u32,
     end: u32,
 }
 
-impl AddressRange {
-    fn new(first: Point, end: u32, device: &DeviceDef) -> AddressRange {
+impl Extent {
+    fn new(first: Point, end: u32, device: &DeviceDef) -> Extent {
         let (table, start) = (first.table, u32::from(first.address));
         let step = if table.is_bits() { 1 } else { u32::from(device.limits.alignment.max(1)) };
-        AddressRange { table, start: start - start % step, end: end.next_multiple_of(step).min(0x1_0000) }
+        Extent { table, start: start - start % step, end: end.next_multiple_of(step).min(0x1_0000) }
     }
 
     fn count(self) -> u32 {
@@ -180,7 +186,8 @@ impl AddressRange {
 
     /// Within the limits of one request, and free of unreadable registers.
     fn allowed(self, device: &DeviceDef, unreadable: &UnreadableRanges) -> bool {
-        self.count() <= device.limits.most(self.table) && !unreadable.touch(device.id, self.table, self.start, self.end)
+        self.count() <= most(device, self.table, unreadable)
+            && !unreadable.touch(device.unit, self.table, self.start, self.end)
     }
 
     /// Most unused registers or bits between two tags: sixteen bits cost as much on the wire as one register.

@@ -3,11 +3,13 @@
 //! A transaction cannot be pre-empted, so this is non-preemptive EDF: whatever is released and has the nearest deadline
 //! (release + period) goes first. A release that is missed is counted and skipped, never piled up. On a line with too much
 //! to do (see [`overload`]) background polls are shed, critical polls go before normal ones, and normal ones share what is left. A device
-//! that does not answer (`device`) is asked with one block only, within a small share of the line's time for all of them.
+//! that does not answer (`device`) is asked with one block at a time, in turn; a block that fails alone waits alone. All of them together
+//! take a small share of the time that the others want, and whatever nobody wants.
 
 pub mod budget;
 pub mod overload;
 mod device;
+mod failures;
 mod poll;
 mod queue;
 mod status;
@@ -17,7 +19,7 @@ mod model;
 mod tests;
 
 pub use budget::{Budget, LIVE_SHARE, WRITE_SHARE};
-pub use device::FAILURES_MAX;
+pub use device::{FAILURES_MAX, Failure, Patience};
 pub use overload::{Demand, FACTOR_MAX, Load};
 pub use poll::{PollInfo, Served};
 
@@ -34,9 +36,8 @@ use self::{
 };
 use super::plan::Block;
 use crate::plant::{
-    def::{DeviceId, LineDef},
+    def::DeviceId,
     event::ExceptionCode,
-    number::to_u32,
     tag::PollClass,
 };
 
@@ -72,8 +73,9 @@ pub struct Schedule {
     stale: bool,
     devices: Vec<Health>,
     overload: Overload,
-    /// The time for devices that do not answer.
+    /// The time for devices and blocks that do not answer.
     probes: Budget,
+    patience: Patience,
     /// A critical poll was late since the demand was last looked at, and when that was.
     late: bool,
     judged_at: Timestamp,
@@ -87,30 +89,45 @@ impl Schedule {
         let (polls, devices, overload) = (Vec::new(), Vec::new(), Overload::default());
         let probes = Budget::new(PROBE_SHARE, now);
         let (queue, stale, late, judged_at, last_was_aged) = (Queue::default(), true, false, now, false);
-        let mut schedule =
-            Schedule { origin: now, polls, queue, stale, devices, overload, probes, late, judged_at, last_was_aged };
+        let patience = Patience::default();
+        let origin = now;
+        let mut schedule = Schedule {
+            origin,
+            polls,
+            queue,
+            stale,
+            devices,
+            overload,
+            probes,
+            patience,
+            late,
+            judged_at,
+            last_was_aged,
+        };
         schedule.replan(blocks, now);
         schedule
+    }
+
+    /// How long the answers of the line are waited for.
+    pub fn set_patience(&mut self, patience: Patience) {
+        self.patience = patience;
     }
 
     /// The plan has changed: blocks that stay keep their grid and counts, devices their health; new blocks are due now.
     pub fn replan(&mut self, blocks: &[Block], now: Timestamp) {
         let mut old: Vec<Option<ScheduledPoll>> = std::mem::take(&mut self.polls).into_iter().map(Some).collect();
         self.stale = true;
-        for health in &mut self.devices {
-            health.probe = None;
-        }
-        for (index, block) in blocks.iter().enumerate() {
+        for block in blocks {
             let place = self.devices.iter().position(|health| health.device == block.device);
             let place = place.unwrap_or_else(|| {
                 self.devices.push(Health::new(block.device, now));
                 self.devices.len() - 1
             });
-            self.devices[place].probe.get_or_insert(index);
             let kept =
                 old.iter_mut().find(|old| old.as_ref().is_some_and(|old| old.is_of(block))).and_then(Option::take);
             self.polls.push(kept.unwrap_or_else(|| ScheduledPoll::new(block, place, self.origin, now)).at(place));
         }
+        (0..self.devices.len()).for_each(|place| self.choose_probe(place));
     }
 
     /// The block whose deadline is nearest among those that may be read now.
@@ -132,15 +149,29 @@ impl Schedule {
             }
             wake = Some(wake.map_or(free_at, |wake| wake.min(free_at)));
         }
+        let (is_idle, free_until) = (best.is_none(), wake);
+        let mut idle: Option<(Timestamp, usize)> = None;
         for health in self.devices.iter().filter(|health| health.probe_at.is_some()) {
             let Some((index, spot)) = health.probe.and_then(|index| Some((index, self.spot(index)?))) else { continue };
             let from = spot.from.max(health.free_at);
-            if now < from {
+            if from <= now {
+                if best.is_none_or(|best| (self.rank(spot, now), index) < best) {
+                    best = Some((self.rank(spot, now), index));
+                }
+                continue;
+            }
+            // Where nothing else is due before its timeout, it may be asked at no cost.
+            let idle_from = health.idle_at.max(health.rests_until).max(health.free_at);
+            let wait = self.patience.plant_span(self.response_timeout(index));
+            if now < idle_from {
+                wake = Some(wake.map_or(idle_from, |wake| wake.min(idle_from)));
+            } else if is_idle && free_until.is_none_or(|until| now + wait <= until) {
+                idle = Some(idle.map_or((idle_from, index), |idle| idle.min((idle_from, index))));
+            } else {
                 wake = Some(wake.map_or(from, |wake| wake.min(from)));
-            } else if best.is_none_or(|best| (self.rank(spot, now), index) < best) {
-                best = Some((self.rank(spot, now), index));
             }
         }
+        let best = best.or(idle.map(|(at, index)| ((STARVED, at), index)));
         match (best, wake) {
             (Some((_, index)), _) => Next::Run(index),
             (None, Some(at)) => Next::WaitUntil(at),
@@ -156,7 +187,7 @@ impl Schedule {
         }
         let health = &self.devices[poll.place];
         let (from, deadline) = if let Some(probe_at) = health.probe_at {
-            // A device that does not answer is asked with its first block only; who has waited longest goes first.
+            // A device that does not answer is asked with one block; who has waited longest goes first.
             let from = self.probe_from(health)?;
             (health.probe == Some(index)).then_some((from, probe_at + ONCE_WITHIN))?
         } else {
@@ -264,13 +295,10 @@ impl Schedule {
         self.polls[index].spent(time);
     }
 
-    /// A block that is read once could not be: it is due again soon.
+    /// See [`ScheduledPoll::reschedule`].
     pub fn reschedule(&mut self, index: usize, now: Timestamp) {
-        let poll = &mut self.polls[index];
-        if poll.period.is_none() {
-            poll.release = Some(now + ONCE_WITHIN);
-            self.requeue(index);
-        }
+        self.polls[index].reschedule(now);
+        self.requeue(index);
     }
 
     /// The block is read again at `until`, and not before; its grid stays.
@@ -285,47 +313,6 @@ impl Schedule {
         let until = now + self.polls[index].retry_after(code)?;
         self.later(index, until);
         Some(until)
-    }
-
-    /// The device answered (an exception is an answer too), `reply` after the request, where that is known. If it was down,
-    /// everything of it is due. What was released while it did not answer is not missed: the line had time.
-    pub fn answered(&mut self, device: DeviceId, response_time: Option<Duration>, now: Timestamp) {
-        let Some(place) = self.place_of(device) else { return };
-        let failing = self.devices[place].probe_at.is_some();
-        let was_down = self.devices[place].answered(response_time);
-        if failing {
-            self.stale = true;
-            let polls = self.polls.iter_mut().filter(|poll| poll.place == place);
-            polls.for_each(|poll| poll.back_on_grid(self.origin, now));
-        }
-        if was_down {
-            self.due_now(device, now);
-        }
-    }
-
-    /// An answer of the device came after it had been given up.
-    pub fn answered_late(&mut self, device: DeviceId) {
-        if let Some(place) = self.place_of(device) {
-            self.devices[place].answered_late();
-        }
-    }
-
-    /// The device did not answer a request that was sent at `sent`, and that took the line for so long. `true` if it is
-    /// given up with this.
-    pub fn failed(&mut self, device: DeviceId, sent: Timestamp, spent: Duration, now: Timestamp) -> bool {
-        let Some(place) = self.place_of(device) else { return false };
-        self.probes.spent(spent, now);
-        self.stale |= self.devices[place].probe_at.is_none();
-        // Those that wait for their second or third try come first: none fails for long before it is given up.
-        let waiting = self.devices.iter().filter(|other| other.device != device && other.is_failing()).count();
-        let affordable = self.probes.affords(spent * to_u32(waiting), now);
-        self.devices[place].failed(sent, now, affordable)
-    }
-
-    /// How long the answer to a block is waited for (real time), at most the timeout of its line.
-    pub fn response_timeout(&self, index: usize, line: &LineDef) -> Duration {
-        let neighbour = || self.devices.iter().filter_map(Health::slowest).max();
-        self.devices[self.polls[index].place].response_timeout(line, neighbour)
     }
 
     /// The device is not to be asked before `until`.
@@ -345,24 +332,17 @@ impl Schedule {
 
     /// Everything of a device is due now; its grid stays. A device that does not answer is asked at once.
     pub fn refresh(&mut self, device: DeviceId, now: Timestamp) {
-        if let Some(place) = self.place_of(device) {
-            self.devices[place].retry(now);
-        }
-        self.due_now(device, now);
-    }
-
-    fn due_now(&mut self, device: DeviceId, now: Timestamp) {
+        let Some(place) = self.place_of(device) else { return };
+        self.devices[place].retry(now);
         self.stale = true;
-        let place = self.place_of(device);
-        for poll in self.polls.iter_mut().filter(|poll| Some(poll.place) == place) {
-            poll.urgent = Some(now);
-        }
+        self.polls.iter_mut().filter(|poll| poll.place == place).for_each(|poll| poll.retry(now));
     }
 
     /// When a device that does not answer is asked next.
     fn probe_from(&self, health: &Health) -> Option<Timestamp> {
         let probe_at = health.probe_at?;
-        let affordable = if health.prompt { probe_at } else { probe_at.max(self.probes.allows_from()) };
+        let is_free = health.prompt || health.is_trusted();
+        let affordable = if is_free { probe_at } else { probe_at.max(self.probes.allows_from()) };
         Some(affordable.max(health.rests_until))
     }
 

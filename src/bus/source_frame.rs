@@ -75,6 +75,12 @@ pub fn advice(fault: Fault) -> &'static str {
         Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho => {
             "response to another request: increase the timeout of the line (c), check for a second master or a duplicate address"
         }
+        Fault::WrongTransaction { .. } => {
+            "the device does not repeat the transaction id of a request: update its firmware, or use rtu-over-tcp if it can"
+        }
+        Fault::Hangup => {
+            "the device cannot answer this request: check address and count of the block, lower read_registers_max or gap_registers_max"
+        }
         Fault::OutOfSync => {
             "check for a second master on the line, a duplicate address, or a repeater that repeats each response"
         }

@@ -207,6 +207,17 @@ pub enum Fault {
         /// Data bytes asked.
         asked: u16,
     },
+    /// Only answers with another transaction id came (Modbus TCP).
+    #[error("{}", t!("responses carry transaction {got}, the request was {asked}", got = .got, asked = .asked))]
+    WrongTransaction {
+        /// Transaction of the last of them.
+        got: u16,
+        /// Transaction of the request.
+        asked: u16,
+    },
+    /// The other side closed the connection instead of answering this request.
+    #[error("{}", t!("the device closes the connection on this request"))]
+    Hangup,
     /// The echo of a write names another address or value.
     #[error("{}", t!("echo of the write differs from the request"))]
     WrongEcho,
@@ -230,6 +241,7 @@ pub enum Fault {
 /// What a fault proves about the device and the line; what exactly was wrong with a frame makes no difference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FaultKind {
+    /// No response: silence, or a closed connection in its place.
     Timeout,
     /// A frame came, but it was no valid response.
     Corrupt,
@@ -243,7 +255,7 @@ pub(crate) enum FaultKind {
 impl Fault {
     pub(crate) fn kind(self) -> FaultKind {
         match self {
-            Fault::Timeout => FaultKind::Timeout,
+            Fault::Timeout | Fault::Hangup => FaultKind::Timeout,
             Fault::Crc { .. }
             | Fault::Lrc { .. }
             | Fault::NotHex(_)
@@ -251,6 +263,7 @@ impl Fault {
             | Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
+            | Fault::WrongTransaction { .. }
             | Fault::WrongEcho => FaultKind::Corrupt,
             Fault::OutOfSync => FaultKind::OutOfSync,
             Fault::Exception(code) => FaultKind::Exception(code),

@@ -54,14 +54,16 @@ impl RequestStats {
             return;
         };
         match fault {
-            Fault::Timeout => self.timeouts += 1,
+            Fault::Timeout | Fault::Hangup => self.timeouts += 1,
             Fault::Crc { .. } | Fault::Lrc { .. } => self.check += 1,
             Fault::Truncated { .. } | Fault::WrongLength { .. } | Fault::NotHex(_) | Fault::NotANumber => {
                 self.length += 1;
             }
-            Fault::WrongUnit { .. } | Fault::WrongFunction { .. } | Fault::WrongEcho | Fault::OutOfSync => {
-                self.foreign += 1
-            }
+            Fault::WrongUnit { .. }
+            | Fault::WrongFunction { .. }
+            | Fault::WrongTransaction { .. }
+            | Fault::WrongEcho
+            | Fault::OutOfSync => self.foreign += 1,
             Fault::Exception(code) => match self.exceptions.iter_mut().find(|(known, _)| *known == code) {
                 Some((_, count)) => *count += 1,
                 None => self.exceptions.push((code, 1)),

@@ -125,7 +125,7 @@ fn joined(group: &[TagDef], run: &[&TagDef], device: &DeviceDef, unreadable: &Un
     }
     // Several values on the same registers are one, whatever its length.
     let same = run.iter().all(|tag| range(tag) == range(run[0]));
-    let fits = same || (end - start <= max && near && !unreadable.touch(device.id, first.table, start, end));
+    let fits = same || (end - start <= max && near && !unreadable.touch(device.unit, first.table, start, end));
     fits.then(|| Block {
         address: start as u16,
         count: (end - start) as u16,

@@ -38,7 +38,7 @@ use super::{
 use crate::{
     bus::{
         frame::{self, ResponseSignature},
-        late_reply::OutstandingReplies,
+        late_reply::{OutstandingReplies, Proof},
         plan::Block,
     },
     plant::{
@@ -62,6 +62,10 @@ impl From<Fault> for LinkError {
     fn from(fault: Fault) -> Self {
         LinkError::Fault(fault)
     }
+}
+
+fn answers(counters: &LineCounters) -> u64 {
+    counters.ok + counters.exceptions
 }
 
 /// The link on one open port.
@@ -92,6 +96,8 @@ pub struct Link {
     busy: Duration,
     /// Of the last exchange on a line without transaction ids.
     took: Duration,
+    /// Answers before it was opened.
+    answers_before: u64,
 }
 
 impl Link {
@@ -114,8 +120,14 @@ impl Link {
             last: None,
             busy: Duration::ZERO,
             took: Duration::ZERO,
+            answers_before: answers(&wire.counters),
             wire,
         }
+    }
+
+    /// Answers since it was opened; an exception is one.
+    pub fn answers(&self) -> u64 {
+        answers(&self.wire.counters) - self.answers_before
     }
 
     /// Sends a request through tokio-modbus and gives the answer; an exception is a [`Fault::Exception`].
@@ -223,7 +235,22 @@ impl Link {
 
     /// Could the answer to this message be mistaken for an outstanding one?
     pub fn is_ambiguous(&self, message: &[u8]) -> bool {
-        self.framing() != Framing::Mbap && self.wire.replies.is_ambiguous(message)
+        self.wire.replies.is_ambiguous(message)
+    }
+
+    /// See [`crate::bus::late_reply::LineReplies::proof`].
+    pub fn proof(&self, unit: u8) -> Proof {
+        self.wire.replies.proof(unit)
+    }
+
+    /// See [`crate::bus::late_reply::LineReplies::proof_failed`].
+    pub fn proof_failed(&mut self, unit: u8) {
+        self.wire.replies.proof_failed(unit);
+    }
+
+    /// See [`crate::bus::late_reply::LineReplies::settles_in`].
+    pub fn settles_in(&self, unit: u8) -> Option<Duration> {
+        self.wire.replies.settles_in(unit, self.wire.uptime())
     }
 
     /// See [`crate::bus::late_reply::LineReplies::must_wait`].
@@ -368,9 +395,12 @@ impl Link {
             FaultKind::Exception(_) => {
                 self.wire.counters.exceptions += 1;
                 // An exception names no address: while a reply of the unit is outstanding, it may be the answer to an older request.
-                if mbap || self.wire.replies.of(*unit).is_clear() {
+                if self.wire.replies.of(*unit).is_clear() {
                     return;
                 }
+                self.expect_late(message);
+                self.wire.replies.refused(*unit, self.wire.uptime());
+                return;
             }
             FaultKind::Timeout => self.wire.counters.timeouts += 1,
             FaultKind::Corrupt

@@ -4,7 +4,7 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::clock::Clock;
 use crate::{
-    bus::live::{KnownHoles, LiveJob},
+    bus::{live::LiveJob, plan::UnreadableRanges},
     plant::live::{LiveRead, LiveReading},
 };
 
@@ -24,13 +24,12 @@ pub struct LiveReads {
     waiting: Vec<LiveRequest>,
     /// The one at work.
     pub(super) job: Option<(LiveJob, LiveRequest)>,
-    pub(super) known: KnownHoles,
 }
 
 impl LiveReads {
     /// All of `queue`.
     pub fn new(queue: mpsc::Receiver<LiveRequest>) -> LiveReads {
-        LiveReads { queue, waiting: Vec::new(), job: None, known: KnownHoles::default() }
+        LiveReads { queue, waiting: Vec::new(), job: None }
     }
 
     /// Answers none of them: the line only listens.
@@ -40,7 +39,7 @@ impl LiveReads {
     }
 
     /// Begins the read that is due longest, unless one is at work. `true`: one is at work.
-    pub fn begin(&mut self, clock: Clock) -> bool {
+    pub fn begin(&mut self, known: &mut UnreadableRanges, clock: Clock) -> bool {
         while let Ok(request) = self.queue.try_recv() {
             self.waiting.push(request);
         }
@@ -55,7 +54,7 @@ impl LiveReads {
             && let Some(first) = first
         {
             let request = self.waiting.remove(first);
-            self.job = Some((LiveJob::new(&request.read, &mut self.known, clock.to_utc(now), now), request));
+            self.job = Some((LiveJob::new(&request.read, known, clock.to_utc(now), now), request));
         }
         self.job.is_some()
     }

@@ -3,13 +3,14 @@
 mod concurrent;
 mod deferred_read_back;
 mod exit;
+mod hangups;
 mod live;
 mod poll;
 mod test;
 mod wait;
 mod write;
 
-use std::{convert::Infallible, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Duration};
 
 use exit::LinkExit;
 use jiff::Timestamp;
@@ -27,9 +28,11 @@ use crate::{
     bus::{
         backoff::Backoff,
         diagnostics::Job,
+        hangup::Hangups,
+        in_flight::InFlight,
         line_stats::{LineStats, Plan},
         plan::{self, Block, RangeBisection, UnreadableRanges},
-        schedule::{Budget, LIVE_SHARE, Load, Next, Schedule, WRITE_SHARE},
+        schedule::{Budget, LIVE_SHARE, Load, Next, Patience, Schedule, WRITE_SHARE},
     },
     plant::{
         PlantDef,
@@ -68,6 +71,12 @@ pub async fn run(
         live_budget: Budget::new(LIVE_SHARE, clock.now()),
         unconfirmed: Vec::new(),
         under_way: Vec::new(),
+        cut: Vec::new(),
+        hangups: Hangups::default(),
+        in_flight: InFlight::default(),
+        unheard: 0,
+        refused_all: BTreeMap::new(),
+        schedule: Schedule::new(&blocks, clock.now()),
         memory: LineMemory::new(def.line(line), clock).expect(&blocks),
         settings: def.line(line).clone(),
         clock,
@@ -116,6 +125,18 @@ struct Task<'a> {
     unconfirmed: Vec<deferred_read_back::Unconfirmed>,
     /// Reads that are under way over Modbus TCP, no more than a device takes at once.
     under_way: Vec<concurrent::UnderWay>,
+    /// What was under way otherwise when the connection went away.
+    cut: Vec<Block>,
+    /// How connections over a network have ended.
+    hangups: Hangups,
+    /// How many requests the units take at once, as found.
+    in_flight: InFlight,
+    /// Connections in a row that were given up because nothing was ever answered.
+    unheard: u32,
+    /// Units that refuse everything, and how long they are left alone.
+    refused_all: BTreeMap<u8, Backoff>,
+    /// Whose turn it is; what is known of blocks and devices outlives an opening.
+    schedule: Schedule,
     /// When the counters of the link were last added to the statistics.
     closed_at: Timestamp,
     stats: LineStats,
@@ -130,29 +151,39 @@ impl Task<'_> {
     /// Opens, serves and waits until the station ends.
     async fn connect_loop(mut self) -> Result<(), LinkExit> {
         let mut backoff = Backoff::for_ports();
+        let mut schedule = self.schedule.clone();
+        // The last connection has ended without a word, and its values stay.
+        let mut is_quiet = false;
         loop {
-            self.publish_state(LineState::Connecting).await?;
+            if !is_quiet {
+                self.publish_state(LineState::Connecting).await?;
+            }
             let exit = match self.connector.open().await {
                 Ok(port) => {
                     self.memory.counters.opens += 1;
-                    self.publish_state(LineState::Connected).await?;
-                    tracing::info!(line = self.settings.name, transport = %self.settings.transport, "connected");
-                    let answers = self.memory.counters.ok;
-                    let exit = self.serve(port).await;
-                    // A port that fails right after opening is retried with backoff.
-                    if answers < self.memory.counters.ok {
-                        backoff.reset();
+                    if !is_quiet {
+                        self.publish_state(LineState::Connected).await?;
+                        tracing::info!(line = self.settings.name, transport = %self.settings.transport, "connected");
                     }
-                    exit
+                    schedule.reopened(!is_quiet, self.clock.now());
+                    let (answers, exit) = self.serve(port, &mut schedule).await;
+                    // A port that fails right after opening is retried with backoff.
+                    if 0 < answers {
+                        backoff.reset();
+                        self.unheard = 0;
+                    }
+                    self.ended(&mut schedule, answers, exit).await?
                 }
                 Err(why) => LinkExit::PortFailed(why),
             };
-            if !matches!(exit, LinkExit::Reopen | LinkExit::Shutdown) {
+            is_quiet = matches!(exit, LinkExit::UsedUp);
+            if !matches!(exit, LinkExit::Reopen | LinkExit::Shutdown | LinkExit::UsedUp) {
                 self.give_up_unconfirmed().await?;
             }
             match exit {
                 LinkExit::Shutdown => return Err(exit),
                 LinkExit::Reopen => backoff.reset(),
+                LinkExit::UsedUp => self.wait_until_due(&mut schedule).await?,
                 LinkExit::Diagnostic => {
                     self.publish_state(LineState::Testing).await?;
                     self.run_diagnostic_alone().await?;
@@ -163,7 +194,7 @@ impl Task<'_> {
                     self.publish_report(None).await?;
                     self.wait(None).await?;
                 }
-                LinkExit::PortFailed(why) => {
+                LinkExit::PortFailed(why) | LinkExit::Gone(why) => {
                     self.end_diagnostic(&why).await?;
                     tracing::warn!(line = self.settings.name, why, "not connected");
                     let retry_at = self.clock.now() + backoff.fail();
@@ -175,18 +206,42 @@ impl Task<'_> {
         }
     }
 
-    /// Serves an open port until it is left.
-    async fn serve(&mut self, opened: Opened) -> LinkExit {
+    /// A port was left. One that is gone without a fault of the line is [`LinkExit::UsedUp`].
+    async fn ended(&mut self, schedule: &mut Schedule, answers: u64, exit: LinkExit) -> Result<LinkExit, LinkExit> {
+        let exit = match exit {
+            LinkExit::Gone(why) if self.settings.transport.serial().is_none() => {
+                tracing::debug!(line = self.settings.name, why, answers, "the connection has ended");
+                if self.on_hangup(schedule, answers).await? {
+                    self.end_diagnostic(&why).await?;
+                    LinkExit::UsedUp
+                } else {
+                    LinkExit::PortFailed(why)
+                }
+            }
+            exit => exit,
+        };
+        self.cut_off(schedule);
+        // What waits is served by the next connection, if that may take the place of this one.
+        if !matches!(exit, LinkExit::UsedUp) {
+            self.stats.rest(&mut self.memory.counters);
+            self.refuse_waiting().await?;
+        }
+        Ok(exit)
+    }
+
+    /// Serves an open port until it is left; says how many answers came over it.
+    async fn serve(&mut self, opened: Opened, schedule: &mut Schedule) -> (u64, LinkExit) {
         let mut link = Link::new(opened, &self.settings, self.clock, self.memory.clone());
-        let mut schedule = Schedule::new(&self.blocks, self.clock.now());
-        self.under_way.clear();
+        schedule.set_patience(Patience::of(&self.settings, self.clock.speed()));
         let on_line = self.def.devices.iter().filter(|device| device.line == self.line);
-        on_line.for_each(|device| link.allow(device.unit, device.limits.in_flight_max));
+        on_line.for_each(|device| {
+            link.allow(device.unit, self.in_flight.limit(device.unit, device.limits.in_flight_max))
+        });
+        link.set_alone(!self.hangups.is_clear());
         self.closed_at = self.clock.now();
-        let Err(exit) = self.serve_loop(&mut link, &mut schedule).await;
+        let Err(exit) = self.serve_loop(&mut link, schedule).await;
         self.collect_stats(&mut link);
-        self.stats.rest(&mut self.memory.counters);
-        self.refuse_waiting().await.err().unwrap_or(exit)
+        (link.answers(), exit)
     }
 
     /// Operators first, then the schedule and the running diagnostic, else it waits.
@@ -201,6 +256,7 @@ impl Task<'_> {
             // Before the second is closed: the schedule, too, learns of answers that came late.
             self.receive_replies(link, schedule).await?;
             self.check_connection(link)?;
+            self.check_used_up(link)?;
             let now = self.clock.now();
             if report_at <= now {
                 report_at = now + REPORT_EVERY;

@@ -91,7 +91,6 @@ impl Wire {
     /// A freshly opened port; `memory` goes on from an earlier opening.
     pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: LineMemory) -> Wire {
         let LineMemory { counters, mut replies, created_at } = memory;
-        replies.set_timeout(line.timeout);
         let (char_time, silent_interval) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
             Some(serial) if line.transport.framing() == Framing::Ascii => (serial.char_time(), line.gap),
@@ -99,6 +98,7 @@ impl Wire {
             None => (Duration::ZERO, line.gap),
         };
         let framing = line.transport.framing();
+        replies.set_line(line.timeout, framing == Framing::Mbap);
         // What was asked before an earlier port went away may still be answered.
         let may_come = framing != Framing::Mbap && 0 < counters.requests;
         Wire {

@@ -2,7 +2,7 @@
 
 use std::{ops::Range, time::Duration};
 
-use super::{AddressRange, UnreadableRanges, cost::Wire};
+use super::{Extent, UnreadableRanges, cost::Wire, most};
 use crate::plant::{def::DeviceDef, tag::TagDef};
 
 /// Cuts tags of one device, table and period, sorted by address and length, into runs that are one request each, so that
@@ -19,8 +19,8 @@ pub(super) fn cut<'a>(
     unreadable: &UnreadableRanges,
 ) -> Vec<Vec<&'a TagDef>> {
     let too_long = |value: &Value| {
-        let alone = AddressRange::new(tags[value.tags.start].point, value.end, device);
-        device.limits.most(alone.table) < alone.count()
+        let alone = Extent::new(tags[value.tags.start].point, value.end, device);
+        most(device, alone.table, unreadable) < alone.count()
     };
     let (mut runs, mut values): (Vec<Vec<&TagDef>>, Vec<Value>) = (Vec::new(), Vec::new());
     // The registers of a value that was set aside are no gap, but one before it still lies between its neighbours.
@@ -40,7 +40,7 @@ pub(super) fn cut<'a>(
         let mut found = None;
         for start in (0..=last).rev() {
             end = values[start].end.max(end);
-            let extent = AddressRange::new(tags[values[start].tags.start].point, end, device);
+            let extent = Extent::new(tags[values[start].tags.start].point, end, device);
             let alone = start == last;
             // From here on the run only grows: what is forbidden now stays forbidden.
             if !alone && (values[start + 1].gap > extent.gap_max(device) || !extent.allowed(device, unreadable)) {

@@ -1,54 +1,116 @@
-//! What a device refused to read, and how the refused register in a refused block is found with few requests.
+//! What units refuse to read, and how the culprit in a refused request is found with few requests: of the polls and of live reads.
+//!
+//! A unit refuses a request with exception 02 because it does not have a register, with 03 (some makers: 01, 02 or 04) because that is too
+//! many at once, or because of a register; the standard leaves it open, so only trying tells. The refused request is cut in two until
+//! its parts are answered, or are one value each.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Block, together};
 use crate::plant::{
-    def::{DeviceId, PlantDef},
+    def::PlantDef,
+    event::ExceptionCode,
+    live::AddressSpan,
+    number::to_u16,
     tag::{Table, TagDef},
 };
 
-/// Addresses that a device does not have, although the plan would read (over) them. An empty range is a split boundary: both sides
-/// can be read, but not with one request.
+/// May the exception mean that a request asks for too much, or for something that is not there?
+pub fn may_be_cut(code: ExceptionCode) -> bool {
+    matches!(code.0, 0x01..=0x04)
+}
+
+/// Addresses that a unit does not have, although the plan would read (over) them, and how much it gives at once. An empty range is
+/// a boundary: both sides can be read, but not with one request.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct UnreadableRanges {
     /// End by start. Ranges never touch the inside of each other.
-    ends: BTreeMap<(DeviceId, Table, u32), u32>,
+    ends: BTreeMap<(u8, Table, u32), u32>,
+    /// Most registers or bits of one request.
+    most: BTreeMap<(u8, Table), u16>,
 }
 
 impl UnreadableRanges {
     /// Remembers an unreadable range from `start` up to before `end`.
-    pub fn add(&mut self, device: DeviceId, table: Table, start: u32, end: u32) {
+    pub fn add(&mut self, unit: u8, table: Table, start: u32, end: u32) {
         let (mut start, mut end) = (start, end);
-        while let Some((old, old_end)) = self.touched(device, table, start, end.max(start + 1)) {
+        while let Some((old, old_end)) = self.touched(unit, table, start, end.max(start + 1)) {
             (start, end) = (start.min(old), end.max(old_end));
-            self.ends.remove(&(device, table, old));
+            self.ends.remove(&(unit, table, old));
         }
-        self.ends.insert((device, table, start), end);
+        self.ends.insert((unit, table, start), end);
+    }
+
+    /// Remembers that a unit gives no more than `most` registers or bits at once.
+    pub fn limit(&mut self, unit: u8, table: Table, most: u16) {
+        let limit = self.most.entry((unit, table)).or_insert(most);
+        *limit = (*limit).min(most).max(1);
+    }
+
+    /// Most registers or bits that a unit gives at once, if it gives less than was asked for.
+    pub fn most(&self, unit: u8, table: Table) -> Option<u16> {
+        self.most.get(&(unit, table)).copied()
     }
 
     /// Would a read from `start` up to before `end` touch a gap?
-    pub fn touch(&self, device: DeviceId, table: Table, start: u32, end: u32) -> bool {
-        self.touched(device, table, start, end).is_some()
+    pub fn touch(&self, unit: u8, table: Table, start: u32, end: u32) -> bool {
+        self.touched(unit, table, start, end).is_some()
     }
 
-    /// A device may be another one, or have another program, when it comes back: its unreadable ranges are searched again.
-    pub fn forget(&mut self, device: DeviceId) {
-        self.ends.retain(|(gap, ..), _| *gap != device);
+    /// A unit may be another one, or have another program: its unreadable ranges are searched again.
+    pub fn forget(&mut self, unit: u8) {
+        self.ends.retain(|(gap, ..), _| *gap != unit);
+        self.most.retain(|(other, _), _| *other != unit);
     }
 
-    /// A block was read. If it lay on a gap, what is known of its device no longer holds, and `true` says so.
+    /// A block was read. If it lay on a gap, what is known of its unit no longer holds, and `true` says so.
     pub fn disproved(&mut self, block: &Block) -> bool {
         let (start, end) = block.range();
-        let wrong = self.touch(block.device, block.table, start, end);
+        let wrong = self.touch(block.unit, block.table, start, end);
         if wrong {
-            self.forget(block.device);
+            self.forget(block.unit);
         }
         wrong
     }
 
-    fn touched(&self, device: DeviceId, table: Table, start: u32, end: u32) -> Option<(u32, u32)> {
-        let before = self.ends.range((device, table, 0)..(device, table, end));
+    /// The requests that read a span around what is unreadable.
+    pub fn requests(&self, unit: u8, span: AddressSpan) -> Vec<AddressSpan> {
+        let usual = if span.table.is_bits() { 2_000 } else { 125 };
+        let most = self.most(unit, span.table).unwrap_or(usual).max(1);
+        let (mut from, range) = (span.range().start, span.range());
+        let mut requests = Vec::new();
+        for (start, end) in self.within(unit, span.table, &range).chain([(range.end, range.end)]) {
+            requests.extend((from..start).step_by(usize::from(most)).map(|address| AddressSpan {
+                table: span.table,
+                address: to_u16(address),
+                count: most.min(to_u16(start - address)),
+            }));
+            from = end.max(from);
+        }
+        requests
+    }
+
+    /// What is unreadable in a span.
+    pub fn holes_in(&self, unit: u8, span: AddressSpan) -> impl Iterator<Item = AddressSpan> {
+        let range = span.range();
+        let holes = self.within(unit, span.table, &range).filter(|(start, end)| start < end).collect::<Vec<_>>();
+        holes.into_iter().map(move |(start, end)| AddressSpan {
+            table: span.table,
+            address: to_u16(start),
+            count: to_u16(end - start),
+        })
+    }
+
+    /// The ranges in another one, cut to it.
+    fn within(&self, unit: u8, table: Table, range: &std::ops::Range<u32>) -> impl Iterator<Item = (u32, u32)> {
+        let (first, last) = (range.start, range.end);
+        let all = self.ends.range((unit, table, 0)..(unit, table, last));
+        let cut = all.map(move |((_, _, start), end)| ((*start).max(first), (*end).min(last)));
+        cut.filter(move |(start, end)| first < *end && start <= end)
+    }
+
+    fn touched(&self, unit: u8, table: Table, start: u32, end: u32) -> Option<(u32, u32)> {
+        let before = self.ends.range((unit, table, 0)..(unit, table, end));
         // The last one that begins before the end is also the one that reaches furthest.
         before.map(|((_, _, gap), gap_end)| (*gap, *gap_end)).next_back().filter(|(_, gap_end)| start < *gap_end)
     }
@@ -79,95 +141,212 @@ pub fn split(def: &PlantDef, block: &Block) -> Option<([Block; 2], (u32, u32))> 
     Some(([part(&tags[..before]), part(&tags[before..])], (from, to)))
 }
 
-/// The search for what is wrong with a refused block: its parts are polled in its place, and their responses narrow it down. What
-/// was found must be confirmed by one more refusal, so that a device that stumbled once loses nothing.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct RangeBisection {
-    /// Parts that have not answered yet.
-    open: Vec<Block>,
-    /// Each refused block, and what lay between the two parts that it was cut into.
-    cuts: Vec<(AddressRange, AddressRange)>,
-    found: Vec<AddressRange>,
-    /// Found once: unreadable if the next read that contains them is refused too.
-    candidates: Vec<AddressRange>,
-}
-
-/// Addresses of a table, from the first to before the last.
+/// Registers or bits of a unit, from the first to before the last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct AddressRange {
-    device: DeviceId,
+pub struct AddressRange {
+    unit: u8,
     table: Table,
     start: u32,
     end: u32,
 }
 
 impl AddressRange {
-    fn new(block: &Block, (start, end): (u32, u32)) -> AddressRange {
-        AddressRange { device: block.device, table: block.table, start, end }
+    /// Those of a span.
+    pub fn of_span(unit: u8, span: AddressSpan) -> AddressRange {
+        AddressRange { unit, table: span.table, start: span.range().start, end: span.range().end }
+    }
+
+    fn of_block(block: &Block) -> AddressRange {
+        let (start, end) = block.range();
+        AddressRange { unit: block.unit, table: block.table, start, end }
+    }
+
+    fn at(self, (start, end): (u32, u32)) -> AddressRange {
+        AddressRange { start, end, ..self }
+    }
+
+    fn count(self) -> u32 {
+        self.end - self.start
     }
 
     fn contains(&self, other: &AddressRange) -> bool {
-        (self.device, self.table) == (other.device, other.table) && self.start <= other.start && other.end <= self.end
+        (self.unit, self.table) == (other.unit, other.table) && self.start <= other.start && other.end <= self.end
     }
 }
 
+/// What a refused request was found to fail of: a range that the unit does not have, or, if that is empty, that it was so much at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Obstacle {
+    range: AddressRange,
+    /// Registers or bits of the refused request.
+    asked: u32,
+}
+
+/// What is to be done about a refused request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refused {
+    /// Nothing new was learnt.
+    Known,
+    /// Its two parts are asked for in its place.
+    Cut,
+    /// It is one value: that is not there.
+    Alone,
+}
+
+/// What a search has come to.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Conclusion {
+    /// The plan must be made again.
+    pub replan: bool,
+    /// These units have refused everything since their search began, which is not believed: a device that starts up does so.
+    pub disbelieved: BTreeSet<u8>,
+}
+
+/// The search for what is wrong with a refused request: its parts are asked for in its place, and their responses narrow it down.
+/// What was found must be confirmed by one more refusal, so that a device that stumbled once loses nothing.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct RangeBisection {
+    /// Parts that have not answered yet.
+    open: Vec<AddressRange>,
+    /// Each refused request, and what lay between the two parts that it was cut into.
+    cuts: Vec<(AddressRange, AddressRange)>,
+    found: Vec<Obstacle>,
+    /// Found once: unreadable if the next read that contains them is refused too.
+    candidates: Vec<Obstacle>,
+    /// Units that have given a value since their search began.
+    gives: BTreeSet<u8>,
+    /// The most that a unit has given at once.
+    given: BTreeMap<(u8, Table), u32>,
+}
+
 impl RangeBisection {
-    /// A block was refused with exception 02: what to poll in its place. `None`: leave it, nothing new was learnt.
+    /// A block was refused: what to poll in its place. `None`: leave it, nothing new was learnt.
     pub fn refused(&mut self, def: &PlantDef, unreadable: &UnreadableRanges, block: &Block) -> Option<Vec<Block>> {
-        let whole = AddressRange::new(block, block.range());
-        if unreadable.touch(whole.device, whole.table, whole.start, whole.end) {
-            return None;
+        let (whole, parts) = (AddressRange::of_block(block), split(def, block));
+        let ranges = parts
+            .as_ref()
+            .map(|([first, second], between)| ([first, second].map(AddressRange::of_block), whole.at(*between)));
+        match (self.refused_range(unreadable, whole, ranges), parts) {
+            (Refused::Known, _) => None,
+            (Refused::Cut, Some((parts, _))) => Some(parts.into()),
+            (Refused::Cut | Refused::Alone, _) => Some(vec![block.clone()]),
         }
-        self.open.retain(|open| open != block);
-        let parts = split(def, block);
-        let confirmed = self.candidates.iter().any(|candidate| whole.contains(candidate));
+    }
+
+    /// A range was refused that can be cut into these parts, with something between them.
+    pub fn refused_range(
+        &mut self,
+        unreadable: &UnreadableRanges,
+        whole: AddressRange,
+        parts: Option<([AddressRange; 2], AddressRange)>,
+    ) -> Refused {
+        if unreadable.touch(whole.unit, whole.table, whole.start, whole.end) {
+            return Refused::Known;
+        }
+        if !self.searches(whole.unit) {
+            self.gives.remove(&whole.unit);
+        }
+        self.open.retain(|open| *open != whole);
+        let confirmed: Vec<Obstacle> =
+            self.candidates.iter().filter(|candidate| whole.contains(&candidate.range)).copied().collect();
         match parts {
-            Some((parts, between)) if !confirmed => {
-                self.cuts.push((whole, AddressRange::new(block, between)));
-                self.open.extend(parts.clone());
-                Some(parts.into())
+            Some((parts, between)) if confirmed.is_empty() => {
+                self.cuts.push((whole, between));
+                self.open.extend(parts);
+                Refused::Cut
             }
-            Some((parts, _)) => {
-                self.found.extend(self.candidates.iter().filter(|candidate| whole.contains(candidate)));
-                Some(parts.into())
+            Some(_) => {
+                self.found.extend(confirmed);
+                Refused::Cut
             }
             None => {
-                if !self.found.contains(&whole) {
-                    self.found.push(whole);
+                if !self.found.iter().any(|found| found.range == whole) {
+                    self.found.push(Obstacle { range: whole, asked: whole.count() });
                 }
-                Some(vec![block.clone()])
+                Refused::Alone
             }
         }
     }
 
-    /// A block was read. The device has all of it.
+    fn searches(&self, unit: u8) -> bool {
+        self.cuts.iter().any(|(whole, _)| whole.unit == unit)
+            || self.found.iter().any(|found| found.range.unit == unit)
+    }
+
+    /// A block was read. The unit has all of it.
     pub fn answered(&mut self, block: &Block) {
-        let whole = AddressRange::new(block, block.range());
-        self.open.retain(|open| open != block);
-        self.candidates.retain(|candidate| !whole.contains(candidate));
+        self.answered_range(AddressRange::of_block(block));
     }
 
-    /// When every part has answered, or is a gap itself: adds what was confirmed to `unreadable`. `true` if the plan must be
-    /// made again. Where both parts of a refused block can be read, the gap between them cannot.
-    pub fn conclude(&mut self, unreadable: &mut UnreadableRanges) -> bool {
+    /// A range was read.
+    pub fn answered_range(&mut self, whole: AddressRange) {
+        self.gives.insert(whole.unit);
+        let given = self.given.entry((whole.unit, whole.table)).or_default();
+        *given = whole.count().max(*given);
+        self.open.retain(|open| *open != whole);
+        self.candidates.retain(|candidate| !whole.contains(&candidate.range));
+    }
+
+    /// When every part has answered, or is a gap itself: adds what was confirmed to `unreadable`. Where both parts of a refused
+    /// request can be read, the gap between them cannot, or it was too much.
+    pub fn conclude(&mut self, unreadable: &mut UnreadableRanges) -> Conclusion {
         if !self.open.is_empty() || (self.cuts.is_empty() && self.found.is_empty()) {
-            return false;
+            return Conclusion::default();
         }
+        self.explain_cuts();
+        let (gives, candidates) = (&self.gives, &self.candidates);
+        let disbelieved: BTreeSet<u8> =
+            self.found.iter().map(|found| found.range.unit).filter(|unit| !gives.contains(unit)).collect();
+        self.found.retain(|found| gives.contains(&found.range.unit));
+        let (confirmed, new): (Vec<Obstacle>, Vec<Obstacle>) =
+            self.found.drain(..).partition(|found| candidates.iter().any(|known| known.range == found.range));
+        self.candidates.retain(|candidate| !confirmed.iter().any(|known| known.range == candidate.range));
+        self.candidates.extend(new);
+        self.learn(&confirmed, unreadable);
+        Conclusion { replan: true, disbelieved }
+    }
+
+    /// The same without a second refusal: for reads that somebody watches.
+    pub fn conclude_at_once(&mut self, unreadable: &mut UnreadableRanges) {
+        self.explain_cuts();
+        let found: Vec<Obstacle> = self.found.drain(..).filter(|found| self.gives.contains(&found.range.unit)).collect();
+        self.learn(&found, unreadable);
+    }
+
+    /// Cuts that no found range explains are obstacles themselves.
+    fn explain_cuts(&mut self) {
         for (whole, between) in std::mem::take(&mut self.cuts).into_iter().rev() {
-            if !self.found.iter().any(|found| whole.contains(found)) {
-                self.found.push(between);
+            if !self.found.iter().any(|found| whole.contains(&found.range)) {
+                self.found.push(Obstacle { range: between, asked: whole.count() });
             }
         }
-        let (confirmed, new): (Vec<AddressRange>, Vec<AddressRange>) =
-            self.found.drain(..).partition(|found| self.candidates.contains(found));
-        self.candidates.retain(|candidate| !confirmed.contains(candidate));
-        self.candidates.extend(new);
-        confirmed.iter().for_each(|gap| unreadable.add(gap.device, gap.table, gap.start, gap.end));
-        true
     }
 
-    /// The plan is made again for another reason: the search starts over.
+    fn learn(&self, obstacles: &[Obstacle], unreadable: &mut UnreadableRanges) {
+        for Obstacle { range, asked } in obstacles {
+            let given = self.given.get(&(range.unit, range.table)).copied().unwrap_or_default();
+            if range.start == range.end && given < *asked {
+                unreadable.limit(range.unit, range.table, to_u16(given));
+            } else {
+                unreadable.add(range.unit, range.table, range.start, range.end);
+            }
+        }
+    }
+
+    /// Is a search under way?
+    pub fn is_open(&self) -> bool {
+        !self.open.is_empty()
+    }
+
+    /// The plan is made again: its blocks are whole again, and what was found stays to be confirmed.
+    pub fn restart(&mut self) {
+        self.open.clear();
+        self.cuts.clear();
+        self.found.clear();
+    }
+
+    /// What was known no longer holds: the search starts over.
     pub fn reset(&mut self) {
-        *self = RangeBisection::default();
+        *self = RangeBisection { given: std::mem::take(&mut self.given), ..RangeBisection::default() };
     }
 }

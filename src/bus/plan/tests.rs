@@ -40,7 +40,7 @@ fn what_is_never_polled_is_planned_for_who_asks_only() {
     assert!(has_unpolled(&def, device) && !has_unpolled(&fixture::plant(), device));
     // Refused once, it stays on request only.
     let mut refused = none;
-    refused.add(device, Table::Holding, 1002, 1003);
+    refused.add(def.device(device).unit, Table::Holding, 1002, 1003);
     assert_eq!(reads(blocks_with_unpolled(&def, LineId(0), &refused, &[device])), Some((Poll::Never, 1002)));
 }
 
@@ -160,7 +160,7 @@ fn bisection(def: &PlantDef, missing: &[u32], count_max: u32) -> (UnreadableRang
             search.answered(&block);
             assert!(!unreadable.disproved(&block));
         }
-        if search.conclude(&mut unreadable) {
+        if search.conclude(&mut unreadable).replan {
             todo = plan(&unreadable);
         }
     }
@@ -220,9 +220,9 @@ fn a_device_that_stumbles_once_loses_nothing() {
     for _ in 0..3 {
         let whole = blocks(&def, LineId(0), &unreadable).remove(0);
         let parts = search.refused(&def, &unreadable, &whole).expect("something new");
-        assert!(!search.conclude(&mut unreadable), "the parts have not answered");
+        assert!(!search.conclude(&mut unreadable).replan, "the parts have not answered");
         parts.iter().for_each(|part| search.answered(part));
-        assert!(search.conclude(&mut unreadable), "back to the whole block");
+        assert!(search.conclude(&mut unreadable).replan, "back to the whole block");
         assert_eq!(ranges(&def, &unreadable), [(0, 4)]);
         search.answered(&whole);
     }
@@ -273,7 +273,7 @@ fn transport() -> impl Strategy<Value = Transport> {
 fn holes_at(addresses: &[u16]) -> UnreadableRanges {
     let mut unreadable = UnreadableRanges::default();
     for address in addresses {
-        unreadable.add(fixture::TIC, Table::Holding, u32::from(*address), u32::from(*address) + 1);
+        unreadable.add(fixture::plant().device(fixture::TIC).unit, Table::Holding, u32::from(*address), u32::from(*address) + 1);
     }
     unreadable
 }
@@ -314,7 +314,7 @@ proptest! {
             let max = if block.table.is_bits() { limits.read_bits_max } else { words_max };
             prop_assert!(block.count <= max, "{:?}", block);
             let (start, end) = block.range();
-            let over = unreadable.touch(block.device, block.table, start, end);
+            let over = unreadable.touch(block.unit, block.table, start, end);
             prop_assert_eq!(over, refused.contains(&block.tags[0]), "{:?} and a is_unreadable", block);
             prop_assert!(!over || block.tags.len() == 1);
             if !block.table.is_bits() {

@@ -1,11 +1,13 @@
 //! What a schedule knows of a device: whether it answers, how fast, and when it may be asked.
 //!
 //! ```text
-//!             no answer               3 in a row (2 if it has never answered), or no time for a third try
-//!   answering ─────────> failing ───────────────────────────────────────────────────────────> down
-//!             <─────────         second try at once, third after 1 s: only its first block
-//!               an answer                                                                   probed with that
+//!             silence                 3 in a row (of one that has never answered: all of its first blocks), or no time
+//!   answering ─────────> failing ────────────────────────────────────────────────────────────────────────────────────> down
+//!             <─────────         one block after another: at once, after 1 s, …                        and so on, with backoff
+//!               an answer
 //! ```
+//!
+//! Health is of a block first: a block that fails beside others that answer says nothing of its device.
 
 use std::time::Duration;
 
@@ -18,8 +20,10 @@ use crate::{
 
 /// Failures in a row after which a device that has answered before is given up and only probed.
 pub const FAILURES_MAX: u32 = 3;
-/// The same for one that has never answered: it may have lost its first frame, and has no values to lose.
-const FIRST_FAILURES_MAX: u32 = 2;
+/// One that has never answered is asked for this many of its blocks before it is given up, and at least twice: it may have lost
+/// its first frame, and has no values to lose.
+const FIRST_BLOCKS_MAX: u32 = 5;
+const FIRST_FAILURES_MIN: u32 = 2;
 /// After so many answers it is known how fast a device answers.
 const ANSWERS_MIN: u32 = 32;
 /// A device that has always answered faster is waited for so many times its slowest answer …
@@ -33,6 +37,74 @@ const WHOLE_TIMEOUT_EVERY: u32 = 4;
 
 /// A device without any result, not even a failure, is asked again after this time.
 const TRIED_AGAIN: Duration = Duration::from_secs(1);
+/// Where the line has nothing else to do, a device that does not answer waits no longer than this: somebody may just have
+/// plugged it in.
+const IDLE_WAIT_MAX: Duration = Duration::from_secs(5);
+/// A gateway that says at once that the device is away may be asked again soon: after so many times what that took.
+const COST_SHARE: u32 = 20;
+/// Doubts in a row count once in this time: several requests may share one cause.
+const DOUBTS_EVERY: Duration = Duration::from_secs(1);
+
+/// How a request has failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Failure {
+    /// Nothing came.
+    Silence,
+    /// A gateway says that the device does not answer it.
+    OfGateway,
+    /// Something came that is no valid response.
+    Corrupt,
+    /// The other side closed the connection instead of answering.
+    Hangup,
+    /// Whatever came might have been the answer to something else.
+    Doubt,
+}
+
+impl Failure {
+    /// Nothing shows that the device is there.
+    pub(super) fn is_silence(self) -> bool {
+        matches!(self, Failure::Silence | Failure::OfGateway)
+    }
+}
+
+/// When a request failed: sent, the line taken for so long, and noticed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Failed {
+    pub sent: Timestamp,
+    pub spent: Duration,
+    pub now: Timestamp,
+}
+
+/// How long the answers of a line are waited for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Patience {
+    /// Its timeout (real time).
+    timeout: Duration,
+    /// No device is waited for less, however fast it has been.
+    least: Duration,
+    /// Plant seconds per real second.
+    speed: f64,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Patience { timeout: Duration::from_secs(1), least: RESPONSE_TIMEOUT_MIN, speed: 1.0 }
+    }
+}
+
+impl Patience {
+    /// That of a line.
+    pub fn of(line: &LineDef, speed: f64) -> Patience {
+        let serial = line.transport.serial().is_some();
+        let least = if serial { RESPONSE_TIMEOUT_MIN } else { NETWORK_RESPONSE_TIMEOUT_MIN };
+        Patience { timeout: line.timeout, least, speed }
+    }
+
+    /// The plant time in which a span of real time passes.
+    pub(super) fn plant_span(self, real: Duration) -> Duration {
+        real.mul_f64(self.speed)
+    }
+}
 
 #[derive(Debug, Clone)]
 pub(super) struct Health {
@@ -42,13 +114,14 @@ pub(super) struct Health {
     /// When the last failure was noticed.
     failed_at: Timestamp,
     backoff: Backoff,
-    /// While it does not answer: when it is asked next.
+    /// While it does not answer: when it is asked next, and from when on if the line has nothing else to do.
     pub probe_at: Option<Timestamp>,
+    pub idle_at: Timestamp,
     /// The next try does not wait for its share of the line's time.
     pub prompt: bool,
     /// The next try waits for the whole timeout.
     thorough: bool,
-    /// The poll that it is asked with while it does not answer: its first.
+    /// The poll that it is asked with while it does not answer.
     pub probe: Option<usize>,
     /// Not to be asked before this moment.
     pub rests_until: Timestamp,
@@ -68,6 +141,7 @@ impl Health {
             failed_at: now,
             backoff: Backoff::default(),
             probe_at: None,
+            idle_at: now,
             prompt: false,
             thorough: false,
             probe: None,
@@ -99,41 +173,65 @@ impl Health {
         std::mem::take(&mut self.down)
     }
 
-    /// An answer came after it had been given up: from now on the device has the whole timeout.
-    pub fn answered_late(&mut self) {
+    /// An answer came after it had been given up: it lives, and from now on it has the whole timeout.
+    pub fn answered_late(&mut self, now: Timestamp) {
         self.slowest = Duration::MAX;
+        self.retry(now);
     }
 
     /// It was asked; the outcome follows, or never comes if nothing could be sent: then it is asked again after a while.
     pub fn tried(&mut self, now: Timestamp) {
         if let Some(probe_at) = &mut self.probe_at {
-            (*probe_at, self.prompt) = (now + TRIED_AGAIN, false);
+            (*probe_at, self.idle_at, self.prompt) = (now + TRIED_AGAIN, now + TRIED_AGAIN, false);
         }
     }
 
-    /// It did not answer a request that was sent at `sent`; `affordable`: the line has time for another try. `true` if it is
-    /// given up with this.
-    pub fn failed(&mut self, sent: Timestamp, now: Timestamp, affordable: bool) -> bool {
+    /// A request that was sent at `sent` has failed, after the line was taken for `spent`; it has so many `blocks`.
+    /// `affordable`: the line has time for another try. `true` if it is given up with this.
+    pub fn failed(&mut self, failure: Failure, times: Failed, blocks: u32, affordable: bool) -> bool {
+        let Failed { sent, spent, now } = times;
         // What was under way when the last failure was noticed says nothing new.
-        if 0 < self.failures && sent < self.failed_at {
+        let together = sent < self.failed_at || failure == Failure::Doubt && now < self.failed_at + DOUBTS_EVERY;
+        if 0 < self.failures && together {
             return false;
         }
         (self.failed_at, self.failures) = (now, self.failures.saturating_add(1));
         // One frame may have been lost.
-        self.prompt = self.failures == 1;
+        self.prompt = self.failures == 1 && failure.is_silence();
         self.thorough = false;
-        let tries = if self.answers == 0 { FIRST_FAILURES_MAX } else { FAILURES_MAX };
-        let goes_down = !self.down && (tries <= self.failures || !(affordable || self.prompt));
+        let tries =
+            if self.answers == 0 { blocks.clamp(FIRST_FAILURES_MIN, FIRST_BLOCKS_MAX) } else { FAILURES_MAX };
+        let goes_down = !self.down && (tries <= self.failures || failure.is_silence() && !(affordable || self.prompt));
         self.down |= goes_down;
-        self.probe_at = Some(if self.prompt { now } else { now + self.backoff.fail() });
+        if self.prompt {
+            (self.probe_at, self.idle_at) = (Some(now), now);
+        } else if self.down || failure.is_silence() {
+            // Before it is given up, each of its blocks is asked for.
+            let tried = if self.down { self.backoff.fail() } else { TRIED_AGAIN };
+            let wait = match failure {
+                Failure::OfGateway => tried.min((spent * COST_SHARE).max(TRIED_AGAIN)),
+                Failure::Silence | Failure::Corrupt | Failure::Hangup | Failure::Doubt => tried,
+            };
+            (self.probe_at, self.idle_at) = (Some(now + wait), now + wait.min(IDLE_WAIT_MAX));
+        }
         goes_down
+    }
+
+    /// It has answered, and few requests in a row have failed: its tries do not wait for a share of the line's time.
+    pub fn is_trusted(&self) -> bool {
+        0 < self.answers && self.failures < FAILURES_MAX
+    }
+
+    /// Requests in a row that have failed.
+    pub fn failures(&self) -> u32 {
+        self.failures
     }
 
     /// It is asked again at once, and the waits between tries start from the shortest.
     pub fn retry(&mut self, now: Timestamp) {
         if self.probe_at.is_some() {
             self.backoff.reset();
-            (self.probe_at, self.prompt, self.thorough) = (Some(now), true, true);
+            (self.probe_at, self.idle_at, self.prompt, self.thorough) = (Some(now), now, true, true);
         }
     }
 
@@ -144,9 +242,8 @@ impl Health {
 
     /// How long an answer is waited for (real time), at most the timeout of the line. One that has never answered is waited
     /// for so long once; then as if it were as slow as the slowest `neighbour` that answers, if there is one.
-    pub fn response_timeout(&self, line: &LineDef, neighbour: impl FnOnce() -> Option<Duration>) -> Duration {
-        let timeout = line.timeout;
-        let least = if line.transport.serial().is_some() { RESPONSE_TIMEOUT_MIN } else { NETWORK_RESPONSE_TIMEOUT_MIN };
+    pub fn response_timeout(&self, patience: Patience, neighbour: impl FnOnce() -> Option<Duration>) -> Duration {
+        let Patience { timeout, least, .. } = patience;
         let whole = self.thorough || self.failures % WHOLE_TIMEOUT_EVERY == WHOLE_TIMEOUT_EVERY - 1;
         let slowest = match self.answers {
             0 if 0 < self.failures => neighbour().map(|neighbour| neighbour.max(self.slowest)),

@@ -3,7 +3,7 @@
 
 use super::{tests::at, *};
 use crate::plant::{
-    def::{LineId, Serial, TagId, Transport},
+    def::TagId,
     tag::{Poll, Table},
 };
 
@@ -23,7 +23,6 @@ fn unit(period: i64, cost: i64) -> Unit {
 }
 
 struct Model {
-    line: LineDef,
     units: Vec<Unit>,
     schedule: Schedule,
     now: i64,
@@ -48,8 +47,7 @@ impl Model {
         };
         let blocks: Vec<Block> = units.iter().enumerate().map(block).collect();
         let reads = vec![Vec::new(); units.len()];
-        let line = LineDef::new(LineId(0), "L1", Transport::rtu("memory", Serial::USUAL));
-        Model { line, schedule: Schedule::new(&blocks, at(0)), units, now: 0, reads, busy: Vec::new() }
+        Model { schedule: Schedule::new(&blocks, at(0)), units, now: 0, reads, busy: Vec::new() }
     }
 
     fn play(&mut self, until: i64) {
@@ -64,14 +62,14 @@ impl Model {
             };
             let (unit, started) = (&self.units[index], self.now);
             let (device, dead) = (DeviceId(index as u16), unit.dead.contains(&started));
-            let response_timeout = self.schedule.response_timeout(index, &self.line);
+            let response_timeout = self.schedule.response_timeout(index);
             let took = if dead { response_timeout } else { Duration::from_millis(unit.cost as u64) };
             self.now += took.as_millis() as i64;
             self.schedule.done(index, at(started), at(self.now));
             if dead {
-                self.schedule.failed(device, at(started), took, at(self.now));
+                self.schedule.failed(Some(index), device, Failure::Silence, (at(started), took), at(self.now));
             } else {
-                self.schedule.answered(device, Some(Duration::from_millis(5)), at(self.now));
+                self.schedule.answered(Some(index), device, Some(Duration::from_millis(5)), at(self.now));
                 self.schedule.spent(index, took);
                 self.reads[index].push(started);
                 self.busy.push((started, self.now));

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
+use super::device::Failure;
 use crate::{
-    bus::plan::Block,
+    bus::{backoff::Backoff, plan::Block},
     plant::{
         def::DeviceId,
         event::ExceptionCode,
@@ -16,10 +17,14 @@ use crate::{
 
 /// A block that is read once should be read within this time.
 pub(super) const ONCE_WITHIN: Duration = Duration::from_secs(5);
+/// Waits between its tries grow to so many doublings of that.
+const ONCE_DOUBLINGS: u32 = 4;
 /// A critical poll that was late so often in a row means overload, whatever the costs say.
 const LATE_MAX: u32 = 3;
 /// A device that has acknowledged (05) wants to be left alone for a while.
 const ACKNOWLEDGED: Duration = Duration::from_secs(1);
+/// A block whose answers are corrupt so often in a row is asked for less often.
+const CORRUPT_MAX: u32 = 3;
 /// The first wait for a device that is busy (06); it doubles up to [`BUSY_MAX`].
 const BUSY: Duration = Duration::from_millis(100);
 const BUSY_MAX: Duration = Duration::from_secs(5);
@@ -68,6 +73,10 @@ pub(super) struct ScheduledPoll {
     pub place: usize,
     pub class: PollClass,
     pub period: Option<Duration>,
+    /// It is read once, as opposed to only on request.
+    once: bool,
+    /// Refusals of a block that is read once.
+    refusals: u32,
     /// Next point of its grid; `None` for a block that is read once and has been.
     pub release: Option<Timestamp>,
     /// Asked for out of turn (device came back, refresh command, retry) at this time.
@@ -84,6 +93,13 @@ pub(super) struct ScheduledPoll {
     /// Times in a row that the device put it off; and whether the last read was put off.
     excuses: u32,
     excused: bool,
+    /// Failures in a row, and the wait after the next.
+    failures: u32,
+    backoff: Backoff,
+    /// When it was last tried.
+    pub tried_at: Timestamp,
+    /// It has been answered since the start.
+    answered: bool,
 }
 
 impl ScheduledPoll {
@@ -96,6 +112,8 @@ impl ScheduledPoll {
             place,
             class: block.class,
             period,
+            once: block.poll == Poll::Once,
+            refusals: 0,
             release: Some(release),
             urgent: None,
             not_before: now,
@@ -105,7 +123,62 @@ impl ScheduledPoll {
             late: 0,
             excuses: 0,
             excused: false,
+            failures: 0,
+            backoff: Backoff::default(),
+            tried_at: Timestamp::MIN,
+            answered: false,
         }
+    }
+
+    /// Failures in a row.
+    pub fn failures(&self) -> u32 {
+        self.failures
+    }
+
+    /// Has it been answered before, and lastly?
+    pub fn lives(&self) -> bool {
+        self.answered && self.failures == 0
+    }
+
+    /// It was answered.
+    pub fn answered(&mut self) {
+        (self.failures, self.answered) = (0, true);
+        self.backoff.reset();
+    }
+
+    /// It failed: silence is asked for once more at once, then after a wait that grows, and not before the line has time for it
+    /// (`affordable_from`); what was corrupt stays on its grid a few times.
+    pub fn failed(&mut self, failure: Failure, now: Timestamp, affordable_from: Timestamp) {
+        if failure == Failure::Doubt {
+            return;
+        }
+        self.failures = self.failures.saturating_add(1);
+        match (failure, self.failures) {
+            (Failure::Silence | Failure::OfGateway, 1) => self.later(now),
+            (Failure::Corrupt, ..CORRUPT_MAX) => {}
+            _ => {
+                let until = now + self.backoff.fail();
+                self.later(until.max(affordable_from));
+            }
+        }
+    }
+
+    /// Its device is back after it was given up: what failed meanwhile says nothing of the block.
+    pub fn forgive(&mut self, now: Timestamp) {
+        (self.failures, self.not_before) = (0, self.not_before.min(now));
+        self.backoff.reset();
+        self.due(now);
+    }
+
+    /// It is due out of turn; what was asked for earlier keeps its place.
+    pub fn due(&mut self, now: Timestamp) {
+        self.urgent = Some(self.urgent.map_or(now, |urgent| urgent.min(now)));
+    }
+
+    /// It may be read again at once although it failed.
+    pub fn retry(&mut self, now: Timestamp) {
+        self.not_before = self.not_before.min(now);
+        self.urgent = Some(now);
     }
 
     /// Does it read this very block, as often?
@@ -136,6 +209,7 @@ impl ScheduledPoll {
 
     /// See [`super::Schedule::done`]. `free`: since when its device could be asked at all.
     pub fn serve(&mut self, pace: Pace, free: Timestamp, started: Timestamp, now: Timestamp) -> Served {
+        self.tried_at = started;
         // What was asked for while it was under way is still to be done.
         self.urgent = self.urgent.filter(|urgent| started < *urgent);
         if !std::mem::take(&mut self.excused) {
@@ -152,8 +226,9 @@ impl ScheduledPoll {
                     let waited = elapsed(release.max(free), started);
                     self.late = if period <= waited { self.late.saturating_add(1) } else { 0 };
                 }
-                // Of the releases served together only the last was in time. What was shed was not to be read at all.
-                served_poll.missed = if pace == Pace::Shed { 0 } else { over - served.min(1) };
+                // Of the releases served together only the last was in time. What was shed or waits was not to be read at all.
+                let waits = pace == Pace::Shed || 0 < self.failures;
+                served_poll.missed = if waits { 0 } else { over - served.min(1) };
                 Some(release + period * over)
             }
             (Some(_), release) => release,
@@ -183,6 +258,14 @@ impl ScheduledPoll {
     pub fn back_on_grid(&mut self, origin: Timestamp, now: Timestamp) {
         if let (Some(period), Some(release)) = (self.period, &mut self.release) {
             *release = origin + period * periods_in(origin, now.max(*release), period);
+        }
+    }
+
+    /// A block that is read once could not be: it is due again soon, later each time; one that is read on request is not.
+    pub fn reschedule(&mut self, now: Timestamp) {
+        if self.once {
+            self.release = Some(now + ONCE_WITHIN * 2u32.saturating_pow(self.refusals.min(ONCE_DOUBLINGS)));
+            self.refusals = self.refusals.saturating_add(1);
         }
     }
 

@@ -45,6 +45,8 @@ struct Transaction {
     timeout: Duration,
     /// `None` until it is flushed.
     sent_at: Option<Instant>,
+    /// The last answer to a request that was sent before it.
+    begun_at: Instant,
 }
 
 impl Transaction {
@@ -52,8 +54,9 @@ impl Transaction {
         self.message.first() == Some(&unit)
     }
 
+    /// Its time runs from when the device could begin with it: what was sent before it may have been answered first.
     fn deadline(&self) -> Option<Instant> {
-        Some(self.sent_at? + self.timeout)
+        Some(self.sent_at?.max(self.begun_at) + self.timeout)
     }
 }
 
@@ -75,6 +78,8 @@ pub(super) struct Transactions {
     given_up: VecDeque<(u16, Option<u8>)>,
     /// By unit: how many may be under way beside one to this unit, that one included.
     limits: [u16; 256],
+    /// Only one may be under way at all.
+    alone: bool,
     /// Bytes of a frame that has not come as a whole.
     inbox: Vec<u8>,
     /// Requests that wait for their place in the next write.
@@ -95,6 +100,7 @@ impl Transactions {
             under_way: Vec::new(),
             given_up: VecDeque::new(),
             limits: [1; 256],
+            alone: false,
             inbox: Vec::new(),
             outbox: Vec::new(),
             sending: false,
@@ -106,6 +112,9 @@ impl Transactions {
 
     /// The most that may be under way now.
     fn limit(&self) -> usize {
+        if self.alone {
+            return 1;
+        }
         let units = self.under_way.iter().filter_map(|request| request.message.first());
         units.map(|unit| usize::from(self.limits[usize::from(*unit)])).min().unwrap_or(usize::MAX)
     }
@@ -114,7 +123,7 @@ impl Transactions {
         self.under_way.len() < self.limit().min(self.limits[usize::from(unit)].into())
     }
 
-    fn begin(&mut self, message: &[u8], timeout: Duration) -> u16 {
+    fn begin(&mut self, message: &[u8], timeout: Duration, now: Instant) -> u16 {
         self.last_id = self.last_id.wrapping_add(1);
         while self.under_way.iter().any(|request| request.id == self.last_id)
             || self.given_up.iter().any(|(id, _)| *id == self.last_id)
@@ -123,7 +132,7 @@ impl Transactions {
         }
         let (id, frame) = (self.last_id, frame::with_mbap(self.last_id, message));
         self.outbox.extend_from_slice(&frame);
-        self.under_way.push(Transaction { id, message: message.to_vec(), frame: frame.into(), timeout, sent_at: None });
+        self.under_way.push(Transaction { id, message: message.to_vec(), frame: frame.into(), timeout, sent_at: None, begun_at: now });
         id
     }
 
@@ -183,6 +192,11 @@ impl Link {
         self.transactions.limits[usize::from(unit)] = in_flight_max.max(1);
     }
 
+    /// From now on one request at a time is under way, or as many as the units take.
+    pub fn set_alone(&mut self, alone: bool) {
+        self.transactions.alone = alone;
+    }
+
     /// May another request be sent, to this unit, beside those that are under way?
     pub fn has_room(&self, unit: u8) -> bool {
         self.transactions.has_room(unit)
@@ -205,7 +219,7 @@ impl Link {
 
     /// Puts a message (unit and PDU) among those that the next [`Link::flush`] sends; gives its transaction id.
     pub fn submit(&mut self, message: &[u8], timeout: Duration) -> u16 {
-        self.transactions.begin(message, timeout)
+        self.transactions.begin(message, timeout, Instant::now())
     }
 
     /// Sends what was submitted in one write, once the line has rested long enough.
@@ -355,6 +369,8 @@ impl Link {
                     let answer = frame[6..].to_vec();
                     let answer = frame::check_answer(&request.message, &answer).map(|()| answer);
                     self.unanswered = 0;
+                    let behind = self.transactions.under_way.iter_mut();
+                    behind.filter(|other| request.sent_at <= other.sent_at).for_each(|other| other.begun_at = now);
                     let ended = self.end(request, answer, frame.into(), now);
                     self.transactions.ended.push(ended);
                 }

@@ -18,7 +18,7 @@ use crate::{
         plan::Block,
         schedule::{Next, Schedule},
     },
-    plant::{def::DeviceId, time::elapsed},
+    plant::{def::DeviceId, event::Fault, time::elapsed},
 };
 
 /// A read that is under way over Modbus TCP.
@@ -31,6 +31,8 @@ pub(super) struct UnderWay {
     began: Timestamp,
     /// Which try this is.
     tries: u8,
+    /// Others that were under way when it was sent.
+    beside: usize,
 }
 
 impl Task<'_> {
@@ -92,16 +94,17 @@ impl Task<'_> {
         began: Timestamp,
         tries: u8,
     ) {
-        let response_timeout = schedule.response_timeout(index, &self.settings);
+        let response_timeout = schedule.response_timeout(index);
         let id = link.submit(&block.request(), response_timeout);
-        self.under_way.push(UnderWay { id, index, block, began, tries });
+        let beside = self.under_way.len();
+        self.under_way.push(UnderWay { id, index, block, began, tries, beside });
     }
 
     /// Takes what has come of the requests under way.
     pub(super) async fn receive_replies(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<(), LinkExit> {
         for Answered { id, answer, at, mut exchange } in link.take_ended() {
             let Some(place) = self.under_way.iter().position(|read| read.id == id) else { continue };
-            let UnderWay { index, block, began, tries, .. } = self.under_way.swap_remove(place);
+            let UnderWay { index, block, began, tries, beside, .. } = self.under_way.swap_remove(place);
             let index = self.place_of(index, &block);
             let answer = answer.and_then(|answer| parse(&block, answer));
             if let (Err(fault), Some(index), 1) = (&answer, index, tries)
@@ -120,6 +123,8 @@ impl Task<'_> {
             let places = u32::from(device.limits.in_flight_max.max(1));
             let took = elapsed(began, ended) / places;
             let on_wire = self.clock.plant_span(exchange.response_time.unwrap_or_default()) / places;
+            let lost = answer.as_ref().is_err_and(|fault| *fault == Fault::Timeout);
+            self.note_fate(link, &block, beside, lost && index.is_some_and(|index| schedule.lives(index)));
             if let Some(index) = index {
                 let served = schedule.done(index, began, ended);
                 self.stats.served(index, served.jitter, served.missed);
@@ -158,6 +163,22 @@ impl Task<'_> {
             self.receive_replies(link, schedule).await?;
         }
         Ok(true)
+    }
+
+    /// The connection is gone: what was under way on it.
+    pub(super) fn cut_off(&mut self, schedule: &mut Schedule) -> Vec<Block> {
+        let now = self.clock.now();
+        let mut cut = std::mem::take(&mut self.cut);
+        for UnderWay { index, block, began, .. } in std::mem::take(&mut self.under_way) {
+            if let Some(index) = self.place_of(index, &block) {
+                let served = schedule.done(index, began, now);
+                self.stats.served(index, served.jitter, served.missed);
+            }
+            cut.push(block);
+        }
+        let places = cut.iter().filter_map(|block| self.blocks.iter().position(|planned| planned == block));
+        places.for_each(|index| schedule.cut(index, now));
+        cut
     }
 
     /// Where a block stands that stood at `planned_at`: another answer may have changed the plan meanwhile.

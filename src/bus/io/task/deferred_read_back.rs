@@ -74,7 +74,7 @@ impl Task<'_> {
         let raw = match back {
             Some(Ok(values)) => value_of(tag, &block, &values),
             Some(Err(LinkError::Fault(_))) => None,
-            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::PortFailed(why)),
+            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Gone(why)),
             None => return Ok(()),
         };
         let Some(raw) = raw else {
@@ -89,7 +89,8 @@ impl Task<'_> {
         };
         let exchange = link.last.clone();
         let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time).unwrap_or_default();
-        schedule.answered(tag.device, Some(response_time).filter(|response_time| *response_time > Duration::ZERO), at);
+        let known = Some(response_time).filter(|response_time| *response_time > Duration::ZERO);
+        schedule.answered(None, tag.device, known, at);
         let (device, values) = (tag.device, vec![(tag.id, raw)]);
         self.publish(Event::Read { at, device, values, texts: Vec::new(), response_time, exchange }).await?;
         let write = self.unconfirmed.remove(index);

@@ -9,6 +9,10 @@ pub(super) enum LinkExit {
     Closed,
     /// The port or connection failed.
     PortFailed(String),
+    /// It was closed, or sent what is no Modbus, in the words of the system.
+    Gone(String),
+    /// The other side allows no more on one connection: the next is opened for what is due next.
+    UsedUp,
     /// It is opened again at once, with other settings.
     Reopen,
     /// A diagnostic needs the port for itself.
@@ -27,7 +31,7 @@ impl From<LinkError> for LinkExit {
     /// Of a request without a caller only the end of the port matters.
     fn from(error: LinkError) -> LinkExit {
         match error {
-            LinkError::Gone(why) => LinkExit::PortFailed(why),
+            LinkError::Gone(why) => LinkExit::Gone(why),
             LinkError::Fault(fault) => LinkExit::PortFailed(fault.to_string()),
         }
     }

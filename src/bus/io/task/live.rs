@@ -15,6 +15,7 @@ use crate::{
     },
     plant::{
         def::DeviceId,
+        event::Fault,
         live::AddressSpan,
         tag::{Poll, PollClass},
         time::elapsed,
@@ -25,7 +26,7 @@ impl Task<'_> {
     pub(super) fn is_turn_of_live_read(&mut self, next: Next) -> bool {
         let idle = !matches!(next, Next::Run(_));
         let share = self.live_from() <= self.clock.now();
-        share && (idle || POLLS_BETWEEN <= self.polls_since_step) && self.live.begin(self.clock)
+        share && (idle || POLLS_BETWEEN <= self.polls_since_step) && self.live.begin(&mut self.unreadable, self.clock)
     }
 
     /// From when on a live read may have the line: a request to a silent unit holds up the polls that become due meanwhile,
@@ -51,14 +52,18 @@ impl Task<'_> {
                 Some(Ok(ReadValues::Registers(words))) => Ok(words),
                 Some(Ok(ReadValues::Bits(bits))) => Ok(bits.into_iter().map(u16::from).collect()),
                 Some(Err(LinkError::Fault(fault))) => Err(fault),
-                Some(Err(LinkError::Gone(why))) => return Err(LinkExit::PortFailed(why)),
+                Some(Err(LinkError::Gone(why))) => {
+                    // Made again, it might end the next connection as well.
+                    job.on_outcome(&mut self.unreadable, self.clock.utc(), Err(Fault::Hangup));
+                    return Err(LinkExit::Gone(why));
+                }
                 // A stop comes first; the request is made again.
                 None => {
                     link.abandon();
                     return Ok(());
                 }
             };
-            job.on_outcome(&mut self.live.known, self.clock.utc(), words);
+            job.on_outcome(&mut self.unreadable, self.clock.utc(), words);
         }
         if job.next().is_none()
             && let Some((job, request)) = self.live.job.take()

@@ -13,12 +13,13 @@ use crate::{
     bus::{
         codec,
         io::link::{Link, LinkError},
-        plan::{self, Block, Wire},
-        schedule::Schedule,
+        late_reply::Proof,
+        plan::{self, Block, Wire, may_be_cut},
+        schedule::{Failure, Schedule},
     },
     plant::{
         def::Framing,
-        event::{Event, ExceptionCode, Fault},
+        event::{Event, Fault, FaultKind},
         number::to_u16,
         tag::TagDef,
         time::elapsed,
@@ -26,8 +27,10 @@ use crate::{
     },
 };
 
-/// Requests in a row without any answer after which a TCP connection is opened again.
+/// Requests in a row without any answer after which a TCP connection is opened again …
 const UNANSWERED_MAX: u32 = 5;
+/// … and twice as many each time that this was in vain, up to so many doublings: the device may be deaf after it was connected.
+const DOUBLINGS_MAX: u32 = 3;
 
 /// How a read has ended.
 pub(super) struct ReadResult {
@@ -59,7 +62,7 @@ impl Task<'_> {
         // If only time can resynchronise, nothing is sent.
         link.last = None;
         let timeout = link.timeout();
-        link.set_timeout(schedule.response_timeout(index, &self.settings));
+        link.set_timeout(schedule.response_timeout(index));
         let read = self.read_unless_stopped(link, &block, Some(index)).await;
         link.set_timeout(timeout);
         let ended = self.clock.now();
@@ -70,7 +73,10 @@ impl Task<'_> {
         let answer = match read {
             Some(Ok(answer)) => Ok(answer),
             Some(Err(LinkError::Fault(fault))) => Err(fault),
-            Some(Err(LinkError::Gone(why))) => return Err(LinkExit::PortFailed(why)),
+            Some(Err(LinkError::Gone(why))) => {
+                self.cut.push(block);
+                return Err(LinkExit::Gone(why));
+            }
             // Nothing was learned of the device.
             None => {
                 schedule.reschedule(index, ended);
@@ -90,15 +96,17 @@ impl Task<'_> {
         self.stats.late(&self.def, &late);
         for unit in late {
             let on_line = self.def.devices.iter().filter(|device| device.line == self.line && device.unit == unit);
-            on_line.for_each(|device| schedule.answered_late(device.id));
+            on_line.for_each(|device| schedule.answered_late(device.id, self.clock.now()));
         }
     }
 
     /// A peer may have forgotten a connection, or hold it without ever answering: only a new one shows which.
-    pub(super) fn check_connection(&self, link: &Link) -> Result<(), LinkExit> {
-        if self.settings.transport.serial().is_some() || link.unanswered < UNANSWERED_MAX {
+    pub(super) fn check_connection(&mut self, link: &Link) -> Result<(), LinkExit> {
+        let most = UNANSWERED_MAX << self.unheard.min(DOUBLINGS_MAX);
+        if self.settings.transport.serial().is_some() || link.unanswered < most {
             return Ok(());
         }
+        self.unheard += u32::from(link.answers() == 0);
         Err(LinkExit::PortFailed(format!("no answer to {} requests over this connection", link.unanswered)))
     }
 
@@ -127,52 +135,69 @@ impl Task<'_> {
             Err(_) => false,
         };
         if is_answer {
-            schedule.answered(block.device, response_time, at);
+            schedule.answered(index, block.device, response_time, at);
             index.into_iter().for_each(|index| schedule.spent(index, took));
+            self.on_block_answered(link, block);
         }
         match answer {
             Ok(values) => {
                 self.publish_values(at, block, &values, response_time.unwrap_or_default(), exchange).await?;
                 self.bisection.answered(block);
+                self.refused_all.remove(&block.unit);
                 let disproved = self.unreadable.disproved(block);
                 self.replan(link, schedule, at, disproved);
-                Ok(())
             }
             Err(fault @ Fault::Exception(code)) if is_answer => {
                 self.publish_failure(at, block.device, block.tags.to_vec(), fault, exchange).await?;
-                let its_own = link.outstanding(block.unit).is_clear();
                 let Some(index) = index else { return Ok(()) };
                 schedule.reschedule(index, at);
-                let is_unreadable = code == ExceptionCode(0x02) && its_own;
-                if is_unreadable && let Some(parts) = self.bisection.refused(&self.def, &self.unreadable, block) {
-                    tracing::debug!(address = block.address, count = block.count, "exception 02: the block is split");
-                    let mut blocks = self.blocks.clone();
-                    blocks.splice(index..=index, parts);
-                    self.use_plan(link, schedule, blocks, at);
-                    self.replan(link, schedule, at, false);
-                } else {
+                let its_own = link.outstanding(block.unit).is_clear();
+                let parts = (its_own && may_be_cut(code))
+                    .then(|| self.bisection.refused(&self.def, &self.unreadable, block))
+                    .flatten();
+                let Some(parts) = parts else {
                     schedule.on_exception(index, code, at);
-                }
-                Ok(())
+                    return Ok(());
+                };
+                tracing::debug!(address = block.address, count = block.count, %code, "the block is split");
+                let mut blocks = self.blocks.clone();
+                blocks.splice(index..=index, parts);
+                self.use_plan(link, schedule, blocks, at);
+                self.replan(link, schedule, at, false);
             }
             Err(fault) => {
-                if let Some(index) = index {
-                    schedule.reschedule(index, at);
-                }
+                index.into_iter().for_each(|index| schedule.reschedule(index, at));
                 self.publish_failure(at, block.device, block.tags.to_vec(), fault, exchange).await?;
-                // It answers, and is asked again in its turn.
-                if fault == Fault::OutOfSync {
-                    return Ok(());
-                }
-                if schedule.failed(block.device, began, took, at) {
-                    let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
-                    self.publish_failure(at, block.device, tags, Fault::BackedOff, None).await?;
-                    self.unreadable.forget(block.device);
-                    self.replan(link, schedule, at, true);
-                }
-                Ok(())
+                self.on_failure(link, schedule, index, block, fault, (began, took)).await?;
             }
         }
+        Ok(())
+    }
+
+    /// A read has failed, neither with values nor with an exception of its device.
+    async fn on_failure(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        index: Option<usize>,
+        block: &Block,
+        fault: Fault,
+        (began, took): (Timestamp, Duration),
+    ) -> Result<(), LinkExit> {
+        let at = self.clock.now();
+        // It has answered, and is left alone until nothing more can come.
+        if let Some(settles_in) = link.settles_in(block.unit).filter(|_| fault == Fault::OutOfSync) {
+            schedule.hold_off(block.device, at + self.clock.plant_span(settles_in));
+            return Ok(());
+        }
+        if schedule.failed(index, block.device, failure_of(fault), (began, took), at) {
+            let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
+            self.publish_failure(at, block.device, tags, Fault::BackedOff, None).await?;
+            // A search of what it does not have would never end.
+            let searched = self.bisection.is_open();
+            self.replan(link, schedule, at, searched);
+        }
+        Ok(())
     }
 
     /// Counts how a read has ended, and what a good one has taken.
@@ -221,13 +246,20 @@ impl Task<'_> {
         if wrong {
             self.bisection.reset();
         }
-        if wrong || self.bisection.conclude(&mut self.unreadable) {
+        let found = self.bisection.conclude(&mut self.unreadable);
+        if wrong || found.replan {
             self.plan_again(link, schedule, at);
+        }
+        for unit in found.disbelieved {
+            let until = at + self.refused_all.entry(unit).or_default().fail();
+            let of_unit = |(_, block): &(usize, &Block)| block.unit == unit;
+            self.blocks.iter().enumerate().filter(of_unit).for_each(|(index, _)| schedule.later(index, until));
         }
     }
 
     /// Plans with what is known of unreadable ranges and with what operators have asked for.
     pub(super) fn plan_again(&mut self, link: &mut Link, schedule: &mut Schedule, at: Timestamp) {
+        self.bisection.restart();
         let blocks = plan::blocks_with_unpolled(&self.def, self.line, &self.unreadable, &self.requested);
         self.use_plan(link, schedule, blocks, at);
     }
@@ -237,6 +269,7 @@ impl Task<'_> {
         self.stats.admit(&self.def, &self.settings, &blocks);
         schedule.replan(&blocks, at);
         link.expect(&blocks);
+        self.hangups.keep(&blocks);
         self.blocks = blocks;
     }
 
@@ -272,6 +305,16 @@ impl Task<'_> {
     }
 }
 
+fn failure_of(fault: Fault) -> Failure {
+    match fault.kind() {
+        _ if fault == Fault::Hangup => Failure::Hangup,
+        FaultKind::Exception(_) => Failure::OfGateway,
+        FaultKind::Corrupt | FaultKind::NotANumber => Failure::Corrupt,
+        FaultKind::OutOfSync => Failure::Doubt,
+        FaultKind::Timeout | FaultKind::NotConnected | FaultKind::BackedOff => Failure::Silence,
+    }
+}
+
 /// What came in between may have shown that the unit sends what it was not asked for.
 fn check_in_sync(link: &Link, block: &Block) -> Result<(), LinkError> {
     if link.is_ambiguous(&block.request()) { Err(Fault::OutOfSync.into()) } else { Ok(()) }
@@ -284,33 +327,51 @@ pub(super) enum ReadValues {
     Registers(Vec<u16>),
 }
 
-/// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another signature,
-/// part of this block or of one of `blocks`, if there is one, else by a loopback, else by time.
+/// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another signature, part of this
+/// block or of one of `blocks`, by a loopback, or by any answer after which nothing more comes; what fails gives way to the next. Else
+/// by time.
 async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), LinkError> {
+    let unit = block.unit;
     if !link.is_ambiguous(&block.request()) {
         return Ok(());
     }
-    if link.is_unsettled(block.unit) {
+    if link.is_unsettled(unit) {
         return Err(Fault::OutOfSync.into());
     }
-    if link.must_wait(&block.request()) {
-        return if link.forget_outstanding(block.unit).is_none() { Ok(()) } else { Err(Fault::OutOfSync.into()) };
+    let must_wait = link.must_wait(&block.request());
+    if must_wait || link.settles_in(unit).is_some() {
+        return if link.forget_outstanding(unit).is_none() { Ok(()) } else { Err(Fault::OutOfSync.into()) };
     }
-    let own = std::iter::once(block);
-    let others = blocks.iter().filter(|other| other.device == block.device && *other != block);
-    if let Some(probe) = link.outstanding(block.unit).probe(own.chain(others)) {
-        match link.exchange(&probe).await {
-            // The device does not read parts of a block, or this answers an older request: neither proves anything.
-            Err(LinkError::Fault(Fault::Exception(_))) => {}
-            Ok(_) => return check_in_sync(link, block),
-            Err(error) => return Err(error),
+    let proof = link.proof(unit);
+    if proof == Proof::Part {
+        let others = blocks.iter().filter(|other| other.device == block.device && *other != block);
+        if let Some(probe) = link.outstanding(unit).probe(std::iter::once(block).chain(others)) {
+            match link.exchange(&probe).await {
+                Ok(_) => return check_in_sync(link, block),
+                // The device does not read parts of a block, or this answers an older request: neither proves anything.
+                Err(LinkError::Fault(Fault::Exception(_))) => {}
+                Err(error) => return Err(try_another(link, unit, error)),
+            }
         }
     }
-    match link.loopback(block.unit).await {
-        Err(LinkError::Fault(_)) if link.forget_outstanding(block.unit).is_none() => Ok(()),
-        Ok(()) => check_in_sync(link, block),
-        Err(error) => Err(error),
+    if proof != Proof::Silence {
+        return match link.loopback(unit).await {
+            Ok(()) => check_in_sync(link, block),
+            Err(LinkError::Fault(_)) if link.forget_outstanding(unit).is_none() => Ok(()),
+            Err(error) => Err(try_another(link, unit, error)),
+        };
     }
+    match link.exchange(&block.request()).await {
+        Ok(_) | Err(LinkError::Fault(Fault::Exception(_))) => Err(Fault::OutOfSync.into()),
+        Err(LinkError::Fault(_)) if link.forget_outstanding(unit).is_none() => Ok(()),
+        Err(error) => Err(try_another(link, unit, error)),
+    }
+}
+
+/// The unit gives no such proof, or no answer at all.
+fn try_another(link: &mut Link, unit: u8, error: LinkError) -> LinkError {
+    link.proof_failed(unit);
+    error
 }
 
 /// Reads a block from a unit that is in sync. A `corrupt` answer is asked for once more; it counts as outstanding, so the unit is

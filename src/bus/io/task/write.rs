@@ -14,7 +14,7 @@ use crate::{
     },
     plant::{
         command::{BusRequest, WriteJob},
-        def::{ActionDef, DeviceDef, Framing},
+        def::{ActionDef, DeviceDef},
         event::{Event, Fault, WriteResult},
         number::to_u16,
         scale,
@@ -68,7 +68,7 @@ impl Task<'_> {
             WriteEnd::Ended(result) => result,
             WriteEnd::PortClosed(result, why) => {
                 self.publish_write_result(id, result).await?;
-                return Err(LinkExit::PortFailed(why));
+                return Err(LinkExit::Gone(why));
             }
         };
         // The write of the unlock register is lost where the write of the value was not sent for want of an answer.
@@ -191,7 +191,7 @@ impl Task<'_> {
         self.keep_write_gap(link, schedule, device);
         match sent {
             Ok(()) => {
-                schedule.answered(tag.device, None, self.clock.now());
+                schedule.answered(None, tag.device, None, self.clock.now());
                 Ok(WriteResult::Accepted)
             }
             Err(LinkError::Gone(why)) => Err(why),
@@ -294,8 +294,7 @@ fn may_have_effect(result: &WriteResult) -> bool {
 
 /// Can no outstanding reply be taken for the next one?
 fn is_clear(link: &Link, device: &DeviceDef) -> bool {
-    let broadcast = device.unit == 0;
-    link.framing() == Framing::Mbap || broadcast || link.outstanding(device.unit).is_clear()
+    device.unit == 0 || link.outstanding(device.unit).is_clear()
 }
 
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for

@@ -52,9 +52,9 @@ fn a_device_that_does_not_answer_does_not_overload_its_line() {
                 let (began, ended, took) = (at(now), at(now + spent), Duration::from_millis(spent as u64));
                 schedule.done(index, began, ended);
                 if silent {
-                    schedule.failed(DeviceId(0), began, took, ended);
+                    schedule.failed(Some(index), DeviceId(0), Failure::Silence, (began, took), ended);
                 } else {
-                    schedule.answered(DeviceId(index.min(1) as u16), Some(took), ended);
+                    schedule.answered(Some(index), DeviceId(index.min(1) as u16), Some(took), ended);
                     schedule.spent(index, took);
                 }
                 now += spent;

@@ -1,0 +1,92 @@
+//! Connections that come and go: what ended one, and what is due on the next.
+
+use super::{LinkExit, Task};
+use crate::{
+    bus::{
+        hangup::Hangup,
+        io::link::Link,
+        plan::Block,
+        schedule::{Failure, Next, Schedule},
+    },
+    plant::event::Fault,
+};
+
+impl Task<'_> {
+    /// A connection over a network is gone. The block that has ended it is named and waits; `true` if another connection may take its
+    /// place without a word.
+    pub(super) async fn on_hangup(&mut self, schedule: &mut Schedule, answers: u64) -> Result<bool, LinkExit> {
+        let cut = self.cut_off(schedule);
+        let Hangup { guilty, is_quiet } = self.hangups.on_end(&cut, answers);
+        let Some(block) = guilty else { return Ok(is_quiet) };
+        let now = self.clock.now();
+        let device = &self.def.device(block.device).name;
+        tracing::warn!(device, table = ?block.table, address = block.address, count = block.count, "{}", Fault::Hangup);
+        self.publish_failure(now, block.device, block.tags.to_vec(), Fault::Hangup, None).await?;
+        let index = self.blocks.iter().position(|planned| *planned == block);
+        if schedule.failed(index, block.device, Failure::Hangup, (now, std::time::Duration::ZERO), now) {
+            let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
+            self.publish_failure(now, block.device, tags, Fault::BackedOff, None).await?;
+        }
+        Ok(is_quiet)
+    }
+
+    /// A block was answered: it does not end connections.
+    pub(super) fn on_block_answered(&mut self, link: &mut Link, block: &Block) {
+        self.hangups.on_answers(link.answers());
+        if let Some(together) = self.hangups.answered(block) {
+            let together = u16::try_from(together).unwrap_or(u16::MAX);
+            let most = self.in_flight.step_down(block.unit, together);
+            tracing::warn!(unit = block.unit, together, most, "too many requests at once: in_flight_max is lowered");
+            link.allow(block.unit, most);
+        }
+        link.set_alone(!self.hangups.is_clear());
+    }
+
+    /// A request has ended that was sent with others under way; `lost`: without the answer that it had before.
+    pub(super) fn note_fate(&mut self, link: &mut Link, block: &Block, beside: usize, lost: bool) {
+        let stated = self.def.device(block.device).limits.in_flight_max;
+        if let Some(most) = self.in_flight.on_end(block.unit, stated, beside, lost) {
+            tracing::warn!(unit = block.unit, most, "requests beside others are lost: in_flight_max is lowered");
+            link.allow(block.unit, most);
+        }
+    }
+
+    /// May the other side have had enough of this connection?
+    pub(super) fn check_used_up(&mut self, link: &Link) -> Result<(), LinkExit> {
+        let network = self.settings.transport.serial().is_none();
+        if network && self.under_way.is_empty() && self.hangups.answers_max() == Some(link.answers()) && self.hangups.is_used_up(link.answers()) {
+            return Err(LinkExit::UsedUp);
+        }
+        Ok(())
+    }
+
+    /// Waits without a connection, with the values as they are, until something is due or asked for.
+    pub(super) async fn wait_until_due(&mut self, schedule: &mut Schedule) -> Result<(), LinkExit> {
+        loop {
+            let now = self.clock.now();
+            self.publish_report(Some(schedule)).await?;
+            let until = match schedule.next(now) {
+                Next::Run(_) => return Ok(()),
+                Next::WaitUntil(at) => at.min(now + super::REPORT_EVERY),
+                Next::Idle => now + super::REPORT_EVERY,
+            };
+            let (clock, live_from) = (self.clock, self.live_from());
+            if self.diagnostic_from().is_some_and(|from| from <= now) || self.is_turn_of_deferred_read_back(now) {
+                return Ok(());
+            }
+            let live = async {
+                clock.sleep_until(live_from).await;
+                self.live.due(clock).await;
+            };
+            let request = tokio::select! {
+                biased;
+                _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
+                request = self.requests.recv() => request?,
+                () = live => return Ok(()),
+                () = clock.sleep_until(until) => continue,
+            };
+            self.requests.requeue_first(request);
+            return Ok(());
+        }
+    }
+}
