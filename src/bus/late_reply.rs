@@ -237,7 +237,7 @@ impl LineReplies {
     /// It has answered, and proves to be in sync if nothing more comes of it for so long; `None`: it is not about to.
     pub fn settles_in(&self, unit: u8, now: Duration) -> Option<Duration> {
         let unit = &self.units[usize::from(unit)];
-        let since = unit.settles_from.filter(|_| !unit.reorders)?;
+        let since = unit.settles_from.filter(|_| unit.proof == Proof::Silence && !unit.reorders)?;
         Some(unit.settling_time(self.timeout).saturating_sub(now.saturating_sub(since)))
     }
 

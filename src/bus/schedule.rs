@@ -162,7 +162,7 @@ impl Schedule {
             }
             // Where nothing else is due before its timeout, it may be asked at no cost.
             let idle_from = health.idle_at.max(health.rests_until).max(health.free_at);
-            let wait = self.patience.plant_span(self.response_timeout(index));
+            let wait = self.patience.plant_span(self.idle_timeout(index));
             if now < idle_from {
                 wake = Some(wake.map_or(idle_from, |wake| wake.min(idle_from)));
             } else if is_idle && free_until.is_none_or(|until| now + wait <= until) {
@@ -171,7 +171,11 @@ impl Schedule {
                 wake = Some(wake.map_or(from, |wake| wake.min(from)));
             }
         }
-        let best = best.or(idle.map(|(at, index)| ((STARVED, at), index)));
+        self.devices.iter_mut().for_each(|health| health.short = false);
+        if let Some((at, index)) = idle.filter(|_| best.is_none()) {
+            self.devices[self.polls[index].place].short = true;
+            best = Some(((STARVED, at), index));
+        }
         match (best, wake) {
             (Some((_, index)), _) => Next::Run(index),
             (None, Some(at)) => Next::WaitUntil(at),

@@ -18,7 +18,7 @@ pub enum Proof {
 }
 
 impl Proof {
-    pub fn next(self) -> Proof {
+    pub(super) fn next(self) -> Proof {
         match self {
             Proof::Part => Proof::Loopback,
             Proof::Loopback => Proof::Silence,

@@ -198,7 +198,7 @@ pub enum Refused {
 pub struct Conclusion {
     /// The plan must be made again.
     pub replan: bool,
-    /// These units have refused everything since their search began, which is not believed: a device that starts up does so.
+    /// These units have refused everything since the last search, which is not believed: a device that starts up does so.
     pub disbelieved: BTreeSet<u8>,
 }
 
@@ -213,7 +213,7 @@ pub struct RangeBisection {
     found: Vec<Obstacle>,
     /// Found once: unreadable if the next read that contains them is refused too.
     candidates: Vec<Obstacle>,
-    /// Units that have given a value since their search began.
+    /// Units that have given a value since something of them was found last.
     gives: BTreeSet<u8>,
     /// The most that a unit has given at once.
     given: BTreeMap<(u8, Table), u32>,
@@ -243,12 +243,11 @@ impl RangeBisection {
         if unreadable.touch(whole.unit, whole.table, whole.start, whole.end) {
             return Refused::Known;
         }
-        if !self.searches(whole.unit) {
-            self.gives.remove(&whole.unit);
-        }
         self.open.retain(|open| *open != whole);
+        // Without a value in between this refusal says no more than the last one.
+        let (gives, candidates) = (self.gives.contains(&whole.unit), self.candidates.iter());
         let confirmed: Vec<Obstacle> =
-            self.candidates.iter().filter(|candidate| whole.contains(&candidate.range)).copied().collect();
+            candidates.filter(|candidate| gives && whole.contains(&candidate.range)).copied().collect();
         match parts {
             Some((parts, between)) if confirmed.is_empty() => {
                 self.cuts.push((whole, between));
@@ -266,11 +265,6 @@ impl RangeBisection {
                 Refused::Alone
             }
         }
-    }
-
-    fn searches(&self, unit: u8) -> bool {
-        self.cuts.iter().any(|(whole, _)| whole.unit == unit)
-            || self.found.iter().any(|found| found.range.unit == unit)
     }
 
     /// A block was read. The unit has all of it.
@@ -295,9 +289,10 @@ impl RangeBisection {
         }
         self.explain_cuts();
         let (gives, candidates) = (&self.gives, &self.candidates);
-        let disbelieved: BTreeSet<u8> =
-            self.found.iter().map(|found| found.range.unit).filter(|unit| !gives.contains(unit)).collect();
-        self.found.retain(|found| gives.contains(&found.range.unit));
+        let (believed, disbelieved): (BTreeSet<u8>, BTreeSet<u8>) =
+            self.found.iter().map(|found| found.range.unit).partition(|unit| gives.contains(unit));
+        self.found.retain(|found| believed.contains(&found.range.unit));
+        self.gives.retain(|unit| !believed.contains(unit));
         let (confirmed, new): (Vec<Obstacle>, Vec<Obstacle>) =
             self.found.drain(..).partition(|found| candidates.iter().any(|known| known.range == found.range));
         self.candidates.retain(|candidate| !confirmed.iter().any(|known| known.range == candidate.range));

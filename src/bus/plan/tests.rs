@@ -160,8 +160,13 @@ fn bisection(def: &PlantDef, missing: &[u32], count_max: u32) -> (UnreadableRang
             search.answered(&block);
             assert!(!unreadable.disproved(&block));
         }
-        if search.conclude(&mut unreadable).replan {
+        let found = search.conclude(&mut unreadable);
+        if found.replan {
             todo = plan(&unreadable);
+        }
+        if !found.disbelieved.is_empty() {
+            // A device that refuses everything is left alone for a while.
+            break;
         }
     }
     (unreadable, asked)
@@ -369,6 +374,8 @@ proptest! {
     ) {
         let def = words(&addresses.iter().copied().collect::<Vec<u16>>());
         let missing: Vec<u32> = missing.into_iter().collect();
+        // A device that refuses everything is not believed.
+        prop_assume!(!def.tags.iter().all(|tag| missing.contains(&u32::from(tag.point.address))));
         let (unreadable, _) = bisection(&def, &missing, 125);
         for tag in &def.tags {
             let gone = missing.contains(&u32::from(tag.point.address));

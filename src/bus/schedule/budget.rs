@@ -15,7 +15,7 @@ pub const PROBE_SHARE: f64 = 0.05;
 /// What may be spent at once after a quiet time: some sixteen writes with their reading back at 9600 baud, or one timeout.
 const SAVED_MAX: Duration = Duration::from_secs(1);
 /// What waited for its timeout is not paid for longer than this, at the usual share.
-const OWED_MAX: Duration = Duration::from_secs(2);
+const OWED_MAX: Duration = Duration::from_secs(1);
 
 /// A bucket that fills with time: it allows spending while there is something in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,7 +106,7 @@ mod tests {
                 now += ms;
                 budget.spent(Duration::from_millis(ms), at(now));
             }
-            prop_assert!(budget.allows(at(now + 10_001)), "two seconds at a fifth");
+            prop_assert!(budget.allows(at(now + 5_001)), "a second at a fifth");
         }
     }
 }

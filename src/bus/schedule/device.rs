@@ -121,6 +121,10 @@ pub(super) struct Health {
     pub prompt: bool,
     /// The next try waits for the whole timeout.
     thorough: bool,
+    /// The next try waits no longer than the line has nothing else to do.
+    pub short: bool,
+    /// Tries since one has waited for the whole timeout.
+    short_tries: u32,
     /// The poll that it is asked with while it does not answer.
     pub probe: Option<usize>,
     /// Not to be asked before this moment.
@@ -144,6 +148,8 @@ impl Health {
             idle_at: now,
             prompt: false,
             thorough: false,
+            short: false,
+            short_tries: 0,
             probe: None,
             rests_until: now,
             free_at: now,
@@ -168,7 +174,7 @@ impl Health {
             self.answers = self.answers.saturating_add(1);
             self.slowest = self.slowest.max(response_time);
         }
-        (self.failures, self.probe_at, self.thorough) = (0, None, false);
+        (self.failures, self.short_tries, self.probe_at, self.thorough, self.short) = (0, 0, None, false, false);
         self.backoff.reset();
         std::mem::take(&mut self.down)
     }
@@ -196,6 +202,7 @@ impl Health {
             return false;
         }
         (self.failed_at, self.failures) = (now, self.failures.saturating_add(1));
+        self.short_tries = if self.waits_whole() { 0 } else { self.short_tries.saturating_add(1) };
         // One frame may have been lost.
         self.prompt = self.failures == 1 && failure.is_silence();
         self.thorough = false;
@@ -240,18 +247,26 @@ impl Health {
         (0 < self.answers).then_some(self.slowest)
     }
 
+    /// As it is asked where the line has nothing else to do.
+    pub fn for_idle_time(self) -> Health {
+        Health { short: true, ..self }
+    }
+
+    fn waits_whole(&self) -> bool {
+        !self.short && (self.thorough || WHOLE_TIMEOUT_EVERY <= self.short_tries + 1)
+    }
+
     /// How long an answer is waited for (real time), at most the timeout of the line. One that has never answered is waited
     /// for so long once; then as if it were as slow as the slowest `neighbour` that answers, if there is one.
     pub fn response_timeout(&self, patience: Patience, neighbour: impl FnOnce() -> Option<Duration>) -> Duration {
         let Patience { timeout, least, .. } = patience;
-        let whole = self.thorough || self.failures % WHOLE_TIMEOUT_EVERY == WHOLE_TIMEOUT_EVERY - 1;
         let slowest = match self.answers {
             0 if 0 < self.failures => neighbour().map(|neighbour| neighbour.max(self.slowest)),
             ANSWERS_MIN.. => Some(self.slowest),
             _ => None,
         };
         match slowest {
-            Some(slowest) if !whole => slowest.saturating_mul(SLOWER_MAX).max(least).min(timeout),
+            Some(slowest) if !self.waits_whole() => slowest.saturating_mul(SLOWER_MAX).max(least).min(timeout),
             _ => timeout,
         }
     }

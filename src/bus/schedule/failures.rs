@@ -97,6 +97,13 @@ impl Schedule {
         given_up
     }
 
+    /// How long the answer to a block of a device that does not answer is waited for (real time) where nothing else is due.
+    pub(super) fn idle_timeout(&self, index: usize) -> Duration {
+        let neighbour = || self.devices.iter().filter_map(Health::slowest).max();
+        let health = self.devices[self.polls[index].place].clone();
+        health.for_idle_time().response_timeout(self.patience, neighbour)
+    }
+
     /// How long another poll has waited by now.
     fn held_up(&self, index: Option<usize>, now: Timestamp) -> Duration {
         let others = (0..self.polls.len()).filter(|other| Some(*other) != index);

@@ -265,9 +265,9 @@ fn by_scan(schedule: &Schedule, now: Timestamp) -> Next {
             let Some(spot) = schedule.spot(index).filter(|_| health.probe_at.is_some() == probed) else { continue };
             let from = spot.from.max(health.free_at);
             let idle_from = health.idle_at.max(health.rests_until).max(health.free_at);
-            let fits = free_until.is_none_or(|until| now + schedule.response_timeout(index) <= until);
+            let fits = free_until.is_none_or(|until| now + schedule.idle_timeout(index) <= until);
             if from <= now {
-                if best.is_none_or(|(rank, _)| schedule.rank(spot, now) < rank) {
+                if best.is_none_or(|best| (schedule.rank(spot, now), index) < best) {
                     best = Some((schedule.rank(spot, now), index));
                 }
             } else if probed && now < idle_from {
