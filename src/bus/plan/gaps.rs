@@ -180,6 +180,8 @@ struct Obstacle {
     range: AddressRange,
     /// Registers or bits of the refused request.
     asked: u32,
+    /// The unit gave values between the refusals that led to it: it does not refuse everything.
+    sound: bool,
 }
 
 /// What is to be done about a refused request.
@@ -213,8 +215,9 @@ pub struct RangeBisection {
     found: Vec<Obstacle>,
     /// Found once: unreadable if the next read that contains them is refused too.
     candidates: Vec<Obstacle>,
-    /// Units that have given a value since something of them was found last.
+    /// Units that have given a value since something of them was found last, and since the search for it began.
     gives: BTreeSet<u8>,
+    gives_meanwhile: BTreeSet<u8>,
     /// The most that a unit has given at once.
     given: BTreeMap<(u8, Table), u32>,
 }
@@ -244,10 +247,12 @@ impl RangeBisection {
             return Refused::Known;
         }
         self.open.retain(|open| *open != whole);
-        // Without a value in between this refusal says no more than the last one.
-        let (gives, candidates) = (self.gives.contains(&whole.unit), self.candidates.iter());
+        if !self.searches(whole.unit) {
+            self.gives_meanwhile.remove(&whole.unit);
+        }
+        let candidates = self.candidates.iter().filter(|candidate| candidate.sound);
         let confirmed: Vec<Obstacle> =
-            candidates.filter(|candidate| gives && whole.contains(&candidate.range)).copied().collect();
+            candidates.filter(|candidate| whole.contains(&candidate.range)).copied().collect();
         match parts {
             Some((parts, between)) if confirmed.is_empty() => {
                 self.cuts.push((whole, between));
@@ -260,11 +265,16 @@ impl RangeBisection {
             }
             None => {
                 if !self.found.iter().any(|found| found.range == whole) {
-                    self.found.push(Obstacle { range: whole, asked: whole.count() });
+                    self.found.push(Obstacle { range: whole, asked: whole.count(), sound: false });
                 }
                 Refused::Alone
             }
         }
+    }
+
+    fn searches(&self, unit: u8) -> bool {
+        self.cuts.iter().any(|(whole, _)| whole.unit == unit)
+            || self.found.iter().any(|found| found.range.unit == unit)
     }
 
     /// A block was read. The unit has all of it.
@@ -275,6 +285,7 @@ impl RangeBisection {
     /// A range was read.
     pub fn answered_range(&mut self, whole: AddressRange) {
         self.gives.insert(whole.unit);
+        self.gives_meanwhile.insert(whole.unit);
         let given = self.given.entry((whole.unit, whole.table)).or_default();
         *given = whole.count().max(*given);
         self.open.retain(|open| *open != whole);
@@ -289,10 +300,13 @@ impl RangeBisection {
         }
         self.explain_cuts();
         let (gives, candidates) = (&self.gives, &self.candidates);
-        let (believed, disbelieved): (BTreeSet<u8>, BTreeSet<u8>) =
-            self.found.iter().map(|found| found.range.unit).partition(|unit| gives.contains(unit));
-        self.found.retain(|found| believed.contains(&found.range.unit));
-        self.gives.retain(|unit| !believed.contains(unit));
+        let (believed, doubted): (Vec<Obstacle>, Vec<Obstacle>) =
+            self.found.drain(..).partition(|found| found.sound || gives.contains(&found.range.unit));
+        let disbelieved = doubted.iter().map(|found| found.range.unit).collect();
+        let meanwhile = &self.gives_meanwhile;
+        let sound = |found: Obstacle| Obstacle { sound: meanwhile.contains(&found.range.unit), ..found };
+        self.found = believed.into_iter().map(sound).collect();
+        self.gives.retain(|unit| !self.found.iter().any(|found| found.range.unit == *unit));
         let (confirmed, new): (Vec<Obstacle>, Vec<Obstacle>) =
             self.found.drain(..).partition(|found| candidates.iter().any(|known| known.range == found.range));
         self.candidates.retain(|candidate| !confirmed.iter().any(|known| known.range == candidate.range));
@@ -312,13 +326,13 @@ impl RangeBisection {
     fn explain_cuts(&mut self) {
         for (whole, between) in std::mem::take(&mut self.cuts).into_iter().rev() {
             if !self.found.iter().any(|found| whole.contains(&found.range)) {
-                self.found.push(Obstacle { range: between, asked: whole.count() });
+                self.found.push(Obstacle { range: between, asked: whole.count(), sound: false });
             }
         }
     }
 
     fn learn(&self, obstacles: &[Obstacle], unreadable: &mut UnreadableRanges) {
-        for Obstacle { range, asked } in obstacles {
+        for Obstacle { range, asked, .. } in obstacles {
             let given = self.given.get(&(range.unit, range.table)).copied().unwrap_or_default();
             if range.start == range.end && given < *asked {
                 unreadable.limit(range.unit, range.table, to_u16(given));

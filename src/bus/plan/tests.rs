@@ -165,8 +165,9 @@ fn bisection(def: &PlantDef, missing: &[u32], count_max: u32) -> (UnreadableRang
             todo = plan(&unreadable);
         }
         if !found.disbelieved.is_empty() {
-            // A device that refuses everything is left alone for a while.
-            break;
+            // What was refused waits, and the others are read meanwhile.
+            todo.retain(|other| *other != block);
+            todo.insert(0, block);
         }
     }
     (unreadable, asked)
