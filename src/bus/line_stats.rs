@@ -15,6 +15,7 @@ use crate::plant::{
     def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
     device_time::{DeviceTime, SeenTime},
     event::{Fault, LineCounters},
+    line_finding::{LineFinding, OtherMasterHeard},
     line_report::{LineReport, PollReport},
     request_stats::{RequestStats, Spread},
     traffic::{Frame, Frames},
@@ -40,6 +41,10 @@ pub struct Plan<'a> {
     pub retries: Vec<(DeviceId, Timestamp)>,
     /// How the schedule copes; normal without a port.
     pub load: Load,
+    /// Another master asks on this line.
+    pub other_master: Option<OtherMasterHeard>,
+    /// What was found of devices and connections.
+    pub findings: Vec<LineFinding>,
 }
 
 /// Statistics of one line, kept when its port is reopened.
@@ -209,7 +214,7 @@ impl LineStats {
 
     /// All of it, for a snapshot.
     pub fn report(&self, def: &PlantDef, settings: &LineDef, plan: Plan, counters: LineCounters) -> Arc<LineReport> {
-        let Plan { blocks, polls, refused, retries, load } = plan;
+        let Plan { blocks, polls, refused, retries, load, other_master, findings } = plan;
         let poll = |(index, (block, stats)): (usize, (&Block, &RequestStats))| PollReport {
             class: block.class,
             factor: polls.get(index).map_or(1.0, |poll| poll.factor),
@@ -231,6 +236,8 @@ impl LineStats {
             admission: self.admission.clone(),
             refused,
             retries,
+            other_master,
+            findings,
             strain: (load != Load::Normal).then(|| load.to_string()),
             settings: settings.clone(),
             counters,
@@ -270,6 +277,8 @@ mod tests {
             refused: Vec::new(),
             retries: Vec::new(),
             load: Load::Normal,
+            other_master: None,
+            findings: Vec::new(),
         };
         let report = stats.report(&def, &def.lines[0], plan, counters);
         assert_eq!(report.polls[0].stats.requests, 1, "a block that stays keeps its stats");

@@ -22,6 +22,8 @@ pub struct LineDef {
     /// Silence that ends an answer which is not complete. Frames end by their length first; USB adapters hand bytes over
     /// in batches (16 ms is common) and gateways later still, so this is far more than 3.5 characters.
     pub frame_timeout: Duration,
+    /// A connection rests for so long before the first request: the device is deaf for a while (TCP; real time).
+    pub connect_delay: Duration,
     /// Time after a broadcast in which devices act on it (serial lines; Modbus over serial line V1.02, 2.4.1: 100–200 ms).
     pub turnaround: Duration,
     /// Another master polls it: it is heard, and nothing is ever sent.
@@ -38,6 +40,7 @@ impl LineDef {
             timeout: Duration::from_secs(1),
             gap: Duration::ZERO,
             frame_timeout: Duration::from_millis(50),
+            connect_delay: Duration::ZERO,
             turnaround: Duration::from_millis(100),
             listens: false,
         }

@@ -55,6 +55,7 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
         ("request_gap_ms", line.gap),
         ("frame_timeout_ms", line.frame_timeout),
         ("turnaround_ms", line.turnaround),
+        ("connect_delay_ms", line.connect_delay),
     ] {
         check(
             WAIT_MAX < span,

@@ -11,6 +11,7 @@ use super::{
     event::LineCounters,
     id::{DeviceId, TagId},
     line::LineDef,
+    line_finding::{LineFinding, OtherMasterHeard},
     request_stats::{RequestStats, Spread},
     tag::{Poll, PollClass, Table},
     traffic::Frames,
@@ -31,6 +32,10 @@ pub struct LineReport {
     pub retries: Vec<(DeviceId, Timestamp)>,
     /// How the schedule copes with too much to do, in words; `None` while every poll has its period.
     pub strain: Option<String>,
+    /// Another master asks on this line.
+    pub other_master: Option<OtherMasterHeard>,
+    /// What was found of devices and connections.
+    pub findings: Vec<LineFinding>,
     /// Whether all polls can meet their periods.
     pub admission: Admission,
     /// What each device of the line has answered.
@@ -59,6 +64,8 @@ impl LineReport {
             refused: Vec::new(),
             retries: Vec::new(),
             strain: None,
+            other_master: None,
+            findings: Vec::new(),
             admission: Admission::of_nothing(settings.id),
             devices: Vec::new(),
             device_times: Vec::new(),

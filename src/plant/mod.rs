@@ -19,6 +19,7 @@ pub mod role;
 pub mod sample;
 pub(crate) mod expr;
 pub mod line;
+pub mod line_finding;
 pub(crate) mod line_check;
 pub(crate) mod program;
 pub mod traffic;

@@ -12,7 +12,9 @@ use super::{
     schema::PlantFile,
 };
 use crate::plant::{
-    def::{AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Guidance, LineDef, Priority, Subject},
+    def::{
+        AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Framing, Guidance, LineDef, Priority, Subject,
+    },
     number::to_u16,
     station::StationFault,
     tag::TagDef,
@@ -43,7 +45,10 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
     let of_lines =
         defs.lines.iter().map(|line| (&line.name, if line.listens { no_traffic(line) } else { overloaded(line) }));
     let of_stated = defs.tags.iter().filter_map(|tag| Some((&tag.name, other_than_stated(tag)?)));
-    for (name, alarm) in of_devices.chain(of_timed).chain(of_lines).chain(of_stated) {
+    // Modbus TCP has connections, on which others do no harm.
+    let is_shared = |line: &&LineDef| !line.listens && line.transport.framing() != Framing::Mbap;
+    let of_shared = defs.lines.iter().filter(is_shared).map(|line| (&line.name, other_master(line)));
+    for (name, alarm) in of_devices.chain(of_timed).chain(of_lines).chain(of_shared).chain(of_stated) {
         if !alarms.iter().any(|own| (own.subject, own.condition) == (alarm.subject, alarm.condition)) {
             check_generated(tables, name, &alarm.message, problems);
             alarms.push(AlarmDef { id: AlarmId(to_u16(alarms.len())), ..alarm });
@@ -171,6 +176,7 @@ enum Own {
     OtherThanStated,
     NoTraffic,
     Overloaded,
+    OtherMaster,
 }
 
 impl Own {
@@ -181,6 +187,7 @@ impl Own {
             Own::OtherThanStated => "other than the plant file states",
             Own::NoTraffic => "no traffic heard",
             Own::Overloaded => "line overloaded",
+            Own::OtherMaster => "another master polls this line",
         }
     }
 
@@ -211,6 +218,11 @@ impl Own {
                 "the line is polled more often than it can carry, or its devices answer more slowly",
                 "alarm inputs are polled on time, other values less often; no device is faulty",
                 "see the Bus tab; poll less often, increase the baud rate, or split the line",
+            ],
+            Own::OtherMaster => [
+                "a PLC, a panel or a laptop is connected to the same line and sends requests of its own",
+                "requests collide, and what is read is not reliable: values become uncertain, then bad",
+                "find and stop the other master, or only listen to it (`listen = true` for the line)",
             ],
         }
     }
@@ -256,4 +268,9 @@ fn overloaded(line: &LineDef) -> AlarmDef {
         on_delay: Duration::from_secs(10),
         ..Own::Overloaded.alarm(Subject::Line(line.id), Condition::Overloaded, None)
     }
+}
+
+/// A line without transaction ids has one master.
+fn other_master(line: &LineDef) -> AlarmDef {
+    Own::OtherMaster.alarm(Subject::Line(line.id), Condition::OtherMaster, UNKNOWN_RESPONSE)
 }

@@ -64,7 +64,7 @@ fn or_usual<T: Into<Value>>(key: &'static str, value: T, usual: T) -> Entry {
 
 /// Keys that only a serial line has, and keys that only a TCP line has.
 const SERIAL: [&str; 7] = ["port", "baud", "data_bits", "parity", "stop_bits", "rs485", "turnaround_ms"];
-const TCP: [&str; 2] = ["host", "tcp_port"];
+const TCP: [&str; 3] = ["host", "tcp_port", "connect_delay_ms"];
 
 fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
     if settings.listens {
@@ -88,7 +88,11 @@ fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
             or_usual("turnaround_ms", ms(settings.turnaround), ms(usual.turnaround)),
         ]),
         Transport::Tcp { host, port, framing: _ } => {
-            entries.extend([entry("host", host.as_str()), or_usual("tcp_port", i64::from(*port), i64::from(TCP_PORT))])
+            entries.extend([
+                entry("host", host.as_str()),
+                or_usual("tcp_port", i64::from(*port), i64::from(TCP_PORT)),
+                or_usual("connect_delay_ms", ms(settings.connect_delay), ms(usual.connect_delay)),
+            ])
         }
     }
     entries.extend([

@@ -106,6 +106,7 @@ fn tcp(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut
         timeout: millis(table.timeout_ms, usual.timeout),
         gap: millis(table.request_gap_ms, usual.gap),
         frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout),
+        connect_delay: millis(table.connect_delay_ms, usual.connect_delay),
         ..usual
     };
     report_wrong(&line, |key| table.span_of(key), problems);

@@ -82,6 +82,7 @@ toml_tables! {
         opt "timeout_ms" timeout_ms: u16,
         opt "request_gap_ms" request_gap_ms: u16,
         opt "frame_timeout_ms" frame_timeout_ms: u16,
+        opt "connect_delay_ms" connect_delay_ms: u16,
     }
 
     /// A `[[line]]` of another master on a serial port, which is read only.

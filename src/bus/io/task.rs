@@ -75,6 +75,10 @@ pub async fn run(
         hangups: Hangups::default(),
         in_flight: InFlight::default(),
         unheard: 0,
+        opened_at: clock.now(),
+        heard: false,
+        timeouts_before: 0,
+        deaf: None,
         refused_all: BTreeMap::new(),
         schedule: Schedule::new(&blocks, clock.now()),
         memory: LineMemory::new(def.line(line), clock).expect(&blocks),
@@ -133,6 +137,12 @@ struct Task<'a> {
     in_flight: InFlight,
     /// Connections in a row that were given up because nothing was ever answered.
     unheard: u32,
+    /// When the present connection was opened, and whether something was answered on it.
+    opened_at: Timestamp,
+    heard: bool,
+    timeouts_before: u64,
+    /// How long the last connections were deaf after they were opened, in a row.
+    deaf: Option<(Duration, u32)>,
     /// Units that refuse everything, and how long they are left alone.
     refused_all: BTreeMap<u8, Backoff>,
     /// Whose turn it is; what is known of blocks and devices outlives an opening.
@@ -238,7 +248,8 @@ impl Task<'_> {
             link.allow(device.unit, self.in_flight.limit(device.unit, device.limits.in_flight_max))
         });
         link.set_alone(!self.hangups.is_clear());
-        self.closed_at = self.clock.now();
+        (self.closed_at, self.opened_at, self.heard) = (self.clock.now(), self.clock.now(), false);
+        self.timeouts_before = link.counters().timeouts;
         let Err(exit) = self.serve_loop(&mut link, schedule).await;
         self.collect_stats(&mut link);
         (link.answers(), exit)
@@ -257,6 +268,7 @@ impl Task<'_> {
             self.receive_replies(link, schedule).await?;
             self.check_connection(link)?;
             self.check_used_up(link)?;
+            self.check_deafness(link);
             let now = self.clock.now();
             if report_at <= now {
                 report_at = now + REPORT_EVERY;
@@ -412,6 +424,8 @@ impl Task<'_> {
             refused: plan::refused(&self.def, self.line, &self.unreadable),
             retries: schedule.map(Schedule::retries).unwrap_or_default(),
             load: schedule.map_or(Load::Normal, Schedule::load),
+            other_master: self.memory.other_master(),
+            findings: self.findings(),
         };
         let report = self.stats.report(&self.def, &self.settings, plan, self.memory.counters);
         self.publish(Event::Report { at: self.clock.now(), line: self.line, report }).await

@@ -14,11 +14,13 @@ use crate::{
         ascii,
         frame::{self, Unsolicited},
         late_reply::LineReplies,
+        other_master::OtherMaster,
         plan::Block,
     },
     plant::{
         def::{Framing, LineDef},
         event::LineCounters,
+        line_finding::OtherMasterHeard,
         number::{to_u16, to_u32},
         traffic::{FRAMES_MAX, Frame, FrameFault, FrameResult},
     },
@@ -27,6 +29,9 @@ use crate::{
 /// More stray bytes are judged without waiting for silence.
 const STRAY_MAX: usize = 4 * frame::MESSAGE_MAX;
 
+/// A line is heard for so long before the first request on it: another master may be at work.
+const FIRST_LISTEN: Duration = Duration::from_millis(300);
+
 /// What a line remembers from one opening of its port to the next.
 #[derive(Debug, Clone)]
 pub struct LineMemory {
@@ -34,6 +39,7 @@ pub struct LineMemory {
     pub counters: LineCounters,
     /// Outstanding replies of each unit.
     replies: LineReplies,
+    other_master: OtherMaster,
     created_at: Instant,
 }
 
@@ -44,8 +50,14 @@ impl LineMemory {
         LineMemory {
             counters: LineCounters::default(),
             replies: LineReplies::new(line.timeout, seed),
+            other_master: OtherMaster::default(),
             created_at: Instant::now(),
         }
+    }
+
+    /// See [`OtherMaster::heard`].
+    pub fn other_master(&mut self) -> Option<OtherMasterHeard> {
+        self.other_master.heard(self.created_at.elapsed())
     }
 
     /// These blocks will be asked for.
@@ -73,6 +85,7 @@ pub struct Wire {
     created_at: Instant,
     /// Outstanding replies of each unit.
     pub replies: LineReplies,
+    other_master: OtherMaster,
     /// Bytes that no request waits for, until silence shows that their frame has ended.
     stray: Vec<u8>,
     /// Bytes that are further apart than this (real time) are of two frames.
@@ -90,7 +103,7 @@ pub struct Wire {
 impl Wire {
     /// A freshly opened port; `memory` goes on from an earlier opening.
     pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: LineMemory) -> Wire {
-        let LineMemory { counters, mut replies, created_at } = memory;
+        let LineMemory { counters, mut replies, other_master, created_at } = memory;
         let (char_time, silent_interval) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
             Some(serial) if line.transport.framing() == Framing::Ascii => (serial.char_time(), line.gap),
@@ -99,8 +112,13 @@ impl Wire {
         };
         let framing = line.transport.framing();
         replies.set_line(line.timeout, framing == Framing::Mbap);
-        // What was asked before an earlier port went away may still be answered.
-        let may_come = framing != Framing::Mbap && 0 < counters.requests;
+        // What was asked before an earlier port went away may still be answered; at the start another master may be heard.
+        let rest = match (framing, counters.requests) {
+            (Framing::Mbap, _) => Duration::ZERO,
+            (_, 0) if line.transport.serial().is_none() => Duration::ZERO,
+            (_, 0) => line.timeout.min(FIRST_LISTEN),
+            (_, 1..) => line.timeout,
+        };
         Wire {
             port,
             pause,
@@ -109,10 +127,11 @@ impl Wire {
             char_time: clock.real_span(char_time),
             silent_interval: clock.real_span(silent_interval),
             timeout: line.timeout,
-            quiet_until: Instant::now() + if may_come { line.timeout } else { Duration::ZERO },
+            quiet_until: Instant::now() + rest.max(line.connect_delay),
             left_at: Instant::now(),
             created_at,
             replies,
+            other_master,
             stray: Vec::new(),
             frame_timeout: clock.real_span(silent_interval).max(line.frame_timeout),
             frames: Vec::new(),
@@ -139,7 +158,8 @@ impl Wire {
 
     /// What is remembered until the next opening.
     pub fn memory(&self) -> LineMemory {
-        LineMemory { counters: self.counters, replies: self.replies.clone(), created_at: self.created_at }
+        let (counters, created_at) = (self.counters, self.created_at);
+        LineMemory { counters, replies: self.replies.clone(), other_master: self.other_master.clone(), created_at }
     }
 
     /// Nothing is sent for this long (real time).
@@ -289,6 +309,7 @@ impl Wire {
                 self.unsolicited.push(unit);
             }
             if asks {
+                self.other_master.on_request(message, age);
                 self.replies.mark_all_unproven();
             }
         }

@@ -30,6 +30,27 @@ pub struct UnreadableRanges {
     most: BTreeMap<(u8, Table), u16>,
 }
 
+/// Something that a unit does not give.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unreadable {
+    /// More than this at once.
+    More {
+        /// The table.
+        table: Table,
+        /// Registers or bits.
+        most: u16,
+    },
+    /// These; none is a boundary that no request may cross.
+    Range {
+        /// The table.
+        table: Table,
+        /// The first.
+        address: u16,
+        /// How many.
+        count: u16,
+    },
+}
+
 impl UnreadableRanges {
     /// Remembers an unreadable range from `start` up to before `end`.
     pub fn add(&mut self, unit: u8, table: Table, start: u32, end: u32) {
@@ -50,6 +71,18 @@ impl UnreadableRanges {
     /// Most registers or bits that a unit gives at once, if it gives less than was asked for.
     pub fn most(&self, unit: u8, table: Table) -> Option<u16> {
         self.most.get(&(unit, table)).copied()
+    }
+
+    /// All that is known of a unit.
+    pub fn of(&self, unit: u8) -> impl Iterator<Item = Unreadable> {
+        let most = self.most.range((unit, Table::Coil)..=(unit, Table::Holding));
+        let most = most.map(|((_, table), most)| Unreadable::More { table: *table, most: *most });
+        let ranges = self.ends.range((unit, Table::Coil, 0)..=(unit, Table::Holding, u32::MAX));
+        most.chain(ranges.map(|((_, table, start), end)| Unreadable::Range {
+            table: *table,
+            address: to_u16(*start),
+            count: to_u16(end - start),
+        }))
     }
 
     /// Would a read from `start` up to before `end` touch a gap?

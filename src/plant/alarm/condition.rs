@@ -42,6 +42,8 @@ pub enum Condition {
     NotConnected,
     /// The line has no time for all of its polls: some are read less often.
     Overloaded,
+    /// Another master asks on the line, which this station polls.
+    OtherMaster,
     /// The station has this fault.
     Station(StationFault),
 }
@@ -118,6 +120,8 @@ impl Condition {
             | Condition::SlowerThanStated
             | Condition::NotConnected
             | Condition::Overloaded
+        | Condition::OtherMaster
+            | Condition::OtherMaster
             | Condition::Station(_) => none,
         }
     }

@@ -81,11 +81,15 @@ impl Plant {
             (Subject::Device(device), _) => {
                 let report = lines[def.device(device).line.index()].report.as_deref();
                 let no_values = report.is_some_and(|report| report.gives_no_values(device));
-                answers(devices[device.index()].state, no_values).map(|answers| !answers)
+                let state = devices[device.index()].state;
+                let failing = matches!(state, DeviceState::Failing(_));
+                let no_values = no_values || failing && image.has_only_bad(device);
+                answers(state, no_values).map(|answers| !answers)
             }
             // A plant that is played faster overloads the machine that plays it, not its lines.
             (Subject::Line(_), Condition::Overloaded) if 1.0 < speed => Some(false),
             (Subject::Line(line), Condition::Overloaded) => is_overloaded(&lines[line.index()]),
+            (Subject::Line(line), Condition::OtherMaster) => has_other_master(&lines[line.index()]),
             (Subject::Line(line), _) => is_lost(&lines[line.index()]),
             (Subject::Station, Condition::Station(fault)) => Some(faults.is_active(fault)),
             (Subject::Tag(_) | Subject::Station, _) => None,
@@ -93,7 +97,23 @@ impl Plant {
         let mut events = self.alarm_manager.evaluate(self.at, |alarm| facts(image, ill(alarm), alarm));
         events.iter_mut().for_each(|event| explain(event, faults));
         events.iter_mut().for_each(|event| self.explain_slow(event));
+        events.iter_mut().for_each(|event| self.explain_other_master(event));
         events
+    }
+
+    /// Adds what is heard of another master to its alarm event.
+    fn explain_other_master(&self, event: &mut AlarmRecord) {
+        let of_event = |alarm: &&AlarmDef| {
+            let line = match alarm.subject {
+                Subject::Line(line) if alarm.condition == Condition::OtherMaster => self.def.line(line),
+                _ => return false,
+            };
+            (&*line.name, &*alarm.message) == (&*event.subject, &*event.message)
+        };
+        let alarm = self.def.alarms.iter().find(of_event).filter(|_| event.event == AlarmEvent::Raised);
+        let Some(Subject::Line(line)) = alarm.map(|alarm| alarm.subject) else { return };
+        let heard = self.lines[line.index()].report.as_deref().and_then(|report| report.other_master);
+        event.reason = heard.map(|heard| heard.to_string().into());
     }
 
     /// Adds what a slow device takes to its alarm event.
@@ -111,6 +131,12 @@ impl Plant {
         let reason = report.and_then(|report| Reason::above_stated(report.device_time(device)?));
         event.reason = reason.map(|reason| reason.to_string().into());
     }
+}
+
+/// Only heard while the line is connected.
+fn has_other_master(line: &LineStatus) -> Option<bool> {
+    let report = line.report.as_ref().filter(|_| line.state == LineState::Connected);
+    report.map(|report| report.other_master.is_some())
 }
 
 /// Adds the detail of a station fault to its alarm event.

@@ -5,11 +5,16 @@ use crate::{
     bus::{
         hangup::Hangup,
         io::link::Link,
-        plan::Block,
+        plan::{Block, Unreadable},
         schedule::{Failure, Next, Schedule},
     },
-    plant::event::Fault,
+    plant::{event::Fault, line_finding::LineFinding, time::elapsed},
 };
+
+/// Connections in a row that were deaf at first.
+const DEAF_TIMES: u32 = 2;
+/// More unreadable ranges of a device are not listed.
+const FINDINGS_MAX: usize = 50;
 
 impl Task<'_> {
     /// A connection over a network is gone. The block that has ended it is named and waits; `true` if another connection may take its
@@ -49,6 +54,42 @@ impl Task<'_> {
             tracing::warn!(unit = block.unit, most, "requests beside others are lost: in_flight_max is lowered");
             link.allow(block.unit, most);
         }
+    }
+
+    /// The first answer over a connection shows how long the other side was deaf.
+    pub(super) fn check_deafness(&mut self, link: &mut Link) {
+        let network = self.settings.transport.serial().is_none();
+        if self.heard || !network || link.answers() == 0 {
+            return;
+        }
+        self.heard = true;
+        let unanswered = link.counters().timeouts - self.timeouts_before;
+        let waited = elapsed(self.opened_at, self.clock.now()).max(self.settings.connect_delay);
+        self.deaf = match self.deaf {
+            Some((longest, count)) if 0 < unanswered => Some((longest.max(waited), count.saturating_add(1))),
+            None if 0 < unanswered => Some((waited, 1)),
+            Some(_) | None => None,
+        };
+    }
+
+    /// What was found of devices and connections.
+    pub(super) fn findings(&self) -> Vec<LineFinding> {
+        let mut findings = Vec::new();
+        findings.extend(self.hangups.answers_max().map(LineFinding::AnswersPerConnection));
+        let deaf = self.deaf.filter(|(_, count)| DEAF_TIMES <= *count);
+        findings.extend(deaf.map(|(longest, _)| LineFinding::DeafAfterConnect(longest)));
+        for device in self.def.devices.iter().filter(|device| device.line == self.line) {
+            let (id, stated) = (device.id, device.limits.in_flight_max);
+            let found = self.in_flight.found(device.unit).filter(|most| *most < stated);
+            findings.extend(found.map(|most| LineFinding::InFlight { device: id, most, stated }));
+            findings.extend(self.unreadable.of(device.unit).take(FINDINGS_MAX).map(|obstacle| match obstacle {
+                Unreadable::More { table, most } => LineFinding::ReadMost { device: id, table, most },
+                Unreadable::Range { table, address, count } => {
+                    LineFinding::Unreadable { device: id, table, address, count }
+                }
+            }));
+        }
+        findings
     }
 
     /// May the other side have had enough of this connection?
