@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::{frame, framing::FrameMatch};
 use crate::plant::{
+    def::Framing,
     event::Fault,
     number::{to_u8, to_u16},
 };
@@ -70,7 +71,7 @@ pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
                 continue;
             }
         };
-        return match frame::check_answer(message, &answer) {
+        return match frame::check_answer(Framing::Ascii, message, &answer) {
             Ok(()) | Err(Fault::Exception(_)) => FrameMatch::Answer(frame),
             Err(fault) => FrameMatch::Foreign(frame.end, fault),
         };

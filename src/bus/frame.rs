@@ -2,6 +2,8 @@
 //!
 //! A *message* is unit and PDU without any check: `01 03 03 EA 00 01`. RTU appends a CRC, TCP prepends the MBAP header.
 
+mod mbap;
+
 use super::{
     ascii,
     pdu::{self, Item, Length},
@@ -11,6 +13,8 @@ use crate::plant::{
     event::{ExceptionCode, Fault},
     number::to_u16,
 };
+
+pub use mbap::{Mbap, ShortException, is_out_of_sync, mbap, short_exception};
 
 /// Longest message: unit and 253 bytes of PDU.
 pub const MESSAGE_MAX: usize = 254;
@@ -84,46 +88,6 @@ pub fn unit_of(framing: Framing, frame: &[u8]) -> Option<u8> {
         Framing::Rtu => frame.first().copied(),
         Framing::Ascii => u8::from_str_radix(std::str::from_utf8(frame.get(1..3)?).ok()?, 16).ok(),
         Framing::Mbap => frame.get(6).copied(),
-    }
-}
-
-/// What stands at the beginning of a TCP stream.
-#[derive(Debug, PartialEq, Eq)]
-pub enum Mbap {
-    /// Not all of it has come yet.
-    Incomplete,
-    /// A whole frame: its transaction and the end of its message (which begins at byte 6).
-    Whole {
-        /// Transaction id.
-        transaction: u16,
-        /// End of the message in the buffer.
-        end: usize,
-    },
-    /// No MBAP header: the stream is out of sync and must be closed.
-    Broken,
-}
-
-/// Looks at the beginning of a TCP stream.
-pub fn mbap(buffer: &[u8]) -> Mbap {
-    let Some((header, _)) = buffer.split_first_chunk::<6>() else { return Mbap::Incomplete };
-    let length = usize::from(u16::from_be_bytes([header[4], header[5]]));
-    if header[2..4] != [0, 0] || !(2..=MESSAGE_MAX).contains(&length) {
-        return Mbap::Broken;
-    }
-    if buffer.len() < 6 + length {
-        return Mbap::Incomplete;
-    }
-    Mbap::Whole { transaction: u16::from_be_bytes([header[0], header[1]]), end: 6 + length }
-}
-
-/// Does a TCP stream go on with anything but whole frames and the beginning of one?
-pub fn is_out_of_sync(mut stream: &[u8]) -> bool {
-    loop {
-        match mbap(stream) {
-            Mbap::Whole { end, .. } => stream = &stream[end..],
-            Mbap::Incomplete => return stream.get(2..4).is_some_and(|protocol| protocol != [0, 0]),
-            Mbap::Broken => return true,
-        }
     }
 }
 
@@ -208,8 +172,9 @@ impl ResponseSignature {
 }
 
 /// Checks a whole answer message, free of line errors, against its request: unit, function, byte count, echo.
-/// An exception answer is [`Fault::Exception`].
-pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
+/// An exception answer is [`Fault::Exception`]; over Modbus TCP, where the header says where it ends, some devices send more
+/// bytes behind its code.
+pub fn check_answer(framing: Framing, request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     let (&[asked_unit, asked, ..], &[unit, function, ..]) = (request, answer) else {
         return Err(Fault::Truncated { got: to_u16(answer.len()), expected: 3 });
     };
@@ -219,6 +184,7 @@ pub fn check_answer(request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     if function == asked | 0x80 {
         return match answer {
             [_, _, code] => Err(Fault::Exception(ExceptionCode(*code))),
+            [_, _, code, ..] if framing == Framing::Mbap => Err(Fault::Exception(ExceptionCode(*code))),
             _ => Err(Fault::WrongLength { got: to_u16(answer.len()), asked: 3 }),
         };
     }
@@ -290,13 +256,13 @@ mod tests {
         let of = |wanted: &'static str| rows.iter().filter(move |row| row.1 == wanted);
         for (id, _, answer, _) in of("response") {
             for (other, _, request, _) in of("request") {
-                let verdict = check_answer(request, answer);
+                let verdict = check_answer(Framing::Rtu, request, answer);
                 assert_eq!(verdict.is_ok(), id == other, "{id} as an answer to {other}: {verdict:?}");
             }
         }
         let (_, _, request, _) = of("request").find(|row| row.0 == "illegal-address").unwrap();
         let (_, _, exception, _) = of("exception").next().unwrap();
-        assert_eq!(check_answer(request, exception), Err(Fault::Exception(ExceptionCode(2))));
+        assert_eq!(check_answer(Framing::Rtu, request, exception), Err(Fault::Exception(ExceptionCode(2))));
     }
 
     #[test]
@@ -309,25 +275,9 @@ mod tests {
             (&[1, 3, 2, 0, 1, 0, 2], Fault::WrongLength { got: 2, asked: 4 }),
             (&[1, 0x83, 2], Fault::Exception(ExceptionCode(2))),
         ] {
-            assert_eq!(check_answer(&request, answer), Err(fault));
+            assert_eq!(check_answer(Framing::Rtu, &request, answer), Err(fault));
         }
-        assert_eq!(check_answer(&[1, 6, 0, 1, 0, 3], &[1, 6, 0, 1, 0, 4]), Err(Fault::WrongEcho));
-    }
-
-    #[test]
-    fn a_tcp_stream_is_cut_by_its_header() {
-        let frame = with_mbap(7, &[1, 3, 2, 0, 5]);
-        assert_eq!(mbap(&frame), Mbap::Whole { transaction: 7, end: 11 });
-        for cut in 0..frame.len() {
-            assert_eq!(mbap(&frame[..cut]), Mbap::Incomplete, "cut at {cut}");
-        }
-        assert_eq!(mbap(&[0, 1, 9, 9, 0, 5]), Mbap::Broken);
-        assert_eq!(mbap(&[0, 1, 0, 0, 255, 255]), Mbap::Broken);
-        let two = [&frame[..], &frame].concat();
-        for cut in 0..two.len() {
-            assert!(!is_out_of_sync(&two[..cut]), "cut at {cut}");
-        }
-        assert!(is_out_of_sync(&[&frame[..], &[0, 1, 9, 9]].concat()));
+        assert_eq!(check_answer(Framing::Rtu, &[1, 6, 0, 1, 0, 3], &[1, 6, 0, 1, 0, 4]), Err(Fault::WrongEcho));
     }
 
     #[test]

@@ -23,12 +23,12 @@ pub enum FrameMatch {
 pub fn find_answer(framing: Framing, message: &[u8], buffer: &[u8]) -> FrameMatch {
     match framing {
         Framing::Ascii => ascii::find_answer(message, buffer),
-        Framing::Rtu | Framing::Mbap => in_bytes(message, buffer),
+        Framing::Rtu | Framing::Mbap => in_bytes(framing, message, buffer),
     }
 }
 
 /// Looks for a frame with a good CRC at the beginning, then behind noise.
-fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
+fn in_bytes(framing: Framing, message: &[u8], buffer: &[u8]) -> FrameMatch {
     let begins = |rest: &[u8]| match (rest, message) {
         ([unit, function, ..], [asked_unit, asked, ..]) => unit == asked_unit && function & 0x7F == *asked,
         _ => false,
@@ -36,7 +36,7 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
     for start in 0..buffer.len() {
         let Some(Ok(answer)) = full_frame(&buffer[start..]).map(frame::without_crc) else { continue };
         let end = start + answer.len() + 2;
-        match frame::check_answer(message, answer) {
+        match frame::check_answer(framing, message, answer) {
             Ok(()) | Err(Fault::Exception(_)) => return FrameMatch::Answer(start..end),
             // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
             Err(_) if (0..start).any(|earlier| begins(&buffer[earlier..])) => {}

@@ -287,7 +287,7 @@ impl Listener {
         let echoes = pdu::function(message[1]).is_none_or(|function| function.echoes);
         // A master that repeats a request waits for its own timeout before.
         let repeated = same && (!echoes || self.timeout < elapsed(open.at, first));
-        let fits = matches!(frame::check_answer(asked, message), Ok(()) | Err(Fault::Exception(_)));
+        let fits = matches!(frame::check_answer(self.framing, asked, message), Ok(()) | Err(Fault::Exception(_)));
         fits && is_response(message) && !repeated
     }
 
@@ -334,7 +334,7 @@ impl Listener {
 
     fn response(&mut self, open: Open, message: &[u8], bytes: Vec<u8>, first: Timestamp, at: Timestamp) -> Heard {
         self.totals.responses += 1;
-        let outcome = frame::check_answer(&open.message, message);
+        let outcome = frame::check_answer(self.framing, &open.message, message);
         let time = Some(elapsed(open.at, first)).filter(|time| !time.is_zero());
         self.units.entry(message[0]).or_default().count(outcome, time);
         let proven = self.framing == Framing::Mbap || !self.replies.is_ambiguous(&open.message);

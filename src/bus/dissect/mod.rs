@@ -90,7 +90,7 @@ pub fn dissect(
     // Bytes without unit and function have no direction.
     let direction = direction.filter(|_| 2 <= envelope.message.len());
     let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
-        let fault = frame::check_answer(asked, &envelope.message).err()?;
+        let fault = frame::check_answer(envelope.framing.unwrap_or(Framing::Rtu), asked, &envelope.message).err()?;
         (!matches!(fault, crate::plant::event::Fault::Exception(_))).then(|| fault.to_string())
     });
     let wrong = envelope.fault.clone().or(reading.trouble).or(wrong);

@@ -152,7 +152,7 @@ fn exchange_of(heard: &Heard) -> Option<(Exchange, Messages)> {
         Heard::Frame(heard) => {
             let Role::Response { request, time, proven } = &heard.role else { return None };
             let message = frame::unwrap(heard.frame.framing, &heard.frame.bytes).ok()?;
-            let checked = frame::check_answer(request, &message);
+            let checked = frame::check_answer(heard.frame.framing, request, &message);
             let outcome = if *proven { checked } else { checked.and(Err(Fault::OutOfSync)) };
             (heard.frame.at, heard.frame.framing, request, Some((&heard.frame, message)), *time, outcome)
         }

@@ -122,7 +122,7 @@ fn verdict(framing: Framing, request: &[u8], bytes: &[u8]) -> Result<String, Str
     if framing == Framing::Mbap && frame::mbap(bytes) == frame::Mbap::Broken {
         return Err("no Modbus TCP header".to_owned());
     }
-    match frame::unwrap(framing, bytes).and_then(|answer| frame::check_answer(request, &answer)) {
+    match frame::unwrap(framing, bytes).and_then(|answer| frame::check_answer(framing, request, &answer)) {
         Ok(()) => Ok("ok".to_owned()),
         // A refusal is an answer.
         Err(fault @ Fault::Exception(_)) => Ok(fault.to_string()),

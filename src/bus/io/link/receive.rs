@@ -70,7 +70,7 @@ impl Link {
                     let frame: Arc<[u8]> = buffer[range].into();
                     self.wire.record(false, frame.clone(), FrameResult::Good);
                     let answer = frame::unwrap(framing, &frame)
-                        .and_then(|answer| frame::check_answer(message, &answer).map(|()| answer));
+                        .and_then(|answer| frame::check_answer(framing, message, &answer).map(|()| answer));
                     return Ok(Received { answer, frame, response_time });
                 }
                 FrameMatch::Foreign(end, fault) => {
