@@ -98,6 +98,8 @@ pub struct Link {
     took: Duration,
     /// Answers before it was opened.
     answers_before: u64,
+    /// Bytes may be delayed by a network.
+    is_network: bool,
 }
 
 impl Link {
@@ -121,6 +123,7 @@ impl Link {
             busy: Duration::ZERO,
             took: Duration::ZERO,
             answers_before: answers(&wire.counters),
+            is_network: line.transport.serial().is_none(),
             wire,
         }
     }

@@ -83,6 +83,8 @@ impl Link {
                 FrameMatch::Nothing => deadline,
                 // The frame may still grow, or it is corrupt; silence decides.
                 FrameMatch::Begun if framing == Framing::Ascii => (Instant::now() + ASCII_PAUSE).min(deadline),
+                // A network may hold the rest of a frame back as long as any answer.
+                FrameMatch::Begun if self.is_network => deadline,
                 FrameMatch::Begun | FrameMatch::Corrupt(_) => (Instant::now() + self.frame_timeout).min(deadline),
             };
             if self.wire.receive(wait_until, &mut buffer).await? && buffer.len() <= RECEIVE_MAX {

@@ -6,10 +6,14 @@
 //! ```
 
 mod busy;
+mod under_way;
 
-use std::{collections::VecDeque, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use tokio::time::Instant;
+
+pub use under_way::Transactions;
+use under_way::{Owner, SHORT_WAIT, Transaction};
 
 use super::{FrameFault, FrameResult, Link, LinkError};
 use crate::{
@@ -17,8 +21,8 @@ use crate::{
     plant::{def::Framing, event::Fault, traffic::Exchange},
 };
 
-/// Ids of requests that were given up are remembered, and not used again, as long as there are no more than these.
-const GIVEN_UP_MAX: usize = 256;
+/// So many bytes that are no frame are shown.
+const SHOWN_MAX: usize = 24;
 /// Looked at again after this time at the latest.
 const LOOK_AGAIN: Duration = Duration::from_secs(3_600);
 
@@ -33,157 +37,6 @@ pub struct Ended {
     pub at: Instant,
     /// Both as they were on the wire.
     pub exchange: Arc<Exchange>,
-}
-
-/// A request that is under way.
-#[derive(Debug)]
-struct Transaction {
-    id: u16,
-    /// Unit and PDU.
-    message: Vec<u8>,
-    frame: Arc<[u8]>,
-    timeout: Duration,
-    /// `None` until it is flushed.
-    sent_at: Option<Instant>,
-    /// The last answer to a request that was sent before it.
-    begun_at: Instant,
-}
-
-impl Transaction {
-    fn is_to(&self, unit: u8) -> bool {
-        self.message.first() == Some(&unit)
-    }
-
-    /// Its time runs from when the device could begin with it: what was sent before it may have been answered first.
-    fn deadline(&self) -> Option<Instant> {
-        Some(self.sent_at?.max(self.begun_at) + self.timeout)
-    }
-}
-
-/// Whose answer a transaction id announces.
-#[derive(Debug)]
-enum Owner {
-    UnderWay(Transaction),
-    /// The request to this unit was given up.
-    Late(u8),
-    Unknown,
-}
-
-/// The requests under way on one connection.
-#[derive(Debug)]
-pub(super) struct Transactions {
-    last_id: u16,
-    under_way: Vec<Transaction>,
-    /// The latest that are not waited for any longer: id, and the unit if it did not answer in time.
-    given_up: VecDeque<(u16, Option<u8>)>,
-    /// By unit: how many may be under way beside one to this unit, that one included.
-    limits: [u16; 256],
-    /// Only one may be under way at all.
-    alone: bool,
-    /// Bytes of a frame that has not come as a whole.
-    inbox: Vec<u8>,
-    /// Requests that wait for their place in the next write.
-    outbox: Vec<u8>,
-    /// A write has begun and has not ended.
-    sending: bool,
-    ended: Vec<Ended>,
-    /// Since when the line is busy.
-    busy_since: Option<Instant>,
-    /// When the last silence was counted: what was under way then adds nothing.
-    silence_at: Option<Instant>,
-}
-
-impl Transactions {
-    pub fn new() -> Transactions {
-        Transactions {
-            last_id: 0,
-            under_way: Vec::new(),
-            given_up: VecDeque::new(),
-            limits: [1; 256],
-            alone: false,
-            inbox: Vec::new(),
-            outbox: Vec::new(),
-            sending: false,
-            ended: Vec::new(),
-            busy_since: None,
-            silence_at: None,
-        }
-    }
-
-    /// The most that may be under way now.
-    fn limit(&self) -> usize {
-        if self.alone {
-            return 1;
-        }
-        let units = self.under_way.iter().filter_map(|request| request.message.first());
-        units.map(|unit| usize::from(self.limits[usize::from(*unit)])).min().unwrap_or(usize::MAX)
-    }
-
-    fn has_room(&self, unit: u8) -> bool {
-        self.under_way.len() < self.limit().min(self.limits[usize::from(unit)].into())
-    }
-
-    fn begin(&mut self, message: &[u8], timeout: Duration, now: Instant) -> u16 {
-        self.last_id = self.last_id.wrapping_add(1);
-        while self.under_way.iter().any(|request| request.id == self.last_id)
-            || self.given_up.iter().any(|(id, _)| *id == self.last_id)
-        {
-            self.last_id = self.last_id.wrapping_add(1);
-        }
-        let (id, frame) = (self.last_id, frame::with_mbap(self.last_id, message));
-        self.outbox.extend_from_slice(&frame);
-        self.under_way.push(Transaction { id, message: message.to_vec(), frame: frame.into(), timeout, sent_at: None, begun_at: now });
-        id
-    }
-
-    fn take(&mut self, id: u16) -> Owner {
-        if let Some(place) = self.under_way.iter().position(|request| request.id == id) {
-            return Owner::UnderWay(self.under_way.swap_remove(place));
-        }
-        let place = self.given_up.iter().position(|(given_up, _)| *given_up == id);
-        let unit = place.and_then(|place| self.given_up.remove(place)).and_then(|(_, unit)| unit);
-        unit.map_or(Owner::Unknown, Owner::Late)
-    }
-
-    /// Those whose time is over; their answers may still come.
-    fn expire(&mut self, now: Instant) -> Vec<Transaction> {
-        let is_over = |request: &mut Transaction| request.deadline().is_some_and(|deadline| deadline <= now);
-        let expired: Vec<Transaction> = self.under_way.extract_if(.., is_over).collect();
-        for request in &expired {
-            self.keep_id(request.id, request.message.first().copied());
-        }
-        expired
-    }
-
-    /// Nothing is waited for any longer, and what was not sent is not sent. An answer that comes all the same is not late.
-    fn give_up_all(&mut self) {
-        self.outbox.clear();
-        self.ended.clear();
-        for request in std::mem::take(&mut self.under_way) {
-            self.give_up(&request);
-        }
-    }
-
-    /// This one is not waited for any longer.
-    fn give_up(&mut self, request: &Transaction) {
-        if request.sent_at.is_some() {
-            self.keep_id(request.id, None);
-        }
-    }
-
-    /// The answer may still come, and must not be taken for that of a later request.
-    fn keep_id(&mut self, id: u16, unit: Option<u8>) {
-        if self.given_up.len() == GIVEN_UP_MAX {
-            self.given_up.pop_front();
-        }
-        self.given_up.push_back((id, unit));
-    }
-
-    /// Has a frame begun that answers nothing under way?
-    fn is_cut_short(&self) -> bool {
-        let id = self.inbox.first_chunk::<2>().map(|id| u16::from_be_bytes(*id));
-        !self.inbox.is_empty() && !self.under_way.iter().any(|request| Some(request.id) == id)
-    }
 }
 
 impl Link {
@@ -322,10 +175,12 @@ impl Link {
     /// Takes what comes until `until`, or until the first time for an answer is over. May be dropped while it waits.
     async fn collect(&mut self, until: Instant) -> Result<(), LinkError> {
         let deadlines = self.transactions.under_way.iter().filter_map(Transaction::deadline);
-        let until = deadlines.fold(until, Instant::min);
+        let until = deadlines.chain(self.transactions.short_since.map(|since| since + SHORT_WAIT)).fold(until, Instant::min);
         if self.wire.receive(until, &mut self.transactions.inbox).await? {
             // What stands behind an answer shows whether it was one.
             self.wire.receive_waiting(&mut self.transactions.inbox);
+            self.take_frames_mbap()?;
+        } else if self.transactions.short_since.is_some() {
             self.take_frames_mbap()?;
         }
         let now = Instant::now();
@@ -336,10 +191,12 @@ impl Link {
             return Err(LinkError::Gone("a response was incomplete, the stream is out of sync".into()));
         }
         for request in expired {
-            if self.transactions.silence_at <= request.sent_at {
+            let (id, strange) = (request.id, request.strange);
+            if strange.is_none() && self.transactions.silence_at <= request.sent_at {
                 (self.transactions.silence_at, self.unanswered) = (Some(now), self.unanswered.saturating_add(1));
             }
-            let ended = self.end(request, Err(Fault::Timeout), Arc::default(), now);
+            let fault = strange.map_or(Fault::Timeout, |got| Fault::WrongTransaction { got, asked: id });
+            let ended = self.end(request, Err(fault), Arc::default(), now);
             self.transactions.ended.push(ended);
         }
         self.close_busy(now);
@@ -349,16 +206,20 @@ impl Link {
     /// Assigns the whole frames that have come to their requests. If what stands behind them is no header, none of them is an
     /// answer: each may be a piece of something else.
     fn take_frames_mbap(&mut self) -> Result<(), LinkError> {
-        let (mut bytes, mut start, now) = (std::mem::take(&mut self.transactions.inbox), 0, Instant::now());
-        if frame::is_out_of_sync(&bytes) {
+        let (mut bytes, now) = (std::mem::take(&mut self.transactions.inbox), Instant::now());
+        let (frames, end) = self.transactions.cut(&bytes, now);
+        if frame::is_out_of_sync(&bytes[end..]) {
+            let words = no_frame(&bytes[end..]);
             self.wire.record(false, bytes.into(), FrameResult::Wrong(FrameFault::NoHeader));
-            return Err(LinkError::Gone("bytes came that are no Modbus TCP frame".into()));
+            return Err(LinkError::Gone(words));
         }
-        while let Mbap::Whole { transaction, end } = frame::mbap(&bytes[start..]) {
-            let frame = &bytes[start..start + end];
-            start += end;
+        for (transaction, range) in frames {
+            let frame = &bytes[range];
             match self.transactions.take(transaction) {
-                Owner::Unknown => self.wire.drop_unexpected(frame),
+                Owner::Unknown => {
+                    self.transactions.note_strange(transaction, &frame[6..]);
+                    self.wire.drop_unexpected(frame);
+                }
                 Owner::Late(unit) => {
                     self.wire.drop_late(unit, frame);
                     // It is slower than it was: what else it was asked has the whole timeout.
@@ -376,7 +237,7 @@ impl Link {
                 }
             }
         }
-        bytes.drain(..start);
+        bytes.drain(..end);
         self.transactions.inbox = bytes;
         Ok(())
     }
@@ -408,6 +269,14 @@ impl Link {
         };
         Ended { id: request.id, answer, at: now, exchange: Arc::new(exchange) }
     }
+}
+
+/// What came that is no frame, as text where it is text.
+fn no_frame(bytes: &[u8]) -> String {
+    let shown = &bytes[..bytes.len().min(SHOWN_MAX)];
+    let is_text = shown.iter().all(|byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace());
+    let words = if is_text { format!("text `{}`", String::from_utf8_lossy(shown).trim()) } else { frame::hex(shown) };
+    format!("bytes came that are no Modbus TCP frame: {words}")
 }
 
 #[cfg(test)]
