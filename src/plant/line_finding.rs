@@ -4,10 +4,7 @@ use std::{fmt, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-use super::{
-    id::DeviceId,
-    tag::Table,
-};
+use super::{id::DeviceId, tag::Table};
 use crate::t;
 
 /// What is heard of another master.
@@ -91,10 +88,18 @@ impl fmt::Display for LineFinding {
                 t!("takes {most} requests at once, not {stated}: in_flight_max = {most}", most, stated)
             }
             LineFinding::ReadMost { table, most, .. } => {
-                t!("gives {most} of table {table} at once: read_registers_max or read_bits_max = {most}", most, table = table.word())
+                t!(
+                    "gives {most} of table {table} at once: read_registers_max or read_bits_max = {most}",
+                    most,
+                    table = table.word()
+                )
             }
             LineFinding::Unreadable { table, address, count: 0, .. } => {
-                t!("table {table} cannot be read across address {address} with one request", table = table.word(), address)
+                t!(
+                    "table {table} cannot be read across address {address} with one request",
+                    table = table.word(),
+                    address
+                )
             }
             LineFinding::Unreadable { table, address, count, .. } => {
                 t!("table {table}: no address {address}, {count} in all", table = table.word(), address, count)
@@ -102,10 +107,9 @@ impl fmt::Display for LineFinding {
             LineFinding::AnswersPerConnection(answers) => {
                 t!("each connection is closed after {answers} responses: a new one is opened in time", answers)
             }
-            LineFinding::DeafAfterConnect(time) => t!(
-                "no response for {ms} ms after each connection: connect_delay_ms = {ms}",
-                ms = time.as_millis()
-            ),
+            LineFinding::DeafAfterConnect(time) => {
+                t!("no response for {ms} ms after each connection: connect_delay_ms = {ms}", ms = time.as_millis())
+            }
         })
     }
 }

@@ -87,13 +87,11 @@ fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
             or_usual("rs485", rs485.word(), Rs485::Off.word()),
             or_usual("turnaround_ms", ms(settings.turnaround), ms(usual.turnaround)),
         ]),
-        Transport::Tcp { host, port, framing: _ } => {
-            entries.extend([
-                entry("host", host.as_str()),
-                or_usual("tcp_port", i64::from(*port), i64::from(TCP_PORT)),
-                or_usual("connect_delay_ms", ms(settings.connect_delay), ms(usual.connect_delay)),
-            ])
-        }
+        Transport::Tcp { host, port, framing: _ } => entries.extend([
+            entry("host", host.as_str()),
+            or_usual("tcp_port", i64::from(*port), i64::from(TCP_PORT)),
+            or_usual("connect_delay_ms", ms(settings.connect_delay), ms(usual.connect_delay)),
+        ]),
     }
     entries.extend([
         or_usual("timeout_ms", ms(settings.timeout), ms(usual.timeout)),

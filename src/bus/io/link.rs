@@ -9,6 +9,7 @@
 //! Writes are made, and answers read, by tokio-modbus, with a fresh context for every request on one end of a pipe; the PDU
 //! of a poll is its block's, and what travels on the port is ours.
 
+mod outstanding;
 mod raw;
 mod receive;
 mod signals;
@@ -31,16 +32,13 @@ pub use self::transactions::Ended;
 use self::{receive::Received, transactions::Transactions};
 use super::{
     clock::Clock,
+    memory::LineMemory,
     transport::Opened,
     uart::{HeldSignal, PortWatch},
-    wire::{LineMemory, Wire},
+    wire::Wire,
 };
 use crate::{
-    bus::{
-        frame::{self, ResponseSignature},
-        late_reply::{OutstandingReplies, Proof},
-        plan::Block,
-    },
+    bus::frame::{self, ResponseSignature},
     plant::{
         def::{Framing, LineDef},
         event::{ExceptionCode, Fault, FaultKind, LineCounters},
@@ -236,31 +234,6 @@ impl Link {
         self.wire.framing()
     }
 
-    /// Could the answer to this message be mistaken for an outstanding one?
-    pub fn is_ambiguous(&self, message: &[u8]) -> bool {
-        self.wire.replies.is_ambiguous(message)
-    }
-
-    /// See [`crate::bus::late_reply::LineReplies::proof`].
-    pub fn proof(&self, unit: u8) -> Proof {
-        self.wire.replies.proof(unit)
-    }
-
-    /// See [`crate::bus::late_reply::LineReplies::proof_failed`].
-    pub fn proof_failed(&mut self, unit: u8) {
-        self.wire.replies.proof_failed(unit);
-    }
-
-    /// See [`crate::bus::late_reply::LineReplies::settles_in`].
-    pub fn settles_in(&self, unit: u8) -> Option<Duration> {
-        self.wire.replies.settles_in(unit, self.wire.uptime())
-    }
-
-    /// See [`crate::bus::late_reply::LineReplies::must_wait`].
-    pub fn must_wait(&self, message: &[u8]) -> bool {
-        self.wire.replies.must_wait(message)
-    }
-
     /// Plant time of the last exchange on a line without transaction ids, from the first byte of the request to the last of
     /// the answer.
     pub fn took(&self) -> Duration {
@@ -275,16 +248,6 @@ impl Link {
     /// Another response timeout from now on: a poll or a step of a diagnostic has its own.
     pub fn set_timeout(&mut self, timeout: Duration) {
         self.timeout = timeout;
-    }
-
-    /// Outstanding replies of a unit.
-    pub fn outstanding(&self, unit: u8) -> &OutstandingReplies {
-        self.wire.replies.of(unit)
-    }
-
-    /// See [`crate::bus::late_reply::LineReplies::forget`].
-    pub fn forget_outstanding(&mut self, unit: u8) -> Option<Duration> {
-        self.wire.replies.forget(unit, self.wire.uptime())
     }
 
     /// Nothing is sent to a unit for this long (plant time): it wants a gap between two requests.
@@ -330,16 +293,6 @@ impl Link {
     /// Totals of this line; `utilisation`, `opens` and `missed` are the task's.
     pub fn counters(&mut self) -> &mut LineCounters {
         &mut self.wire.counters
-    }
-
-    /// See [`crate::bus::late_reply::LineReplies::is_unsettled`].
-    pub fn is_unsettled(&self, unit: u8) -> bool {
-        self.wire.replies.is_unsettled(unit, self.wire.uptime())
-    }
-
-    /// Other blocks are asked for from now on.
-    pub fn expect(&mut self, blocks: &[Block]) {
-        self.wire.replies.expect(blocks);
     }
 
     /// See [`Wire::take_unsolicited`].

@@ -286,8 +286,15 @@ impl Task<'_> {
             self.stats.spent(busy.as_secs_f32() / self.clock.real_span(over).as_secs_f32().max(1e-6), over);
         }
         self.stats.add_frames(std::mem::take(&mut self.frames), &mut self.counters);
-        let plan =
-            Plan { blocks: &[], polls: Vec::new(), refused: Vec::new(), retries: Vec::new(), load: Load::Normal };
+        let plan = Plan {
+            blocks: &[],
+            polls: Vec::new(),
+            refused: Vec::new(),
+            retries: Vec::new(),
+            load: Load::Normal,
+            other_master: None,
+            findings: Vec::new(),
+        };
         let report = self.stats.report(&self.def, self.settings(), plan, self.counters);
         self.publish(Event::Report { at: now, line: self.line, report }).await
     }

@@ -9,6 +9,7 @@ pub mod tap;
 pub mod hearing;
 pub mod signals;
 pub mod pause;
+pub mod memory;
 pub mod wire;
 pub mod link;
 pub mod testing;

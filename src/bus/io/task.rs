@@ -1,11 +1,13 @@
 //! The task of one line: opens the port, keeps the schedule, serves operators and diagnostics, and sends events to the plant.
 
 mod concurrent;
+mod connection;
 mod deferred_read_back;
 mod exit;
 mod hangups;
 mod live;
 mod poll;
+mod read;
 mod test;
 mod wait;
 mod write;
@@ -20,9 +22,9 @@ use super::{
     clock::Clock,
     link::Link,
     live_reads::LiveReads,
+    memory::LineMemory,
     requests::{Closed, Requests},
-    transport::{Connector, Opened},
-    wire::LineMemory,
+    transport::Connector,
 };
 use crate::{
     bus::{
@@ -32,7 +34,7 @@ use crate::{
         in_flight::InFlight,
         line_stats::{LineStats, Plan},
         plan::{self, Block, RangeBisection, UnreadableRanges},
-        schedule::{Budget, LIVE_SHARE, Load, Next, Patience, Schedule, WRITE_SHARE},
+        schedule::{Budget, LIVE_SHARE, Load, Next, Schedule, WRITE_SHARE},
     },
     plant::{
         PlantDef,
@@ -158,103 +160,6 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Opens, serves and waits until the station ends.
-    async fn connect_loop(mut self) -> Result<(), LinkExit> {
-        let mut backoff = Backoff::for_ports();
-        let mut schedule = self.schedule.clone();
-        // The last connection has ended without a word, and its values stay.
-        let mut is_quiet = false;
-        loop {
-            if !is_quiet {
-                self.publish_state(LineState::Connecting).await?;
-            }
-            let exit = match self.connector.open().await {
-                Ok(port) => {
-                    self.memory.counters.opens += 1;
-                    if !is_quiet {
-                        self.publish_state(LineState::Connected).await?;
-                        tracing::info!(line = self.settings.name, transport = %self.settings.transport, "connected");
-                    }
-                    schedule.reopened(!is_quiet, self.clock.now());
-                    let (answers, exit) = self.serve(port, &mut schedule).await;
-                    // A port that fails right after opening is retried with backoff.
-                    if 0 < answers {
-                        backoff.reset();
-                        self.unheard = 0;
-                    }
-                    self.ended(&mut schedule, answers, exit).await?
-                }
-                Err(why) => LinkExit::PortFailed(why),
-            };
-            is_quiet = matches!(exit, LinkExit::UsedUp);
-            if !matches!(exit, LinkExit::Reopen | LinkExit::Shutdown | LinkExit::UsedUp) {
-                self.give_up_unconfirmed().await?;
-            }
-            match exit {
-                LinkExit::Shutdown => return Err(exit),
-                LinkExit::Reopen => backoff.reset(),
-                LinkExit::UsedUp => self.wait_until_due(&mut schedule).await?,
-                LinkExit::Diagnostic => {
-                    self.publish_state(LineState::Testing).await?;
-                    self.run_diagnostic_alone().await?;
-                }
-                LinkExit::Closed => {
-                    self.end_diagnostic("the line was closed").await?;
-                    self.publish_state(LineState::Disconnected).await?;
-                    self.publish_report(None).await?;
-                    self.wait(None).await?;
-                }
-                LinkExit::PortFailed(why) | LinkExit::Gone(why) => {
-                    self.end_diagnostic(&why).await?;
-                    tracing::warn!(line = self.settings.name, why, "not connected");
-                    let retry_at = self.clock.now() + backoff.fail();
-                    self.publish_state(LineState::Waiting { why, retry_at }).await?;
-                    self.publish_report(None).await?;
-                    self.wait(Some(retry_at)).await?;
-                }
-            }
-        }
-    }
-
-    /// A port was left. One that is gone without a fault of the line is [`LinkExit::UsedUp`].
-    async fn ended(&mut self, schedule: &mut Schedule, answers: u64, exit: LinkExit) -> Result<LinkExit, LinkExit> {
-        let exit = match exit {
-            LinkExit::Gone(why) if self.settings.transport.serial().is_none() => {
-                tracing::debug!(line = self.settings.name, why, answers, "the connection has ended");
-                if self.on_hangup(schedule, answers).await? {
-                    self.end_diagnostic(&why).await?;
-                    LinkExit::UsedUp
-                } else {
-                    LinkExit::PortFailed(why)
-                }
-            }
-            exit => exit,
-        };
-        self.cut_off(schedule);
-        // What waits is served by the next connection, if that may take the place of this one.
-        if !matches!(exit, LinkExit::UsedUp) {
-            self.stats.rest(&mut self.memory.counters);
-            self.refuse_waiting().await?;
-        }
-        Ok(exit)
-    }
-
-    /// Serves an open port until it is left; says how many answers came over it.
-    async fn serve(&mut self, opened: Opened, schedule: &mut Schedule) -> (u64, LinkExit) {
-        let mut link = Link::new(opened, &self.settings, self.clock, self.memory.clone());
-        schedule.set_patience(Patience::of(&self.settings, self.clock.speed()));
-        let on_line = self.def.devices.iter().filter(|device| device.line == self.line);
-        on_line.for_each(|device| {
-            link.allow(device.unit, self.in_flight.limit(device.unit, device.limits.in_flight_max))
-        });
-        link.set_alone(!self.hangups.is_clear());
-        (self.closed_at, self.opened_at, self.heard) = (self.clock.now(), self.clock.now(), false);
-        self.timeouts_before = link.counters().timeouts;
-        let Err(exit) = self.serve_loop(&mut link, schedule).await;
-        self.collect_stats(&mut link);
-        (link.answers(), exit)
-    }
-
     /// Operators first, then the schedule and the running diagnostic, else it waits.
     async fn serve_loop(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<Infallible, LinkExit> {
         let mut report_at = self.clock.now() + REPORT_EVERY;

@@ -7,8 +7,8 @@ use futures_util::future::join_all;
 use super::{
     clock::Clock,
     link::{Link, LinkError},
+    memory::LineMemory,
     transport::Connector,
-    wire::LineMemory,
 };
 use crate::{
     bus::diagnostics::{Ask, Job, Step, StepResult},

@@ -8,20 +8,18 @@ use tokio::{
     time::Instant,
 };
 
-use super::{clock::Clock, link::LinkError, pause::Pause, transport::Stream};
+use super::{clock::Clock, link::LinkError, memory::LineMemory, pause::Pause, transport::Stream};
 use crate::{
     bus::{
         ascii,
         frame::{self, Unsolicited},
         late_reply::LineReplies,
         other_master::OtherMaster,
-        plan::Block,
     },
     plant::{
         def::{Framing, LineDef},
         event::LineCounters,
-        line_finding::OtherMasterHeard,
-        number::{to_u16, to_u32},
+        number::to_u32,
         traffic::{FRAMES_MAX, Frame, FrameFault, FrameResult},
     },
 };
@@ -31,41 +29,6 @@ const STRAY_MAX: usize = 4 * frame::MESSAGE_MAX;
 
 /// A line is heard for so long before the first request on it: another master may be at work.
 const FIRST_LISTEN: Duration = Duration::from_millis(300);
-
-/// What a line remembers from one opening of its port to the next.
-#[derive(Debug, Clone)]
-pub struct LineMemory {
-    /// Totals; `utilisation`, `opens` and `missed` are the task's.
-    pub counters: LineCounters,
-    /// Outstanding replies of each unit.
-    replies: LineReplies,
-    other_master: OtherMaster,
-    created_at: Instant,
-}
-
-impl LineMemory {
-    /// Nothing has gone over the line yet.
-    pub fn new(line: &LineDef, clock: Clock) -> LineMemory {
-        let seed = to_u16(clock.now().as_microsecond().rem_euclid(0x1_0000));
-        LineMemory {
-            counters: LineCounters::default(),
-            replies: LineReplies::new(line.timeout, seed),
-            other_master: OtherMaster::default(),
-            created_at: Instant::now(),
-        }
-    }
-
-    /// See [`OtherMaster::heard`].
-    pub fn other_master(&mut self) -> Option<OtherMasterHeard> {
-        self.other_master.heard(self.created_at.elapsed())
-    }
-
-    /// These blocks will be asked for.
-    pub fn expect(mut self, blocks: &[Block]) -> LineMemory {
-        self.replies.expect(blocks);
-        self
-    }
-}
 
 /// One open port.
 pub struct Wire {

@@ -306,8 +306,7 @@ impl RangeBisection {
     }
 
     fn searches(&self, unit: u8) -> bool {
-        self.cuts.iter().any(|(whole, _)| whole.unit == unit)
-            || self.found.iter().any(|found| found.range.unit == unit)
+        self.cuts.iter().any(|(whole, _)| whole.unit == unit) || self.found.iter().any(|found| found.range.unit == unit)
     }
 
     /// A block was read. The unit has all of it.
@@ -351,7 +350,8 @@ impl RangeBisection {
     /// The same without a second refusal: for reads that somebody watches.
     pub fn conclude_at_once(&mut self, unreadable: &mut UnreadableRanges) {
         self.explain_cuts();
-        let found: Vec<Obstacle> = self.found.drain(..).filter(|found| self.gives.contains(&found.range.unit)).collect();
+        let found: Vec<Obstacle> =
+            self.found.drain(..).filter(|found| self.gives.contains(&found.range.unit)).collect();
         self.learn(&found, unreadable);
     }
 

@@ -279,7 +279,12 @@ fn transport() -> impl Strategy<Value = Transport> {
 fn holes_at(addresses: &[u16]) -> UnreadableRanges {
     let mut unreadable = UnreadableRanges::default();
     for address in addresses {
-        unreadable.add(fixture::plant().device(fixture::TIC).unit, Table::Holding, u32::from(*address), u32::from(*address) + 1);
+        unreadable.add(
+            fixture::plant().device(fixture::TIC).unit,
+            Table::Holding,
+            u32::from(*address),
+            u32::from(*address) + 1,
+        );
     }
     unreadable
 }

@@ -206,8 +206,7 @@ impl Health {
         // One frame may have been lost.
         self.prompt = self.failures == 1 && failure.is_silence();
         self.thorough = false;
-        let tries =
-            if self.answers == 0 { blocks.clamp(FIRST_FAILURES_MIN, FIRST_BLOCKS_MAX) } else { FAILURES_MAX };
+        let tries = if self.answers == 0 { blocks.clamp(FIRST_FAILURES_MIN, FIRST_BLOCKS_MAX) } else { FAILURES_MAX };
         let goes_down = !self.down && (tries <= self.failures || failure.is_silence() && !(affordable || self.prompt));
         self.down |= goes_down;
         if self.prompt {

@@ -42,7 +42,9 @@ impl Schedule {
             self.polls[index].answered();
         }
         self.stale |= failing || was_down;
-        for (n, poll) in self.polls.iter_mut().enumerate().filter(|(_, poll)| (failing || was_down) && poll.place == place) {
+        for (n, poll) in
+            self.polls.iter_mut().enumerate().filter(|(_, poll)| (failing || was_down) && poll.place == place)
+        {
             poll.back_on_grid(self.origin, now);
             if was_down && Some(n) != index {
                 poll.forgive(now);

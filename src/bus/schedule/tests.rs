@@ -163,7 +163,13 @@ fn units_that_never_answer_are_all_given_up_within_seconds() {
             Next::Run(index) => {
                 schedule.done(index, at(now), at(now + 300));
                 let spent = Duration::from_millis(300);
-                given_up += u32::from(schedule.failed(Some(index), DeviceId(index as u16), Failure::Silence, (at(now), spent), at(now + 300)));
+                given_up += u32::from(schedule.failed(
+                    Some(index),
+                    DeviceId(index as u16),
+                    Failure::Silence,
+                    (at(now), spent),
+                    at(now + 300),
+                ));
                 now += 300;
             }
             Next::WaitUntil(until) => now = until.as_millisecond().max(now + 1),
@@ -245,7 +251,8 @@ fn a_new_plan_keeps_the_grid_and_the_health_of_devices() {
     let mut schedule = Schedule::new(&[block(1, every(500)), stays.clone()], at(0));
     play(&mut schedule, 0, 300, |_, _| 10);
     schedule.answered(None, DeviceId(1), Some(Duration::from_millis(10)), at(10));
-    let fail = |now| schedule.failed(Some(0), DeviceId(1), Failure::Silence, (at(now), Duration::from_millis(300)), at(now));
+    let fail =
+        |now| schedule.failed(Some(0), DeviceId(1), Failure::Silence, (at(now), Duration::from_millis(300)), at(now));
     assert_eq!([300; 3].map(fail), [false, false, true]);
     let new = Block { address: 7, ..stays.clone() };
     schedule.replan(&[stays, new, block(1, every(700))], at(300));

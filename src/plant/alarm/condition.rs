@@ -120,7 +120,6 @@ impl Condition {
             | Condition::SlowerThanStated
             | Condition::NotConnected
             | Condition::Overloaded
-        | Condition::OtherMaster
             | Condition::OtherMaster
             | Condition::Station(_) => none,
         }
@@ -276,6 +275,7 @@ pub fn holds(
         | Condition::SlowerThanStated
         | Condition::NotConnected
         | Condition::Overloaded
+        | Condition::OtherMaster
         | Condition::Station(_) => facts.ill,
     }
 }

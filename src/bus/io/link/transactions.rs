@@ -17,7 +17,7 @@ use under_way::{Owner, SHORT_WAIT, Transaction};
 
 use super::{FrameFault, FrameResult, Link, LinkError};
 use crate::{
-    bus::frame::{self, Mbap},
+    bus::frame,
     plant::{def::Framing, event::Fault, traffic::Exchange},
 };
 
@@ -175,7 +175,8 @@ impl Link {
     /// Takes what comes until `until`, or until the first time for an answer is over. May be dropped while it waits.
     async fn collect(&mut self, until: Instant) -> Result<(), LinkError> {
         let deadlines = self.transactions.under_way.iter().filter_map(Transaction::deadline);
-        let until = deadlines.chain(self.transactions.short_since.map(|since| since + SHORT_WAIT)).fold(until, Instant::min);
+        let until =
+            deadlines.chain(self.transactions.short_since.map(|since| since + SHORT_WAIT)).fold(until, Instant::min);
         if self.wire.receive(until, &mut self.transactions.inbox).await? {
             // What stands behind an answer shows whether it was one.
             self.wire.receive_waiting(&mut self.transactions.inbox);

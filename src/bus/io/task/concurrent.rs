@@ -5,10 +5,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 use tokio::time::Instant;
 
-use super::{
-    LinkExit, Task,
-    poll::{ReadResult, parse},
-};
+use super::{LinkExit, Task, poll::ReadResult, read::parse};
 use crate::{
     bus::{
         io::{

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{LinkExit, Task, poll::value_of};
+use super::{LinkExit, Task, read::value_of};
 use crate::{
     bus::{
         backoff::Backoff,

@@ -95,7 +95,11 @@ impl Task<'_> {
     /// May the other side have had enough of this connection?
     pub(super) fn check_used_up(&mut self, link: &Link) -> Result<(), LinkExit> {
         let network = self.settings.transport.serial().is_none();
-        if network && self.under_way.is_empty() && self.hangups.answers_max() == Some(link.answers()) && self.hangups.is_used_up(link.answers()) {
+        if network
+            && self.under_way.is_empty()
+            && self.hangups.answers_max() == Some(link.answers())
+            && self.hangups.is_used_up(link.answers())
+        {
             return Err(LinkExit::UsedUp);
         }
         Ok(())

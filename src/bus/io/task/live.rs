@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::{
     LinkExit, Task,
-    poll::{ReadValues, read_in_sync},
+    read::{ReadValues, read_in_sync},
     test::POLLS_BETWEEN,
 };
 use crate::{

@@ -2,30 +2,24 @@
 
 use std::{sync::Arc, time::Duration};
 
-use jiff::Timestamp;
-use tokio_modbus::{
-    Response,
-    bytes::{Buf, Bytes},
+use super::{
+    LinkExit, Task,
+    read::{ReadValues, read_in_sync, text_of, value_of},
 };
-
-use super::{LinkExit, Task};
 use crate::{
     bus::{
-        codec,
         io::link::{Link, LinkError},
-        late_reply::Proof,
         plan::{self, Block, Wire, may_be_cut},
         schedule::{Failure, Schedule},
     },
     plant::{
         def::Framing,
         event::{Event, Fault, FaultKind},
-        number::to_u16,
-        tag::TagDef,
         time::elapsed,
         traffic::Exchange,
     },
 };
+use jiff::Timestamp;
 
 /// Requests in a row without any answer after which a TCP connection is opened again …
 const UNANSWERED_MAX: u32 = 5;
@@ -312,132 +306,5 @@ fn failure_of(fault: Fault) -> Failure {
         FaultKind::Corrupt | FaultKind::NotANumber => Failure::Corrupt,
         FaultKind::OutOfSync => Failure::Doubt,
         FaultKind::Timeout | FaultKind::NotConnected | FaultKind::BackedOff => Failure::Silence,
-    }
-}
-
-/// What came in between may have shown that the unit sends what it was not asked for.
-fn check_in_sync(link: &Link, block: &Block) -> Result<(), LinkError> {
-    if link.is_ambiguous(&block.request()) { Err(Fault::OutOfSync.into()) } else { Ok(()) }
-}
-
-/// What a block read gave: bits or registers, the first at the block's address.
-#[derive(Debug)]
-pub(super) enum ReadValues {
-    Bits(Vec<bool>),
-    Registers(Vec<u16>),
-}
-
-/// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another signature, part of this
-/// block or of one of `blocks`, by a loopback, or by any answer after which nothing more comes; what fails gives way to the next. Else
-/// by time.
-async fn resynchronise(blocks: &[Block], link: &mut Link, block: &Block) -> Result<(), LinkError> {
-    let unit = block.unit;
-    if !link.is_ambiguous(&block.request()) {
-        return Ok(());
-    }
-    if link.is_unsettled(unit) {
-        return Err(Fault::OutOfSync.into());
-    }
-    let must_wait = link.must_wait(&block.request());
-    if must_wait || link.settles_in(unit).is_some() {
-        return if link.forget_outstanding(unit).is_none() { Ok(()) } else { Err(Fault::OutOfSync.into()) };
-    }
-    let proof = link.proof(unit);
-    if proof == Proof::Part {
-        let others = blocks.iter().filter(|other| other.device == block.device && *other != block);
-        if let Some(probe) = link.outstanding(unit).probe(std::iter::once(block).chain(others)) {
-            match link.exchange(&probe).await {
-                Ok(_) => return check_in_sync(link, block),
-                // The device does not read parts of a block, or this answers an older request: neither proves anything.
-                Err(LinkError::Fault(Fault::Exception(_))) => {}
-                Err(error) => return Err(try_another(link, unit, error)),
-            }
-        }
-    }
-    if proof != Proof::Silence {
-        return match link.loopback(unit).await {
-            Ok(()) => check_in_sync(link, block),
-            Err(LinkError::Fault(_)) if link.forget_outstanding(unit).is_none() => Ok(()),
-            Err(error) => Err(try_another(link, unit, error)),
-        };
-    }
-    match link.exchange(&block.request()).await {
-        Ok(_) | Err(LinkError::Fault(Fault::Exception(_))) => Err(Fault::OutOfSync.into()),
-        Err(LinkError::Fault(_)) if link.forget_outstanding(unit).is_none() => Ok(()),
-        Err(error) => Err(try_another(link, unit, error)),
-    }
-}
-
-/// The unit gives no such proof, or no answer at all.
-fn try_another(link: &mut Link, unit: u8, error: LinkError) -> LinkError {
-    link.proof_failed(unit);
-    error
-}
-
-/// Reads a block from a unit that is in sync. A `corrupt` answer is asked for once more; it counts as outstanding, so the unit is
-/// resynchronised before.
-pub(super) async fn read_in_sync(
-    blocks: &[Block],
-    link: &mut Link,
-    block: &Block,
-    corrupt: &mut Option<Fault>,
-) -> Result<ReadValues, LinkError> {
-    resynchronise(blocks, link, block).await?;
-    match read(link, block).await {
-        Err(LinkError::Fault(fault)) if fault.is_corrupt() => {
-            *corrupt = Some(fault);
-            resynchronise(blocks, link, block).await?;
-            let second = read(link, block).await;
-            if let Some(last) = &mut link.last {
-                Arc::make_mut(last).tries = 2;
-            }
-            second
-        }
-        other => other,
-    }
-}
-
-async fn read(link: &mut Link, block: &Block) -> Result<ReadValues, LinkError> {
-    let answer = link.exchange(&block.request()).await?;
-    Ok(parse(block, answer)?)
-}
-
-/// The values in a checked answer message.
-pub(super) fn parse(block: &Block, answer: Vec<u8>) -> Result<ReadValues, Fault> {
-    let (count, got) = (usize::from(block.count), to_u16(answer.len()));
-    let mut pdu = Bytes::from(answer);
-    pdu.advance(1.min(pdu.len()));
-    match Response::try_from(pdu) {
-        Ok(Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits)) if count <= bits.len() => {
-            Ok(ReadValues::Bits(bits))
-        }
-        Ok(Response::ReadInputRegisters(words) | Response::ReadHoldingRegisters(words)) if words.len() == count => {
-            Ok(ReadValues::Registers(words))
-        }
-        // The length was checked byte for byte before; kept so that no later change can turn a shift into a value.
-        _ => Err(Fault::WrongLength { got, asked: block.count }),
-    }
-}
-
-/// The text of a tag that holds text.
-fn text_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Option<Arc<str>> {
-    tag.is_text().then_some(())?;
-    let start = usize::from(tag.point.address.checked_sub(block.address)?);
-    match values {
-        ReadValues::Bits(_) => None,
-        ReadValues::Registers(words) => {
-            let words = words.get(start..start + usize::from(tag.point.len()))?;
-            codec::decode_text(tag.point, words).map(Into::into)
-        }
-    }
-}
-
-pub(super) fn value_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Option<f64> {
-    let start = usize::from(tag.point.address.checked_sub(block.address)?);
-    match values {
-        ReadValues::Bits(bits) => bits.get(start).map(|bit| f64::from(u8::from(*bit))),
-        ReadValues::Registers(words) => {
-            codec::decode(tag.point, words.get(start..start + usize::from(tag.point.len()))?)
-        }
     }
 }

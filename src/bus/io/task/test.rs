@@ -56,7 +56,9 @@ impl Task<'_> {
                 job.on_result(result);
                 if let Some((unit, holes)) = job.take_holes() {
                     self.live_budget.spent(elapsed(started, ended), ended);
-                    holes.into_iter().for_each(|hole| self.unreadable.add(unit, hole.table, hole.range().start, hole.range().end));
+                    holes
+                        .into_iter()
+                        .for_each(|hole| self.unreadable.add(unit, hole.table, hole.range().start, hole.range().end));
                 }
                 // The steps of a sweep are many, and not each of them shows something new.
                 if done != job.run().done || job.run().state != DiagnosticState::Running {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use tokio_modbus::Request;
 
-use super::{LinkExit, Task, poll::value_of};
+use super::{LinkExit, Task, read::value_of};
 use crate::{
     bus::{
         codec,

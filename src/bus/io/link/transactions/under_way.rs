@@ -14,7 +14,7 @@ pub const SHORT_WAIT: Duration = Duration::from_millis(200);
 
 /// A request that is under way.
 #[derive(Debug)]
-pub(super) struct Transaction {
+pub struct Transaction {
     pub id: u16,
     /// Unit and PDU.
     pub message: Vec<u8>,
@@ -41,7 +41,7 @@ impl Transaction {
 
 /// Whose answer a transaction id announces.
 #[derive(Debug)]
-pub(super) enum Owner {
+pub enum Owner {
     UnderWay(Transaction),
     /// The request to this unit was given up.
     Late(u8),
@@ -114,7 +114,15 @@ impl Transactions {
         }
         let (id, frame) = (self.last_id, frame::with_mbap(self.last_id, message));
         self.outbox.extend_from_slice(&frame);
-        self.under_way.push(Transaction { id, message: message.to_vec(), frame: frame.into(), timeout, sent_at: None, begun_at: now, strange: None });
+        self.under_way.push(Transaction {
+            id,
+            message: message.to_vec(),
+            frame: frame.into(),
+            timeout,
+            sent_at: None,
+            begun_at: now,
+            strange: None,
+        });
         id
     }
 
@@ -170,7 +178,8 @@ impl Transactions {
     /// The frames that the stream begins with, each with its transaction, and where they end.
     pub fn cut(&mut self, bytes: &[u8], now: Instant) -> (Vec<(u16, Range<usize>)>, usize) {
         let waited = self.short_since.is_some_and(|since| since + SHORT_WAIT <= now);
-        let asked = |id: u16| self.under_way.iter().find(|request| request.id == id).map(|request| &request.message[..]);
+        let asked =
+            |id: u16| self.under_way.iter().find(|request| request.id == id).map(|request| &request.message[..]);
         let (mut frames, mut start, mut is_open) = (Vec::new(), 0, false);
         loop {
             let rest = &bytes[start..];
@@ -193,7 +202,8 @@ impl Transactions {
     /// An answer came with a transaction id of which nothing is known: those that it may be meant for.
     pub fn note_strange(&mut self, got: u16, answer: &[u8]) {
         let [unit, function, ..] = *answer else { return };
-        let meant = |request: &&mut Transaction| request.is_to(unit) && request.message.get(1) == Some(&(function & 0x7F));
+        let meant =
+            |request: &&mut Transaction| request.is_to(unit) && request.message.get(1) == Some(&(function & 0x7F));
         self.under_way.iter_mut().filter(meant).for_each(|request| request.strange = Some(got));
     }
 }

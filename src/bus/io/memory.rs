@@ -1,0 +1,44 @@
+//! What a line remembers of its wire from one opening of its port to the next.
+
+use tokio::time::Instant;
+
+use super::clock::Clock;
+use crate::{
+    bus::{late_reply::LineReplies, other_master::OtherMaster, plan::Block},
+    plant::{def::LineDef, event::LineCounters, line_finding::OtherMasterHeard, number::to_u16},
+};
+
+/// What a line remembers from one opening of its port to the next.
+#[derive(Debug, Clone)]
+pub struct LineMemory {
+    /// Totals; `utilisation`, `opens` and `missed` are the task's.
+    pub counters: LineCounters,
+    /// Outstanding replies of each unit.
+    pub(super) replies: LineReplies,
+    pub(super) other_master: OtherMaster,
+    pub(super) created_at: Instant,
+}
+
+impl LineMemory {
+    /// Nothing has gone over the line yet.
+    pub fn new(line: &LineDef, clock: Clock) -> LineMemory {
+        let seed = to_u16(clock.now().as_microsecond().rem_euclid(0x1_0000));
+        LineMemory {
+            counters: LineCounters::default(),
+            replies: LineReplies::new(line.timeout, seed),
+            other_master: OtherMaster::default(),
+            created_at: Instant::now(),
+        }
+    }
+
+    /// See [`OtherMaster::heard`].
+    pub fn other_master(&mut self) -> Option<OtherMasterHeard> {
+        self.other_master.heard(self.created_at.elapsed())
+    }
+
+    /// These blocks will be asked for.
+    pub fn expect(mut self, blocks: &[Block]) -> LineMemory {
+        self.replies.expect(blocks);
+        self
+    }
+}
