@@ -98,6 +98,7 @@ fn in_words(snapshot: &Snapshot, with_history: bool) -> Vec<String> {
     for (line, status) in def.lines.iter().zip(&snapshot.lines) {
         let scan = status.report.as_ref().map_or(String::new(), |report| scan_words(report));
         lines.push(format!("line     {:12} {}{scan}", line.name, line_words(line, &status.state)));
+        lines.extend(found(def, status).into_iter().map(|found| format!("found    {:12} {found}", line.name)));
     }
     for (device, status) in def.devices.iter().zip(&snapshot.devices) {
         let why = status.diagnosis.map(|reason| format!(": {reason}")).unwrap_or_default();
@@ -198,6 +199,17 @@ fn poll_json(def: &PlantDef, poll: &PollReport) -> Value {
     })
 }
 
+/// What a line was found to do other than its plant file says.
+fn found(def: &PlantDef, status: &LineStatus) -> Vec<String> {
+    let Some(report) = &status.report else { return Vec::new() };
+    let heard = report.other_master.map(|heard| format!("another master polls this line: {heard}"));
+    let findings = report.findings.iter().map(|finding| match finding.device() {
+        Some(device) => format!("{}: {finding}", def.device(device).name),
+        None => finding.to_string(),
+    });
+    heard.into_iter().chain(findings).collect()
+}
+
 fn line_json(def: &PlantDef, line: &LineDef, status: &LineStatus, visible: bool) -> Value {
     let (counters, report) = (&status.counters, status.report.as_ref());
     let count = |count: u64| visible.then_some(count);
@@ -206,6 +218,7 @@ fn line_json(def: &PlantDef, line: &LineDef, status: &LineStatus, visible: bool)
         "requests": count(counters.requests), "ok": count(counters.ok), "timeouts": count(counters.timeouts),
         "corrupt": count(counters.corrupt), "exceptions": count(counters.exceptions),
         "polls": report.map(|report| report.polls.iter().map(|poll| poll_json(def, poll)).collect::<Vec<_>>()),
+        "found": found(def, status),
         "dispatch_p99_ms": report.and_then(|report| report.dispatch.p99()).map(in_ms),
     })
 }

@@ -3,6 +3,7 @@
 
 mod listening;
 mod live;
+mod oddities;
 mod silent;
 mod slave;
 mod slow;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::*;
-use crate::plant::event::LineState;
+use super::{slave::Line, *};
+use crate::plant::PlantDef;
 
 /// Good reads by block address of the first device until a second.
 async fn reads_until(line: &mut Line, def: &PlantDef, second: i64) -> (BTreeMap<u16, u32>, Vec<Fault>, usize) {
@@ -66,7 +66,12 @@ async fn a_refused_block_is_split_in_every_mode_and_with_every_code() {
 async fn a_bad_first_block_does_not_take_its_device_down() {
     for mode in Mode::ALL {
         for bad in [10, 20, 400] {
-            for what in [SlaveAction::Silent, SlaveAction::BadCheck, SlaveAction::Exception(4), SlaveAction::Instead(vec![1, 3, 2, 0, 1])] {
+            for what in [
+                SlaveAction::Silent,
+                SlaveAction::BadCheck,
+                SlaveAction::Exception(4),
+                SlaveAction::Instead(vec![1, 3, 2, 0, 1]),
+            ] {
                 if mode.has_ids() && what == SlaveAction::BadCheck {
                     continue;
                 }

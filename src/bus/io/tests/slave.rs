@@ -130,6 +130,10 @@ pub enum SlaveAction {
     /// Answers after this time; the next requests are answered meanwhile.
     Meanwhile(Duration),
     Silent,
+    /// Closes the connection in place of an answer.
+    HangUp,
+    /// These bytes, as they are.
+    Bytes(Vec<u8>),
     /// The answer in two pieces, cut here, the second piece after this time.
     Torn(usize, Duration),
     /// Only the first bytes of the answer.
@@ -196,6 +200,8 @@ async fn slave(mut stream: DuplexStream, mode: Mode, mut script: impl FnMut(usiz
                 continue;
             }
             SlaveAction::Silent => continue,
+            SlaveAction::HangUp => return,
+            SlaveAction::Bytes(bytes) => bytes,
             SlaveAction::Torn(at, pause) => {
                 let at = at.min(answer.len() - 1);
                 let _ = stream.write_all(&answer[..at]).await;
@@ -236,7 +242,7 @@ pub fn line(def: PlantDef) -> Line {
     let (sender, events) = mpsc::channel(64);
     let (requests, queue) = mpsc::channel(4);
     let (live, live_queue) = mpsc::channel(4);
-    let (ports, streams) = mpsc::channel(8);
+    let (ports, streams) = mpsc::channel(1_024);
     let (stop, stopped) = watch::channel(false);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
     let task = tokio::spawn(async move {

@@ -9,6 +9,13 @@ pub(super) fn worries(cx: &ViewContext, at: &LineView) -> Vec<String> {
         worries.push(t!("settings under test, not saved; before: {transport}", transport = before.transport));
     }
     let Some(report) = at.report else { return worries };
+    if let Some(heard) = report.other_master {
+        worries.push(t!("another master polls this line: {heard}", heard));
+    }
+    worries.extend(report.findings.iter().map(|finding| match finding.device() {
+        Some(device) => format!("{}: {finding}", cx.snapshot.def.device(device).name),
+        None => finding.to_string(),
+    }));
     if let Some(strain) = &report.strain {
         worries.push(t!("{strain}. Poll less often, or increase the baud rate", strain));
     } else if !report.admission.schedulability.fits() {
