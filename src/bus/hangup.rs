@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   ended with nothing under way, after answers ──> another one when something is due; nothing is lost
-//!   ended on one request that was made again, or before any answer ──> that block is at fault and waits alone
-//!   ended on several requests ──> each is made again alone, until one has ended a connection or all are answered
+//!   ended on the only request of a connection ──> that block is at fault and waits alone
+//!   ended on others ──> each is made again as the first of a connection, until one has ended it or all are answered
 //!   three in a row without any answer ──> the host is at fault: the line waits
 //! ```
 
@@ -51,7 +51,7 @@ impl Hangups {
             _ => (answers, 1),
         };
         let guilty = match under_way {
-            [only] if answers == 0 || self.suspects.contains(only) => Some(only.clone()),
+            [only] if answers == 0 => Some(only.clone()),
             [] | [..] => None,
         };
         match &guilty {
@@ -81,6 +81,11 @@ impl Hangups {
     /// The plan has changed: what is read no more is no suspect.
     pub fn keep(&mut self, blocks: &[Block]) {
         self.suspects.retain(|suspect| blocks.contains(suspect));
+    }
+
+    /// What is asked first on the next connection: if that ends as well, it is at fault.
+    pub fn suspect(&self) -> Option<&Block> {
+        self.suspects.first()
     }
 
     /// May requests be under way together?
@@ -133,7 +138,8 @@ mod tests {
         // After answers it may have been the end of a short life: it is made again.
         assert_eq!(hangups.on_end(&all[1..], 3), Hangup { guilty: None, is_quiet: true });
         assert!(!hangups.is_clear());
-        assert_eq!(hangups.on_end(&all[1..], 1).guilty, Some(all[1].clone()), "the second time it is");
+        assert_eq!(hangups.suspect(), Some(&all[1]));
+        assert_eq!(hangups.on_end(&all[1..], 0).guilty, Some(all[1].clone()), "alone on the next it is");
         assert!(hangups.is_clear());
     }
 

@@ -312,7 +312,7 @@ impl Link {
 
     /// What is remembered until the next opening.
     pub fn memory(&self) -> LineMemory {
-        self.wire.memory()
+        LineMemory { is_cut: self.asked.is_some(), ..self.wire.memory() }
     }
 
     fn note_silence(&mut self, silent: bool) {

@@ -17,6 +17,8 @@ pub struct LineMemory {
     pub(super) replies: LineReplies,
     pub(super) other_master: OtherMaster,
     pub(super) created_at: Instant,
+    /// The last request was cut off with its connection.
+    pub(super) is_cut: bool,
 }
 
 impl LineMemory {
@@ -28,6 +30,7 @@ impl LineMemory {
             replies: LineReplies::new(line.timeout, seed),
             other_master: OtherMaster::default(),
             created_at: Instant::now(),
+            is_cut: false,
         }
     }
 

@@ -182,7 +182,7 @@ impl Task<'_> {
                 self.publish_report(Some(schedule)).await?;
             }
             self.publish_unsolicited(link).await?;
-            let next = schedule.next(now);
+            let next = self.suspect_first(link).unwrap_or_else(|| schedule.next(now));
             // Writes have only their share of the time while polls are due.
             let may_write = !matches!(next, Next::Run(_)) || self.budget.allows(now);
             match (self.requests.next(may_write)?, next) {

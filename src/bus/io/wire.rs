@@ -66,7 +66,7 @@ pub struct Wire {
 impl Wire {
     /// A freshly opened port; `memory` goes on from an earlier opening.
     pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: LineMemory) -> Wire {
-        let LineMemory { counters, mut replies, other_master, created_at } = memory;
+        let LineMemory { counters, mut replies, other_master, created_at, is_cut } = memory;
         let (char_time, silent_interval) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
             Some(serial) if line.transport.framing() == Framing::Ascii => (serial.char_time(), line.gap),
@@ -78,7 +78,7 @@ impl Wire {
         // What was asked before an earlier port went away may still be answered; at the start another master may be heard.
         let rest = match (framing, counters.requests) {
             (Framing::Mbap, _) => Duration::ZERO,
-            (_, 0) if line.transport.serial().is_none() => Duration::ZERO,
+            (_, _) if line.transport.serial().is_none() && !is_cut => Duration::ZERO,
             (_, 0) => line.timeout.min(FIRST_LISTEN),
             (_, 1..) => line.timeout,
         };
@@ -122,7 +122,8 @@ impl Wire {
     /// What is remembered until the next opening.
     pub fn memory(&self) -> LineMemory {
         let (counters, created_at) = (self.counters, self.created_at);
-        LineMemory { counters, replies: self.replies.clone(), other_master: self.other_master.clone(), created_at }
+        let (replies, other_master) = (self.replies.clone(), self.other_master.clone());
+        LineMemory { counters, replies, other_master, created_at, is_cut: false }
     }
 
     /// Nothing is sent for this long (real time).

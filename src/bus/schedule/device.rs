@@ -38,8 +38,11 @@ const WHOLE_TIMEOUT_EVERY: u32 = 4;
 /// A device without any result, not even a failure, is asked again after this time.
 const TRIED_AGAIN: Duration = Duration::from_secs(1);
 /// Where the line has nothing else to do, a device that does not answer waits no longer than this: somebody may just have
-/// plugged it in.
+/// plugged it in …
 const IDLE_WAIT_MAX: Duration = Duration::from_secs(5);
+/// … and no longer than this for so many failures if it has answered before: it may come back by itself.
+const IDLE_WAIT: Duration = Duration::from_secs(1);
+const IDLE_FAILURES: u32 = 20;
 /// A gateway that says at once that the device is away may be asked again soon: after so many times what that took.
 const COST_SHARE: u32 = 20;
 /// Doubts in a row count once in this time: several requests may share one cause.
@@ -218,7 +221,9 @@ impl Health {
                 Failure::OfGateway => tried.min((spent * COST_SHARE).max(TRIED_AGAIN)),
                 Failure::Silence | Failure::Corrupt | Failure::Hangup | Failure::Doubt => tried,
             };
-            (self.probe_at, self.idle_at) = (Some(now + wait), now + wait.min(IDLE_WAIT_MAX));
+            let has_answered = 0 < self.answers && self.failures <= IDLE_FAILURES;
+            let idle_wait = wait.min(if has_answered { IDLE_WAIT } else { IDLE_WAIT_MAX });
+            (self.probe_at, self.idle_at) = (Some(now + wait), now + idle_wait);
         }
         goes_down
     }

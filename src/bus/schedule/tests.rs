@@ -120,7 +120,7 @@ fn a_dead_device_is_probed_with_backoff_and_read_when_back() {
     assert!(!fail(&mut schedule, 1, 3910), "it is reported once");
     schedule.done(2, at(4210), at(4220));
     schedule.done(2, at(5000), at(5010));
-    assert_eq!(schedule.next(at(5010)), Next::WaitUntil(at(6000)), "the other device goes on at its rate");
+    assert_eq!(schedule.next(at(5210)), Next::WaitUntil(at(6000)), "the other device goes on at its rate");
     schedule.done(2, at(6000), at(6010));
     assert_eq!(schedule.next(at(6010)), Next::WaitUntil(at(6210)), "the next wait is two seconds");
     schedule.answered(None, device, Some(Duration::from_millis(10)), at(6100));

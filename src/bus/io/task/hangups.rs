@@ -92,6 +92,12 @@ impl Task<'_> {
         findings
     }
 
+    /// A request on which a connection has ended is the first on the next.
+    pub(super) fn suspect_first(&self, link: &Link) -> Option<Next> {
+        let suspect = self.hangups.suspect().filter(|_| link.answers() == 0 && self.under_way.is_empty())?;
+        self.blocks.iter().position(|planned| planned == suspect).map(Next::Run)
+    }
+
     /// May the other side have had enough of this connection?
     pub(super) fn check_used_up(&mut self, link: &Link) -> Result<(), LinkExit> {
         let network = self.settings.transport.serial().is_none();

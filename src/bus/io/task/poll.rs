@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     bus::{
+        backoff::Backoff,
         io::link::{Link, LinkError},
         plan::{self, Block, Wire, may_be_cut},
         schedule::{Failure, Schedule},
@@ -184,6 +185,10 @@ impl Task<'_> {
             schedule.hold_off(block.device, at + self.clock.plant_span(settles_in));
             return Ok(());
         }
+        if let (Some(index), Fault::OutOfSync) = (index, fault) {
+            // Nothing that it sends within a timeout proves anything.
+            schedule.later(index, at + self.clock.plant_span(self.settings.timeout));
+        }
         if schedule.failed(index, block.device, failure_of(fault), (began, took), at) {
             let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
             self.publish_failure(at, block.device, tags, Fault::BackedOff, None).await?;
@@ -245,7 +250,7 @@ impl Task<'_> {
             self.plan_again(link, schedule, at);
         }
         for unit in found.disbelieved {
-            let until = at + self.refused_all.entry(unit).or_default().fail();
+            let until = at + self.refused_all.entry(unit).or_insert_with(Backoff::for_ports).fail();
             let of_unit = |(_, block): &(usize, &Block)| block.unit == unit;
             self.blocks.iter().enumerate().filter(of_unit).for_each(|(index, _)| schedule.later(index, until));
         }

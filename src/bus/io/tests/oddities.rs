@@ -70,7 +70,7 @@ async fn a_bad_first_block_does_not_take_its_device_down() {
                 SlaveAction::Silent,
                 SlaveAction::BadCheck,
                 SlaveAction::Exception(4),
-                SlaveAction::Instead(vec![1, 3, 2, 0, 1]),
+                SlaveAction::Instead(vec![1, 3, 10, 0, 1, 0, 2, 0, 3, 0, 4, 0, 5]),
             ] {
                 if mode.has_ids() && what == SlaveAction::BadCheck {
                     continue;
@@ -86,7 +86,7 @@ async fn a_bad_first_block_does_not_take_its_device_down() {
                 let (reads, faults, _) = reads_until(&mut line, &def, 30).await;
                 for good in [10, 20, 400].into_iter().filter(|block| *block != bad) {
                     let count = reads.get(&good).copied().unwrap_or_default();
-                    assert!(20 <= count, "{mode:?}, {bad} is bad ({what:?}): {count} reads of {good} in 30 s");
+                    assert!(15 <= count, "{mode:?}, {bad} is bad ({what:?}): {count} reads of {good} in 30 s");
                 }
                 assert!(!faults.contains(&Fault::BackedOff), "{mode:?}, {bad} is bad ({what:?})");
             }
