@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_that_never_answers_is_told_apart_from_a_request() {
+    fn a_host_that_never_answers_is_no_fault_of_a_request() {
         let mut hangups = Hangups::default();
         let quiet = [(); 4].map(|()| hangups.on_end(&[], 0).is_quiet);
         assert_eq!(quiet, [true, true, false, false]);

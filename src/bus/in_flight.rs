@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_unit_that_queues_few_gets_few_and_a_lossy_network_changes_nothing() {
+    fn a_unit_that_queues_few_gets_few() {
         assert_eq!(settle(4, 50), 4, "of sixteen");
         assert_eq!(settle(1, 50), 1);
         assert_eq!(settle(16, 50), 16, "two frames in a hundred are lost");

@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_and_a_hole_are_told_apart() {
+    fn a_limit_and_a_hole_are_distinguished() {
         for code in 1..=4 {
             let mut known = UnreadableRanges::default();
             serve_with(&mut known, code, &[100], 50);

@@ -4,7 +4,7 @@
 //! (release + period) goes first. A release that is missed is counted and skipped, never piled up. On a line with too much
 //! to do (see [`overload`]) background polls are shed, critical polls go before normal ones, and normal ones share what is left. A device
 //! that does not answer (`device`) is asked with one block at a time, in turn; a block that fails alone waits alone. All of them together
-//! take a small share of the time that the others want, and whatever nobody wants.
+//! take a small share of the time that the others want, and all of the time that is left.
 
 pub mod budget;
 pub mod overload;

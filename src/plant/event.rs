@@ -241,7 +241,6 @@ pub enum Fault {
 /// What a fault proves about the device and the line; what exactly was wrong with a frame makes no difference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FaultKind {
-    /// No response: silence, or a closed connection in its place.
     Timeout,
     /// A frame came, but it was no valid response.
     Corrupt,

@@ -12,7 +12,7 @@ use super::{
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
-    tag::{Access, Decimals, Poll, StorePolicy, TagDef},
+    tag::{Decimals, Poll, StorePolicy, TagDef},
 };
 use crate::plant::{number::to_i64, time::elapsed};
 
@@ -56,12 +56,6 @@ struct Reading {
 }
 
 impl ProcessImage {
-    /// Has no tag of a device that is read a value, not even an uncertain one?
-    pub fn has_only_bad(&self, device: DeviceId) -> bool {
-        let mut read = self.def.tags_of(device).filter(|tag| tag.poll != Poll::Never && tag.access != Access::Write);
-        read.all(|tag| matches!(self.samples[tag.id.index()].quality, Quality::Bad(_)))
-    }
-
     /// Nothing read yet, as of `at`.
     pub fn new(def: Arc<PlantDef>, at: Timestamp) -> ProcessImage {
         let count = def.tags.len();

@@ -222,7 +222,7 @@ impl Own {
             Own::OtherMaster => [
                 "a PLC, a panel or a laptop is connected to the same line and sends requests of its own",
                 "requests collide, and what is read is not reliable: values become uncertain, then bad",
-                "find and stop the other master, or only listen to it (`listen = true` for the line)",
+                "find and stop the other master, or only listen to it (mode `listen` of the line)",
             ],
         }
     }

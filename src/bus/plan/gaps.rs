@@ -347,7 +347,7 @@ impl RangeBisection {
         Conclusion { replan: true, disbelieved }
     }
 
-    /// The same without a second refusal: for reads that somebody watches.
+    /// The same without a second refusal: for reads that an operator watches.
     pub fn conclude_at_once(&mut self, unreadable: &mut UnreadableRanges) {
         self.explain_cuts();
         let found: Vec<Obstacle> =

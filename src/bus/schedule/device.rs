@@ -37,8 +37,8 @@ const WHOLE_TIMEOUT_EVERY: u32 = 4;
 
 /// A device without any result, not even a failure, is asked again after this time.
 const TRIED_AGAIN: Duration = Duration::from_secs(1);
-/// Where the line has nothing else to do, a device that does not answer waits no longer than this: somebody may just have
-/// plugged it in …
+/// Where the line has nothing else to do, a device that does not answer waits no longer than this: the cable may just have
+/// been plugged in …
 const IDLE_WAIT_MAX: Duration = Duration::from_secs(5);
 /// … and no longer than this for so many failures if it has answered before: it may come back by itself.
 const IDLE_WAIT: Duration = Duration::from_secs(1);

@@ -112,11 +112,10 @@ fn a_dead_device_is_probed_with_backoff_and_read_when_back() {
     assert!(!fail(&mut schedule, 1, 1310), "it may have lost one frame, or have no answer to one block");
     assert_eq!(schedule.next(at(1610)), Next::WaitUntil(at(2000)));
     schedule.done(2, at(2000), at(2010));
-    assert_eq!(schedule.next(at(2010)), Next::WaitUntil(at(2610)), "the third try after a second, with one block");
+    assert_eq!(schedule.next(at(2010)), Next::WaitUntil(at(2610)), "the third after a second");
     assert!(fail(&mut schedule, 0, 2610), "given up with the third");
     assert!(schedule.is_down(device));
     schedule.done(2, at(3000), at(3010));
-    assert_eq!(schedule.next(at(3010)), Next::WaitUntil(at(3910)));
     assert!(!fail(&mut schedule, 1, 3910), "it is reported once");
     schedule.done(2, at(4210), at(4220));
     schedule.done(2, at(5000), at(5010));

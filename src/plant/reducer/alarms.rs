@@ -4,14 +4,16 @@ use super::{Effects, Plant};
 use crate::plant::{
     alarm::{AlarmCommand, AlarmRefusal, condition::Facts, state::OperatorNote},
     command::{CommandStatus, NotConfirmed, Outcome, Refusal},
-    def::{AlarmDef, AlarmId, Condition, Subject},
+    def::{AlarmDef, AlarmId, Condition, DeviceId, PlantDef, Subject},
     device_time::DeviceTime,
     event::LineState,
     ne107::{Reason, Signal},
     process_image::ProcessImage,
     record::{AlarmEvent, AlarmRecord, Record},
+    sample::Quality,
     snapshot::{DeviceState, DeviceStatus, LineStatus},
     station::{STATION, StationFault, StationFaults},
+    tag::{Access, Poll},
 };
 
 impl Plant {
@@ -83,7 +85,7 @@ impl Plant {
                 let no_values = report.is_some_and(|report| report.gives_no_values(device));
                 let state = devices[device.index()].state;
                 let failing = matches!(state, DeviceState::Failing(_));
-                let no_values = no_values || failing && image.has_only_bad(device);
+                let no_values = no_values || failing && has_only_bad(def, image, device);
                 answers(state, no_values).map(|answers| !answers)
             }
             // A plant that is played faster overloads the machine that plays it, not its lines.
@@ -163,6 +165,12 @@ fn facts(image: &ProcessImage, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
 /// The present value for an alarm that comes back.
 fn value_of(def: &crate::plant::PlantDef, image: &ProcessImage, alarm: AlarmId) -> Option<f64> {
     facts(image, None, def.alarms.get(alarm.index())?).value
+}
+
+/// Has no tag of a device that is read a value, not even an uncertain one?
+fn has_only_bad(def: &PlantDef, image: &ProcessImage, device: DeviceId) -> bool {
+    let mut read = def.tags_of(device).filter(|tag| tag.poll != Poll::Never && tag.access != Access::Write);
+    read.all(|tag| matches!(image.sample(tag.id).quality, Quality::Bad(_)))
 }
 
 /// A device that refuses everything is as good as silent.

@@ -119,7 +119,7 @@ async fn a_unit_that_answers_exact_blocks_only_is_read_within_seconds() {
 
 /// A device that refuses everything while it starts up is read soon after.
 #[tokio::test(start_paused = true)]
-async fn a_device_that_refuses_everything_while_it_starts_is_believed_when_it_is_up() {
+async fn a_refusal_of_everything_while_starting_is_not_believed() {
     for mode in Mode::ALL {
         for code in [2, 4] {
             let def = plant(mode);
