@@ -163,8 +163,8 @@ fn the_small_plant_is_right() {
     let plant = load(PLANT.as_bytes(), METER, PLC).unwrap_or_else(|errors| panic!("{errors}"));
     assert_eq!(plant.name, "small");
     let own = plant.alarms.iter().filter(|alarm| alarm.subject != Subject::Station).count();
-    assert_eq!(own, 4, "one written, not responding for two devices, and overloaded for the line");
-    assert_eq!(plant.alarms.len(), 4 + StationFault::ALL.len(), "and the faults of the station");
+    assert_eq!(own, 5, "one written, not responding for two devices, overloaded and another master for the line");
+    assert_eq!(plant.alarms.len(), 5 + StationFault::ALL.len(), "and the faults of the station");
     assert!(matches!(plant.alarms[1].condition, Condition::NotResponding));
     assert!(matches!(plant.alarms[3].condition, Condition::Overloaded));
     assert_eq!(plant.trends.len(), 1, "a group of pens is made up");

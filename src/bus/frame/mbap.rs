@@ -37,7 +37,8 @@ pub fn is_out_of_sync(mut stream: &[u8]) -> bool {
     loop {
         match mbap(stream) {
             Mbap::Whole { end, .. } => stream = &stream[end..],
-            Mbap::Incomplete => return stream.get(2..4).is_some_and(|protocol| protocol != [0, 0]),
+            // Of a header that has begun the protocol is 0, and so is the first byte of its length.
+            Mbap::Incomplete => return stream.iter().take(5).skip(2).any(|byte| *byte != 0),
             Mbap::Broken => return true,
         }
     }
@@ -59,7 +60,7 @@ impl ShortException {
 
 /// The short exception that a TCP stream begins with, to be looked for before [`mbap`], which would wait for bytes that never
 /// come, or take them from the next frame. `asked` gives the request message (unit and PDU) of an expected transaction.
-pub fn short_exception<'a>(stream: &[u8], asked: impl FnOnce(u16) -> Option<&'a [u8]>) -> Option<ShortException> {
+pub fn short_exception<'a>(stream: &[u8], asked: &impl Fn(u16) -> Option<&'a [u8]>) -> Option<ShortException> {
     let (&[high, low, protocol_high, protocol_low, length_high, length_low, unit, function, code], rest) =
         stream.split_first_chunk::<{ ShortException::LENGTH }>()?;
     let (transaction, length) = (u16::from_be_bytes([high, low]), u16::from_be_bytes([length_high, length_low]));
@@ -67,11 +68,12 @@ pub fn short_exception<'a>(stream: &[u8], asked: impl FnOnce(u16) -> Option<&'a 
         return None;
     }
     let answer = check_answer(Framing::Mbap, asked(transaction)?, &[unit, function, code]);
-    // What the header says is believed where it can be: an exception with bytes behind its code.
-    let is_right = stream.get(6 + usize::from(length)..).is_some_and(|rest| !is_out_of_sync(rest));
-    let is_header = 6 <= rest.len() && mbap(rest) != Mbap::Broken;
-    let is_short = matches!(answer, Err(Fault::Exception(_))) && !is_right && (rest.is_empty() || is_header);
-    is_short.then_some(ShortException { transaction, is_proven: is_header })
+    let is_header = |at: usize| stream.get(at..).is_some_and(|rest| 6 <= rest.len() && mbap(rest) != Mbap::Broken);
+    // A header where this one says the next stands: it is right, the exception has bytes behind its code.
+    let is_right = is_header(6 + usize::from(length));
+    let is_proven = is_header(ShortException::LENGTH) || short_exception(rest, asked).is_some();
+    let is_short = matches!(answer, Err(Fault::Exception(_))) && !is_right && (rest.is_empty() || is_proven);
+    is_short.then_some(ShortException { transaction, is_proven })
 }
 
 #[cfg(test)]
@@ -89,7 +91,7 @@ mod tests {
 
     fn short(stream: &[u8]) -> Option<bool> {
         let asked = |transaction| (transaction == 7).then_some(&ASKED[..]);
-        short_exception(stream, asked).map(|short| short.is_proven)
+        short_exception(stream, &asked).map(|short| short.is_proven)
     }
 
     #[test]
@@ -131,6 +133,7 @@ mod tests {
             (exception(3), "its length is right"),
             ([exception(4), vec![0]].concat(), "as long as its header says"),
             ([exception(4), vec![0], next.clone()].concat(), "as long as its header says, with the next behind"),
+            ([exception(7), vec![0; 4], next].concat(), "the next stands where the header says"),
             ([exception(6), vec![9, 9]].concat(), "what follows is no header"),
             ([exception(40), vec![9; 20]].concat(), "what follows is no header"),
             (with_mbap(7, &[1, 3, 2, 0, 5]), "no exception"),

@@ -147,7 +147,8 @@ impl ScheduledPoll {
     }
 
     /// It failed: silence is asked for once more at once, then after a wait that grows, and not before the line has time for it
-    /// (`affordable_from`); what was corrupt stays on its grid a few times.
+    /// (`affordable_from`); what was corrupt stays on its grid a few times if it
+    /// has been answered before.
     pub fn failed(&mut self, failure: Failure, now: Timestamp, affordable_from: Timestamp) {
         if failure == Failure::Doubt {
             return;
@@ -155,7 +156,7 @@ impl ScheduledPoll {
         self.failures = self.failures.saturating_add(1);
         match (failure, self.failures) {
             (Failure::Silence | Failure::OfGateway, 1) => self.later(now),
-            (Failure::Corrupt, ..CORRUPT_MAX) => {}
+            (Failure::Corrupt, ..CORRUPT_MAX) if self.answered => {}
             _ => {
                 let until = now + self.backoff.fail();
                 self.later(until.max(affordable_from));

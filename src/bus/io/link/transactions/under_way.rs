@@ -183,7 +183,7 @@ impl Transactions {
         let (mut frames, mut start, mut is_open) = (Vec::new(), 0, false);
         loop {
             let rest = &bytes[start..];
-            let (transaction, length) = match (frame::short_exception(rest, asked), frame::mbap(rest)) {
+            let (transaction, length) = match (frame::short_exception(rest, &asked), frame::mbap(rest)) {
                 (Some(short), _) if short.is_proven || waited => (short.transaction, ShortException::LENGTH),
                 (Some(_), _) => {
                     is_open = true;
