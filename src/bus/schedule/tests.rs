@@ -114,7 +114,6 @@ fn a_dead_device_is_probed_with_backoff_and_read_when_back() {
     schedule.done(2, at(2000), at(2010));
     assert_eq!(schedule.next(at(2010)), Next::WaitUntil(at(2610)), "the third after a second");
     assert!(fail(&mut schedule, 0, 2610), "given up with the third");
-    assert!(schedule.is_down(device));
     schedule.done(2, at(3000), at(3010));
     assert!(!fail(&mut schedule, 1, 3910), "it is reported once");
     schedule.done(2, at(4210), at(4220));

@@ -88,7 +88,9 @@ async fn a_bad_first_block_does_not_take_its_device_down() {
                     let count = reads.get(&good).copied().unwrap_or_default();
                     assert!(15 <= count, "{mode:?}, {bad} is bad ({what:?}): {count} reads of {good} in 30 s");
                 }
-                assert!(!faults.contains(&Fault::BackedOff), "{mode:?}, {bad} is bad ({what:?})");
+                // Good frames of a wrong length are noise to the others for a timeout: there it may be given up for a moment.
+                let is_noise = matches!(what, SlaveAction::Instead(_)) && !mode.has_ids();
+                assert!(is_noise || !faults.contains(&Fault::BackedOff), "{mode:?}, {bad} is bad ({what:?})");
             }
         }
     }
