@@ -326,6 +326,8 @@ class Writes:
 
 def ceiling(seconds, bin_folder, loop, folder):
     """Reads a second and CPU each of one TCP connection with three units of 3,000 blocks; one after the other, three times."""
+    window = max(3.0, seconds / 6)
+
     def station(in_flight):
         server = start([loop, "serve"], stdout=subprocess.PIPE, text=True)
         port, counts = int(server.stdout.readline()), []
@@ -336,13 +338,13 @@ def ceiling(seconds, bin_folder, loop, folder):
         process = start_station(bin_folder, folder, line_table("L", "TCP", port), devices, profiles)
         time.sleep(WARM_S)
         cpu, first = ticks(process.pid), len(counts)
-        time.sleep(seconds / 6)
+        time.sleep(window)
         cpu, last, rss = ticks(process.pid) - cpu, len(counts) - 1, memory(process.pid, "VmRSS")
         stop(process)
         server.wait()
         (t0, n0), (t1, n1) = (map(float, counts[i]) for i in (first, last))
         rate = (n1 - n0) / (t1 - t0)
-        return rate, cpu / (rate * seconds / 6), rss
+        return rate, cpu / (rate * window), rss
 
     def libmodbus():
         server = start([loop, "serve"], stdout=subprocess.PIPE, text=True)
