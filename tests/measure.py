@@ -155,4 +155,5 @@ def main():
         bytes_a_second(seconds, folder)
 
 
-main()
+if __name__ == "__main__":
+    main()
