@@ -123,7 +123,7 @@ impl Task<'_> {
                     self.stats.rest(&mut self.counters);
                     exit
                 }
-                Err(why) => Exit::Failed(why),
+                Err(exit) => exit,
             };
             match exit {
                 Exit::Shutdown => return Err(exit),
@@ -143,10 +143,21 @@ impl Task<'_> {
         }
     }
 
-    async fn open(&mut self) -> Result<Tap, String> {
-        match self.connector {
-            Connector::Real(transport) => Tap::open(transport, false).await,
-            Connector::Memory(_) => self.connector.open().await.map(Tap::of),
+    /// Opens the port, unless the station ends or an operator closes the line meanwhile.
+    async fn open(&mut self) -> Result<Tap, Exit> {
+        let connector = &mut *self.connector;
+        let open = async {
+            match connector {
+                Connector::Real(transport) => Tap::open(transport, false).await,
+                Connector::Memory(_) => connector.open().await.map(Tap::of),
+            }
+        };
+        tokio::select! {
+            biased;
+            _ = self.stop.wait_for(|stop| *stop) => Err(Exit::Shutdown),
+            opened = open => opened.map_err(Exit::Failed),
+            // The plant has no other settings for a line that only listens.
+            request = self.requests.recv_end_of_opening() => Err(request.map_or(Exit::Shutdown, |_| Exit::Closed)),
         }
     }
 

@@ -116,6 +116,23 @@ impl Requests {
         }
     }
 
+    /// Waits for what ends the opening of a port: that it be closed, or opened with other settings. All else waits until it is
+    /// open. May be dropped before there is one.
+    pub async fn recv_end_of_opening(&mut self) -> Result<BusRequest, Closed> {
+        let ends = |request: &BusRequest| matches!(request, BusRequest::Connect(false) | BusRequest::Configure(_));
+        loop {
+            let place = self.priority.iter().position(ends);
+            if let Some(request) = place.and_then(|place| self.priority.remove(place)) {
+                return Ok(request);
+            }
+            if PRIORITY_MAX <= self.priority.len() {
+                return std::future::pending().await;
+            }
+            let request = self.queue.recv().await.ok_or(Closed)?;
+            self.enqueue(request);
+        }
+    }
+
     /// The writes of a tag that still wait, taken out: they were requested before a stop, and would undo it.
     pub fn take_writes_of(&mut self, stopped: TagId) -> Vec<WriteId> {
         self.take_writes(|tag| tag == stopped)

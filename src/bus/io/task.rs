@@ -6,6 +6,7 @@ mod deferred_read_back;
 mod exit;
 mod hangups;
 mod live;
+mod opening;
 mod poll;
 mod read;
 mod test;

@@ -1,6 +1,7 @@
 //! The line task against a scripted slave in memory, in virtual time. Register N holds N, so that a value in a wrong tag
 //! shows the address it came from.
 
+mod connecting;
 mod listening;
 mod live;
 mod oddities;

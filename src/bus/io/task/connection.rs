@@ -21,7 +21,7 @@ impl Task<'_> {
             if !is_quiet {
                 self.publish_state(LineState::Connecting).await?;
             }
-            let exit = match self.connector.open().await {
+            let exit = match self.open().await {
                 Ok(port) => {
                     self.memory.counters.opens += 1;
                     if !is_quiet {
@@ -37,7 +37,7 @@ impl Task<'_> {
                     }
                     self.ended(&mut schedule, answers, exit).await?
                 }
-                Err(why) => LinkExit::PortFailed(why),
+                Err(exit) => self.refuse_waiting().await.err().unwrap_or(exit),
             };
             is_quiet = matches!(exit, LinkExit::UsedUp);
             if !matches!(exit, LinkExit::Reopen | LinkExit::Shutdown | LinkExit::UsedUp) {

@@ -234,19 +234,23 @@ pub struct Line {
     pub ports: mpsc::Sender<DuplexStream>,
     /// When its plant time began.
     pub since: Instant,
-    task: tokio::task::JoinHandle<()>,
-    _stop: watch::Sender<bool>,
+    pub task: tokio::task::JoinHandle<()>,
+    pub stop: watch::Sender<bool>,
 }
 
 pub fn line(def: PlantDef) -> Line {
+    let (ports, streams) = mpsc::channel(1_024);
+    line_on(def, ports, Connector::Memory(streams))
+}
+
+/// A line whose port is opened by this connector, which takes the `ports` if it is one in memory.
+pub fn line_on(def: PlantDef, ports: mpsc::Sender<DuplexStream>, mut connector: Connector) -> Line {
     let (sender, events) = mpsc::channel(64);
     let (requests, queue) = mpsc::channel(4);
     let (live, live_queue) = mpsc::channel(4);
-    let (ports, streams) = mpsc::channel(1_024);
     let (stop, stopped) = watch::channel(false);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
     let task = tokio::spawn(async move {
-        let mut connector = Connector::Memory(streams);
         let (mut requests, mut live) = (Requests::new(queue), LiveReads::new(live_queue));
         let def = Arc::new(def);
         match def.lines[0].listens {
@@ -256,7 +260,7 @@ pub fn line(def: PlantDef) -> Line {
             }
         }
     });
-    Line { events, requests, live, ports, since: Instant::now(), task, _stop: stop }
+    Line { events, requests, live, ports, since: Instant::now(), task, stop }
 }
 
 impl Line {
