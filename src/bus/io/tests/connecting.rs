@@ -1,4 +1,4 @@
-//! A host that answers no connection: nobody waits for it, neither the end of its line nor its operator.
+//! A host that answers no connection holds neither the end of its line nor its operator.
 
 use std::{net::TcpStream, time::Duration};
 
