@@ -295,7 +295,7 @@ impl Schedule {
         self.polls[index].spent(time);
     }
 
-    /// See [`ScheduledPoll::reschedule`].
+    /// A block that is read once could not be: it is due again soon, later each time; one that is read on request is not.
     pub fn reschedule(&mut self, index: usize, now: Timestamp) {
         self.polls[index].reschedule(now);
         self.requeue(index);
