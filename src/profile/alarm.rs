@@ -1,5 +1,6 @@
 //! Alarms: one condition each, on a tag, device or line; "not responding" for every device, "slower than its profile states"
-//! where that states a time, "line overloaded" for every line that is polled, "no traffic heard" for one that is listened to; the faults of the station.
+//! where that states a time, "line overloaded" for every line that is polled (without transaction ids also "another master polls this
+//! line"), "no traffic heard" for one that is listened to; the faults of the station.
 
 use std::{collections::HashMap, time::Duration};
 
