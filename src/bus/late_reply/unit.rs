@@ -66,9 +66,9 @@ impl Unit {
         self.settles_from = self.settles_from.map(|_| now);
     }
 
-    /// So long after its last frame nothing more comes.
+    /// So long after its last frame nothing more comes: twice the time that is waited where nothing proves anything.
     pub fn settling_time(&self, timeout: Duration) -> Duration {
-        2 * self.late_max.max(timeout)
+        2 * self.quarantine(timeout)
     }
 
     /// It has given an answer that cannot have been an older one.
