@@ -36,7 +36,7 @@ pub struct AckArgs {
     action: client::ActionArgs,
 }
 
-/// Writes and prints the outcome; anything but verified is a failure.
+/// Writes and prints the outcome; anything but verified, or sent where nothing can be, is a failure.
 pub fn write(args: WriteArgs) -> Result<(), CliError> {
     in_runtime(async {
         let mut actor = args.action.attach().await?;
@@ -54,15 +54,11 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         let (old, new, unit) = (words(status.old), words(new), snapshot.unit(tag));
         let recorded = client::recorded_words(status.recorded);
         let line = format!("{} {old} → {new} {unit}: {}{recorded}", args.tag, status.outcome);
-        match status.outcome {
-            Outcome::Verified | Outcome::Unchanged => {
-                say(&line);
-                Ok(())
-            }
-            Outcome::Pending | Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => {
-                Err(CliError::Failed(line))
-            }
+        if !status.outcome.is_success() {
+            return Err(CliError::Failed(line));
         }
+        say(&line);
+        Ok(())
     })
 }
 

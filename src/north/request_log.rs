@@ -61,6 +61,8 @@ pub enum RequestResult {
     Accepted,
     /// Read back and equal.
     Verified,
+    /// A broadcast is on its way: nothing can confirm it.
+    Sent,
     /// Nothing was written.
     Refused,
     /// The device holds another value.
@@ -78,6 +80,7 @@ impl Ended {
             Outcome::Unchanged => {
                 (RequestResult::Verified, Some("the device already had this value, nothing was written".to_owned()))
             }
+            Outcome::Sent => (RequestResult::Sent, Some("no unit answers a broadcast".to_owned())),
             Outcome::Refused(why) => (RequestResult::Refused, Some(why.to_string())),
             Outcome::Failed(fault) => (RequestResult::Failed, Some(fault.to_string())),
             Outcome::NotConfirmed(why) => {
@@ -231,6 +234,7 @@ mod tests {
         check(Outcome::Pending, None);
         check(Outcome::Verified, Some(RequestResult::Verified));
         check(Outcome::Unchanged, Some(RequestResult::Verified));
+        check(Outcome::Sent, Some(RequestResult::Sent));
         check(Outcome::NotConfirmed(NotConfirmed::Different(48.0)), Some(RequestResult::Failed));
         check(Outcome::NotConfirmed(NotConfirmed::NotApplied(48.0)), Some(RequestResult::Failed));
         check(Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)), Some(RequestResult::Unknown));

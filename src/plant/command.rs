@@ -181,6 +181,8 @@ pub enum Outcome {
     Verified,
     /// The device already had this value: nothing was written, memory is spared.
     Unchanged,
+    /// A broadcast is on its way to all units of its line: none answers, so nothing can confirm it.
+    Sent,
     /// Not done, and certainly without effect on the tag. An unlock register that was sent before has an audit entry of its own.
     Refused(Refusal),
     /// A write that may or may not have taken effect, or had another effect than requested.
@@ -195,12 +197,18 @@ impl Outcome {
         matches!(self, Outcome::Verified | Outcome::Unchanged)
     }
 
+    /// Has it ended as well as it can?
+    pub fn is_success(&self) -> bool {
+        self.is_done() || *self == Outcome::Sent
+    }
+
     /// The outcome without its reason, the same on screen, in the history and in CSV.
     pub fn label(&self) -> &'static str {
         match self {
             Outcome::Pending => "pending",
             Outcome::Verified => "verified",
             Outcome::Unchanged => "unchanged",
+            Outcome::Sent => "sent",
             Outcome::Refused(_) => "refused",
             Outcome::NotConfirmed(_) => "not confirmed",
             Outcome::Failed(_) => "failed",
@@ -221,6 +229,7 @@ impl fmt::Display for Outcome {
         match self {
             Outcome::Pending | Outcome::Verified => Ok(()),
             Outcome::Unchanged => f.write_str(t!(", not written")),
+            Outcome::Sent => f.write_str(t!(", no unit answers a broadcast")),
             Outcome::Refused(why) => write!(f, ": {why}"),
             Outcome::NotConfirmed(why) => write!(f, ": {why}"),
             Outcome::Failed(fault) => write!(f, ": {fault}"),

@@ -276,6 +276,7 @@ fn without_read_back(result: &WriteResult) -> Outcome {
         WriteResult::Superseded => Outcome::Refused(Refusal::Superseded),
         WriteResult::NoValidResponse(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
         WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(*fault)),
+        WriteResult::Sent => Outcome::Sent,
         WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::ReadBackAfterNoResponse(_) => {
             Outcome::NotConfirmed(NotConfirmed::NoReadBack)
         }

@@ -140,6 +140,8 @@ pub enum WriteResult {
     NotRead(Fault),
     /// The device accepted it; the profile excludes a read-back.
     Accepted,
+    /// A broadcast has left: no unit answers it.
+    Sent,
     /// The device refused with an exception.
     Refused(ExceptionCode),
     /// No valid answer: it is not known whether the write took effect.

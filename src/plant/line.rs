@@ -153,6 +153,13 @@ pub enum Framing {
     Mbap,
 }
 
+impl Framing {
+    /// Is what is sent to this unit for all units of the line, of which none answers?
+    pub fn is_broadcast(self, unit: u8) -> bool {
+        unit == 0 && self != Framing::Mbap
+    }
+}
+
 /// Serial parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Serial {

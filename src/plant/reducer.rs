@@ -350,7 +350,7 @@ impl Plant {
     /// Unless a write was read back or certainly had no effect, the present value becomes uncertain.
     fn written(&mut self, tag: TagId, result: &WriteResult, at: Timestamp) {
         match result {
-            WriteResult::Accepted => self.image.written(tag, None, at),
+            WriteResult::Accepted | WriteResult::Sent => self.image.written(tag, None, at),
             WriteResult::NotRead(fault) | WriteResult::NoValidResponse(fault) => {
                 self.image.written(tag, Some(*fault), at)
             }

@@ -21,7 +21,7 @@ use super::{
     tag::{self, DeviceContext},
 };
 use crate::plant::{
-    def::{DeviceDef, DeviceId, Framing, LineDef, LineId, MimicDef, PlantDef, TagId},
+    def::{DeviceDef, DeviceId, LineDef, LineId, MimicDef, PlantDef, TagId},
     number::to_u16,
     poll_class,
     record::hex,
@@ -217,10 +217,10 @@ fn check_broadcasts(
     problems: &mut Problems,
 ) {
     for (device, known) in devices.iter().zip(known) {
-        let broadcasts = |line: &&LineDef| line.id == device.line && line.transport.framing() != Framing::Mbap;
-        let serial = lines.iter().find(broadcasts).is_some();
+        let line = lines.iter().find(|line| line.id == device.line);
+        let to_all = line.is_some_and(|line| line.transport.framing().is_broadcast(device.unit));
         let readable = tags.iter().find(|tag| tag.device == device.id && tag.access != Access::Write);
-        if let (true, 0, Some(unit), Some(tag)) = (serial, device.unit, known.table.unit, readable) {
+        if let (true, Some(unit), Some(tag)) = (to_all, known.table.unit, readable) {
             problems
                 .add(unit.at, format!("unit 0 is a broadcast, which no unit answers: {} can never be read", tag.name))
                 .label("expected 1 to 247, or a profile whose tags all have access = \"w\"");

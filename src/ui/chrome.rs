@@ -216,6 +216,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
         Outcome::Pending => (t!("pending …").to_owned(), false),
         Outcome::Verified => (t!("verified").to_owned(), false),
         Outcome::Unchanged => (t!("unchanged, nothing written").to_owned(), false),
+        Outcome::Sent => (t!("sent to all units; a broadcast has no response").to_owned(), false),
         Outcome::Refused(why) => (t!("REFUSED: {why}", why), true),
         Outcome::NotConfirmed(NotConfirmed::NoReadBack) => (t!("accepted (cannot be read back)").to_owned(), false),
         Outcome::NotConfirmed(how @ (NotConfirmed::PartlyWritten { .. } | NotConfirmed::PartlyAccepted { .. })) => {

@@ -256,7 +256,7 @@ fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option
     let real_s = plant_s / cx.snapshot.speed.clamp(0.01, 1e6);
     let (well, lasts) = match status.outcome {
         Outcome::Pending => (None, f64::MAX),
-        Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(NotConfirmed::NoReadBack) => {
+        Outcome::Verified | Outcome::Unchanged | Outcome::Sent | Outcome::NotConfirmed(NotConfirmed::NoReadBack) => {
             (Some(true), DONE_S)
         }
         Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => (Some(false), FAILED_S),
@@ -283,12 +283,13 @@ pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
             return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
         }
         // A command that cannot be read back was taken, which says nothing while it is blocked.
-        Some((Outcome::NotConfirmed(_), Some(true))) if blocked => {}
+        Some((Outcome::NotConfirmed(_) | Outcome::Sent, Some(true))) if blocked => {}
         // Only while the output is as commanded: another mode may have taken over since.
         Some((outcome, Some(true))) if follows_command(cx, actuator) => {
             let word = match outcome {
                 Outcome::NotConfirmed(_) => t!("accepted"),
                 Outcome::Unchanged => t!("unchanged"),
+                Outcome::Sent => t!("sent"),
                 Outcome::Pending | Outcome::Verified | Outcome::Refused(_) | Outcome::Failed(_) => t!("done"),
             };
             return Some((format!("{} {word}", theme.pick("✓", t!("ok"))), theme.normal()));

@@ -36,7 +36,7 @@ use crate::plant::{
     def::{DeviceId, LineDef, TagId},
     event::{Event, ExceptionCode, Fault, LineState, WriteResult},
     request_stats::RequestStats,
-    tag::{Access, Poll, TagDef},
+    tag::{Access, DataType, Poll, Table, TagDef},
 };
 
 /// Runs a line against a script until `polls` block reads have ended; gives good and failed ones.

@@ -89,7 +89,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Bytes { bytes, .. } if !bytes.is_empty() => Some(bytes),
         _ => None,
     });
-    let broadcast = framing != Framing::Mbap && message.first() == Some(&0);
+    let broadcast = message.first().is_some_and(|unit| framing.is_broadcast(*unit));
     match (answer, broadcast) {
         (None, false) => Err(CliError::Failed(format!("no answer within {} ms", line.timeout.as_millis()))),
         (None, true) => {
@@ -150,7 +150,7 @@ fn errors(message: &[u8], frame: &[u8], framing: Framing) -> Vec<String> {
         let [got_low, got_high] = check;
         errors = vec![format!("wrong CRC: found {got_low:02X} {got_high:02X}, expected {low:02X} {high:02X}")];
     }
-    if framing != Framing::Mbap && message.first() == Some(&0) && errors.is_empty() {
+    if message.first().is_some_and(|unit| framing.is_broadcast(*unit)) && errors.is_empty() {
         errors.push("unit 0 is a broadcast: every unit on the line executes it and none responds".into());
     }
     let behind = frame.len().saturating_sub(frame::wrap(framing, 1, message).len());

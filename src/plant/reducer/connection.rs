@@ -74,8 +74,11 @@ impl Plant {
             self.devices[device.id.index()].state = DeviceState::Unknown;
             self.image.not_heard(device.id);
         }
-        let Some(device_state) = gone else { return action };
+        let Some(gone) = gone else { return action };
         for device in self.def.devices.iter().filter(|device| device.line == line) {
+            // Of all units of a line together nothing is ever heard that could say that they are back.
+            let to_all = self.def.line(line).transport.framing().is_broadcast(device.unit);
+            let device_state = if to_all { DeviceState::Unknown } else { gone };
             let status = &mut self.devices[device.id.index()];
             if !matches!((status.state, device_state), (DeviceState::Down { .. }, DeviceState::Down { .. })) {
                 status.state = device_state;

@@ -63,7 +63,10 @@ impl Plant {
     fn settling(&self, device: DeviceId) -> bool {
         let actions = &self.def.device(device).actions;
         self.commands.commands().any(|status| match (&status.command.kind, &status.outcome) {
-            (CommandKind::Write { tag, value }, Outcome::Verified | Outcome::NotConfirmed(_) | Outcome::Failed(_)) => {
+            (
+                CommandKind::Write { tag, value },
+                Outcome::Verified | Outcome::Sent | Outcome::NotConfirmed(_) | Outcome::Failed(_),
+            ) => {
                 let age = elapsed(status.at, self.at);
                 actions.iter().any(|action| action.tag == *tag && action.value == *value && age < action.settle)
             }

@@ -8,7 +8,7 @@ use super::{Expectation, Scenario};
 use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
-    command::{CommandStatus, Outcome},
+    command::CommandStatus,
     def::{AlarmId, PlantDef, TagId},
     record::{AlarmEvent, AlarmRecord, Record},
 };
@@ -158,7 +158,7 @@ impl Judge {
 
     fn on_command(&mut self, status: &CommandStatus) {
         let (Some(at), Some((tag, value))) = (self.elapsed(status.at), status.command.kind.written()) else { return };
-        let done = matches!(status.outcome, Outcome::Verified | Outcome::Unchanged);
+        let done = status.outcome.is_success();
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             let Expectation::Written(wanted, number) = expect.expectation else { continue };
             if done && wanted == tag && number == value && expect.from <= at && at <= expect.until {

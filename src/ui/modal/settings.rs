@@ -324,8 +324,11 @@ fn not_saved(cx: &ViewContext, line: LineId) -> Option<String> {
     let saved = cx.snapshot.commands.iter().find(|status| status.command.kind == CommandKind::SaveSettings(line))?;
     match &saved.outcome {
         Outcome::Refused(why) => Some(format!("! {why}")),
-        Outcome::Pending | Outcome::Verified | Outcome::Unchanged | Outcome::NotConfirmed(_) | Outcome::Failed(_) => {
-            None
-        }
+        Outcome::Pending
+        | Outcome::Verified
+        | Outcome::Unchanged
+        | Outcome::Sent
+        | Outcome::NotConfirmed(_)
+        | Outcome::Failed(_) => None,
     }
 }

@@ -115,7 +115,7 @@ impl Task<'_> {
                 .await?;
             }
             // The value is unknown until it is read again.
-            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::NoValidResponse(_) => {
+            WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Sent | WriteResult::NoValidResponse(_) => {
                 schedule.refresh(tag.device, self.clock.now());
             }
             // The unlock register may have changed since it was read.
@@ -152,7 +152,7 @@ impl Task<'_> {
             self.end_unconfirmed(unlock_tag.id).await?;
         }
         Ok(match sent {
-            Ok(WriteResult::Accepted) => Unlocked::Yes,
+            Ok(WriteResult::Accepted | WriteResult::Sent) => Unlocked::Yes,
             // A stop is tried all the same: an unlock register without a reply may have arrived.
             Ok(WriteResult::NoValidResponse(_)) if job.urgent => Unlocked::Yes,
             // The value itself was never on the wire.
@@ -162,7 +162,7 @@ impl Task<'_> {
         })
     }
 
-    /// Sends one number: accepted, refused, without a valid response, not sent, or overtaken by a stop of any tag. `Err`: the port closed.
+    /// Sends one number: accepted, sent to all, refused, without a valid response, not sent, or overtaken by a stop of any tag. `Err`: the port closed.
     async fn send_number(
         &mut self,
         link: &mut Link,
@@ -192,7 +192,8 @@ impl Task<'_> {
         match sent {
             Ok(()) => {
                 schedule.answered(None, tag.device, None, self.clock.now());
-                Ok(WriteResult::Accepted)
+                let to_all = link.framing().is_broadcast(device.unit);
+                Ok(if to_all { WriteResult::Sent } else { WriteResult::Accepted })
             }
             Err(LinkError::Gone(why)) => Err(why),
             Err(LinkError::Fault(Fault::Exception(code))) if own && code.is_refusal() => Ok(WriteResult::Refused(code)),
@@ -209,20 +210,20 @@ impl Task<'_> {
     ) -> WriteEnd {
         let def = self.def.clone();
         let tag = def.tag(tag);
-        match self.send_number(link, schedule, tag, raw, urgent).await {
-            Ok(WriteResult::Accepted) => {}
+        let accepted = match self.send_number(link, schedule, tag, raw, urgent).await {
+            Ok(accepted @ (WriteResult::Accepted | WriteResult::Sent)) => accepted,
             Ok(ended) => return WriteEnd::Ended(ended),
             // It may or may not have arrived.
             Err(why) => return WriteEnd::PortClosed(WriteResult::NoValidResponse(Fault::NotConnected), why),
-        }
+        };
         let device = def.device(tag.device);
         // An action such as saving to non-volatile memory wants the device left alone, not the line.
         let is_this = |action: &&ActionDef| action.tag == tag.id && scale::to_raw(tag, action.value, 0) == Some(raw);
         if let Some(action) = device.actions.iter().find(is_this) {
             schedule.hold_off(tag.device, self.clock.now() + action.settle);
         }
-        if !verify {
-            return WriteEnd::Ended(WriteResult::Accepted);
+        if !verify || accepted == WriteResult::Sent {
+            return WriteEnd::Ended(accepted);
         }
         let block = plan::single(device, tag);
         WriteEnd::Ended(match self.read_unless_stopped(link, &block, None).await {

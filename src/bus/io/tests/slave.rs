@@ -69,10 +69,13 @@ impl Mode {
         }
     }
 
-    /// Where the request at the beginning of the buffer ends, once it is whole. Requests here have eight bytes in RTU.
+    /// Where the request at the beginning of the buffer ends, once it is whole. In RTU, but for writes of several, it has eight bytes.
     pub fn end(self, buffer: &[u8]) -> Option<usize> {
         match self.framing() {
-            Framing::Rtu => (8 <= buffer.len()).then_some(8),
+            Framing::Rtu => {
+                let end = if let Some(15 | 16) = buffer.get(1) { 9 + usize::from(*buffer.get(6)?) } else { 8 };
+                (end <= buffer.len()).then_some(end)
+            }
             Framing::Ascii => buffer.iter().position(|char| *char == b'\n').map(|last| last + 1),
             Framing::Mbap => match frame::mbap(buffer) {
                 Mbap::Whole { end, .. } => Some(end),
@@ -154,6 +157,8 @@ pub fn correct(message: &[u8]) -> Vec<u8> {
             let values = (word(2)..word(2) + word(4)).flat_map(u16::to_be_bytes);
             [message[0], 3, 2 * message[5]].into_iter().chain(values).collect()
         }
+        // Of several registers or coils the answer tells where and how many.
+        15 | 16 => message[..6].to_vec(),
         _ => message.to_vec(),
     }
 }

@@ -55,46 +55,54 @@ async fn a_write_is_sent_once_whatever_happens() {
     }
 }
 
-/// A broadcast is sent once, without waiting for a response, and reported as accepted, not as verified.
+/// A broadcast is sent once, without waiting for a response, by each function that writes. Modbus TCP has none: there unit 0
+/// answers as any other does.
 #[tokio::test(start_paused = true)]
 async fn a_broadcast_is_sent_once_and_never_called_verified() {
-    for mode in [Mode::Rtu, Mode::Ascii] {
-        let mut def = plant(mode);
-        def.devices[0].unit = 0;
-        def.tags.retain(|tag| tag.device == DeviceId(1));
-        let everybody = TagDef { device: DeviceId(0), access: Access::Write, ..def.tags[0].clone() };
-        def.tags.insert(0, everybody);
-        for (index, tag) in def.tags.iter_mut().enumerate() {
-            tag.id = TagId(index as u16);
-        }
-        let mut line = line(def.clone());
-        let heard = Arc::new(AtomicUsize::new(0));
-        let count = heard.clone();
-        line.plug(mode, move |_, message| {
-            if message[0] != 0 {
-                return SlaveAction::Answer;
+    let expected = [
+        (Mode::Rtu, WriteResult::Sent),
+        (Mode::Ascii, WriteResult::Sent),
+        (Mode::RtuOverTcp, WriteResult::Sent),
+        (Mode::Tcp, WriteResult::Accepted),
+    ];
+    for (mode, expect) in expected {
+        for function in [5, 6, 15, 16] {
+            let mut def = plant(mode);
+            def.devices[0].unit = 0;
+            def.tags.retain(|tag| tag.device == DeviceId(1));
+            let mut everybody = TagDef { device: DeviceId(0), access: Access::Write, ..def.tags[0].clone() };
+            everybody.write_fc = Some(function);
+            if function != 6 && function != 16 {
+                (everybody.point.table, everybody.point.kind) = (Table::Coil, DataType::Bool);
             }
-            count.fetch_add(1, Ordering::Relaxed);
-            SlaveAction::Silent
-        });
-        line.read(&def).await;
-        let request = BusRequest::Write(WriteJob {
-            id: WriteId(1),
-            tag: TagId(0),
-            raw: 7.0,
-            unlock: None,
-            verify: false,
-            urgent: false,
-        });
-        line.requests.send(request).await.expect("the line runs");
-        let result = line
-            .until(&def, |event| match event {
-                Event::Wrote { result, .. } => Some(result.clone()),
-                _ => None,
-            })
-            .await;
-        assert_eq!((result, heard.load(Ordering::Relaxed)), (WriteResult::Accepted, 1), "{mode:?}");
-        line.read(&def).await;
+            def.tags.insert(0, everybody);
+            for (index, tag) in def.tags.iter_mut().enumerate() {
+                tag.id = TagId(index as u16);
+            }
+            let mut line = line(def.clone());
+            let heard = Arc::new(AtomicUsize::new(0));
+            let count = heard.clone();
+            line.plug(mode, move |_, message| {
+                if message[0] != 0 {
+                    return SlaveAction::Answer;
+                }
+                assert_eq!(message[1], function);
+                count.fetch_add(1, Ordering::Relaxed);
+                if mode == Mode::Tcp { SlaveAction::Answer } else { SlaveAction::Silent }
+            });
+            line.read(&def).await;
+            let job =
+                WriteJob { id: WriteId(1), tag: TagId(0), raw: 1.0, unlock: None, verify: false, urgent: false };
+            line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
+            let result = line
+                .until(&def, |event| match event {
+                    Event::Wrote { result, .. } => Some(result.clone()),
+                    _ => None,
+                })
+                .await;
+            assert_eq!((result, heard.load(Ordering::Relaxed)), (expect.clone(), 1), "{mode:?}, function {function}");
+            line.read(&def).await;
+        }
     }
 }
 

@@ -148,8 +148,7 @@ pub(super) fn summary(listener: &Listener, line: &LineDef, time: Duration) -> Ve
             "  unit  requests        ok  refused  no response  corrupt  unmatched     median        max".to_owned(),
         );
     }
-    let broadcast = |unit: u8| unit == 0 && line.transport.framing() != Framing::Mbap;
-    lines.extend(listener.units().iter().map(|(unit, stats)| match broadcast(*unit) {
+    lines.extend(listener.units().iter().map(|(unit, stats)| match line.transport.framing().is_broadcast(*unit) {
         true => format!("   all  {:8}  broadcasts, to which no unit responds", stats.requests),
         false => row(*unit, stats),
     }));

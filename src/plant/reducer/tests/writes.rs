@@ -231,3 +231,27 @@ fn a_written_value_is_uncertain_for_the_true_cause() {
     check(WriteResult::NoValidResponse(Fault::Exception(ExceptionCode(4))), "uncertain: refused by the device");
     check(WriteResult::Refused(ExceptionCode(3)), "good");
 }
+
+#[test]
+fn a_broadcast_is_sent_and_its_device_never_silent() {
+    let mut def = fixture::plant();
+    def.devices[PLC.index()].unit = 0;
+    def.tags[RUN.index()].access = crate::plant::tag::Access::Write;
+    def.alarms[SILENT.index()].subject = Subject::Device(PLC);
+    let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
+    let waiting = LineState::Waiting { why: "unplugged".into(), retry_at: at(2) };
+    for (second, state) in [(0, waiting), (2, LineState::Connected)] {
+        let effects = plant.on_event(Event::Line { at: at(second), line: L1, state });
+        assert_eq!(alarm_events(effects), []);
+        let snapshot = plant.snapshot();
+        assert_eq!(snapshot.devices[PLC.index()].state, DeviceState::Unknown, "at {second} s");
+        assert_ne!(snapshot.devices[TIC.index()].state, DeviceState::Unknown, "at {second} s");
+    }
+    assert_eq!(alarm_events(plant.on_tick(at(60))), []);
+    let effects = plant.on_command(shown(&plant, 1, RUN, 1.0), at(61));
+    let BusRequest::Write(job) = &effects.bus[0].1 else { panic!("not a write") };
+    let effects = plant.on_event(Event::Wrote { at: at(61), id: job.id, result: WriteResult::Sent });
+    assert_eq!(actions(&effects), ["anna write PLC-1.RUN sent, no unit answers a broadcast"]);
+    let outcome = &plant.snapshot().commands[0].outcome;
+    assert!(outcome.is_success() && *outcome == Outcome::Sent, "{outcome:?}");
+}

@@ -244,7 +244,7 @@ fn danger(cx: &ViewContext, at: &LineView, diagnostic: &Diagnostic) -> Option<St
             let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Request), None);
             let lint = || request_lint::check_request(&dissection.message, framing).first().map(ToString::to_string);
             let wrong = dissection.wrong.clone().or_else(lint);
-            let broadcast = dissection.message.first() == Some(&0) && framing != Framing::Mbap;
+            let broadcast = dissection.message.first().is_some_and(|unit| framing.is_broadcast(*unit));
             let means = meaning::of_request(cx.snapshot, at.id, &dissection.message);
             let summary = [vec![dissection.summary], means].concat().join(". ");
             match (wrong, broadcast, request_lint::only_reads(&dissection.message)) {

@@ -66,7 +66,7 @@ fn failed_commands(cx: &ViewContext) -> impl Iterator<Item = Row> {
     let commands = &cx.snapshot.commands;
     let has_failed = |status: &CommandStatus| match status.outcome {
         Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => true,
-        Outcome::Pending | Outcome::Verified | Outcome::Unchanged => false,
+        Outcome::Pending | Outcome::Verified | Outcome::Unchanged | Outcome::Sent => false,
     };
     let is_latest = move |n: usize, tag| {
         let mut later = commands[..n].iter().filter_map(|status| status.command.kind.written());
