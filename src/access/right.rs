@@ -167,14 +167,14 @@ mod tests {
         assert_eq!(controller.profile, "fuji_pxr");
         for tag in def.tags_of(controller.id).filter(|tag| tag.writable()) {
             let role = if operated.contains(&tag.short.as_str()) { Role::Technician } else { Role::Supervisor };
-            assert_eq!(needs(&def, &CommandKind::Write { tag: tag.id, value: 1.0 }), role, "{}", tag.name);
+            assert_eq!(needs(&def, &CommandKind::Write { tag: tag.id, value: 1.0.into() }), role, "{}", tag.name);
         }
     }
 
     #[test]
     fn a_set_needs_the_role_of_its_strictest_setting() {
         let mut def = fixture::plant();
-        let change = |tag| PlannedChange { tag, old: 0.0, new: 1.0 };
+        let change = |tag| PlannedChange { tag, old: 0.0.into(), new: 1.0.into() };
         let set = Arc::new(ParameterSet {
             name: "winter".into(),
             device: "PLC-1".into(),
@@ -204,7 +204,7 @@ mod tests {
         def.tags[fixture::RUN.index()].role = Role::Supervisor;
         let write = |value| CommandKind::Write { tag: fixture::RUN, value };
         let role = |def: &PlantDef, value| needs(def, &write(value));
-        assert_eq!([0.0, 1.0, 2.0].map(|value| role(&def, value)), [Role::Supervisor; 3]);
+        assert_eq!([0.0, 1.0, 2.0].map(|value| role(&def, value.into())), [Role::Supervisor; 3]);
         let device = def.tag(fixture::RUN).device.index();
         let action = ActionDef {
             name: "GO".into(),
@@ -219,7 +219,7 @@ mod tests {
         let stop = ActionDef { value: 0.0, stop: true, role: None, ..action.clone() };
         def.devices[device].actions = vec![action, stop];
         let expected = [Role::Technician, Role::Technician, Role::Supervisor];
-        assert_eq!([0.0, 1.0, 2.0].map(|value| role(&def, value)), expected);
+        assert_eq!([0.0, 1.0, 2.0].map(|value| role(&def, value.into())), expected);
         assert_eq!(interlock::least_role_to_write(&def, fixture::RUN), Role::Technician);
     }
 
@@ -232,7 +232,7 @@ mod tests {
         let serial = crate::plant::def::Serial::USUAL;
         let signal = SignalTest { signal: OutputSignal::Rts, on: true, seconds: 1 };
         let technician = [
-            CommandKind::Write { tag: TagId(1), value: 1.0 },
+            CommandKind::Write { tag: TagId(1), value: 1.0.into() },
             CommandKind::Alarm(AlarmCommand::Acknowledge {
                 alarm: AlarmId(0),
                 annunciated_at: jiff::Timestamp::UNIX_EPOCH,

@@ -10,31 +10,32 @@
 //! ```
 
 use crate::plant::{
-    number::{to_f32, to_i64, to_u16, to_u64},
+    exact::Exact,
+    number::{to_f32, to_u16},
     tag::{ByteOrder, DataType, Encoding, Point},
     visible::is_printable,
 };
 
 /// The number that the words of a point hold; `None` for what is not a number: BCD with a digit above 9, NaN, infinity.
-/// A 64-bit integer beyond 2^53 is rounded to the nearest `f64`, by one part in 10^16 at most. `words` has [`Point::len`]
-/// words.
+/// `words` has [`Point::len`] words.
 #[expect(clippy::cast_possible_truncation, reason = "each kind takes the bits of its own width")]
-pub fn decode(point: Point, words: &[u16]) -> Option<f64> {
+pub fn decode(point: Point, words: &[u16]) -> Option<Exact> {
     let bytes = to_bytes(point.order, words);
     let bits = bytes.iter().fold(0u64, |bits, byte| (bits << 8) | u64::from(*byte));
     if let Some((low, width)) = point.field {
-        return Some(((bits >> low) & mask(width)) as f64);
+        return Some(Exact::whole(((bits >> low) & mask(width)).into()));
     }
     let size = 16 * u32::from(point.kind.registers());
-    match point.kind.encoding() {
-        Encoding::Bit => Some(f64::from(u8::from(bits != 0))),
-        Encoding::Unsigned => Some(bits as f64),
-        Encoding::Signed => Some(((bits << (64 - size)).cast_signed() >> (64 - size)) as f64),
-        Encoding::Float if size == 32 => Some(f64::from(f32::from_bits(bits as u32))).filter(|value| value.is_finite()),
-        Encoding::Float => Some(f64::from_bits(bits)).filter(|value| value.is_finite()),
-        Encoding::Bcd => from_bcd(bits, size / 4),
-        Encoding::Text => None,
-    }
+    let number = match point.kind.encoding() {
+        Encoding::Bit => f64::from(u8::from(bits != 0)),
+        Encoding::Unsigned => return Some(Exact::whole(bits.into())),
+        Encoding::Signed => return Some(Exact::whole(((bits << (64 - size)).cast_signed() >> (64 - size)).into())),
+        Encoding::Float if size == 32 => f64::from(f32::from_bits(bits as u32)),
+        Encoding::Float => f64::from_bits(bits),
+        Encoding::Bcd => from_bcd(bits, size / 4)?,
+        Encoding::Text => return None,
+    };
+    number.is_finite().then(|| number.into())
 }
 
 /// What stands for a byte that is no part of a printable character.
@@ -70,14 +71,15 @@ pub fn encode_text(point: Point, text: &str) -> Option<Vec<u16>> {
 
 /// The words to write for a number; `None` if it does not fit the type, is no whole number where one is needed, or the
 /// point is a field of bits inside a word (writing it would be a read-modify-write that races with the device).
-pub fn encode(point: Point, value: f64) -> Option<Vec<u16>> {
-    if point.field.is_some() || !value.is_finite() {
+pub fn encode(point: Point, value: impl Into<Exact>) -> Option<Vec<u16>> {
+    let exact = value.into();
+    if point.field.is_some() || !exact.is_finite() {
         return None;
     }
+    let value = exact.near();
     let whole = || {
         let (low, high) = point.kind.whole_range()?;
-        let fits = value.fract() == 0.0 && low.max(-EXACT) <= value && value <= high.min(EXACT);
-        fits.then(|| to_i64(value).cast_unsigned())
+        exact.as_whole().filter(|whole| (low..=high).contains(whole)).map(|_| exact.bits())
     };
     let bits = match point.kind.encoding() {
         Encoding::Bit | Encoding::Unsigned | Encoding::Signed => whole()?,
@@ -94,18 +96,13 @@ pub fn encode(point: Point, value: f64) -> Option<Vec<u16>> {
 
 /// The masks of a mask write (function 22: result = (word AND and) OR (or AND NOT and)) that sets a field of bits inside
 /// a word and leaves the other bits to the device (V1.1b3, 6.16).
-pub fn field_masks(point: Point, value: f64) -> Option<(u16, u16)> {
+pub fn field_masks(point: Point, value: impl Into<Exact>) -> Option<(u16, u16)> {
     let (low, width) = point.field.filter(|_| point.kind.registers() == 1)?;
     let field = mask(width);
-    if value.fract() != 0.0 || value < 0.0 || field as f64 <= value - 1.0 {
-        return None;
-    }
+    let value = value.into().as_whole().filter(|value| (0..=field.into()).contains(value))?;
     let on_wire = |bits: u64| from_bytes(point.order, &to_u16(bits).to_be_bytes())[0];
-    Some((!on_wire(field << low), on_wire(to_u64(value) << low)))
+    Some((!on_wire(field << low), on_wire(Exact::whole(value).bits() << low)))
 }
-
-/// Whole numbers up to here an `f64` carries exactly, and no other rounds to one of them.
-const EXACT: f64 = 9_007_199_254_740_991.0;
 
 fn mask(width: u8) -> u64 {
     u64::MAX.checked_shr(64 - u32::from(width)).unwrap_or(0)
@@ -164,7 +161,7 @@ mod tests {
             (ByteOrder::Badc, [0x6643, 0x3333]),
             (ByteOrder::Dcba, [0x3333, 0x6643]),
         ] {
-            assert_eq!(decode(point(DataType::F32, order), &words), Some(value), "{order:?}");
+            assert_eq!(decode(point(DataType::F32, order), &words), Some(value.into()), "{order:?}");
             assert_eq!(encode(point(DataType::F32, order), value).as_deref(), Some(&words[..]), "{order:?}");
         }
     }
@@ -182,15 +179,24 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_too_large_for_a_double_is_rounded() {
-        for (kind, words, expect) in [
-            (DataType::U64, [0xFFFF; 4], 18_446_744_073_709_551_615.0),
-            (DataType::U64, [0x0020, 0, 0, 1], 9_007_199_254_740_992.0),
-            (DataType::U64, [0x0020, 0, 0, 3], 9_007_199_254_740_996.0),
-            (DataType::I64, [0x8000, 0, 0, 0], -9_223_372_036_854_775_808.0),
-        ] {
-            assert_eq!(decode(point(kind, ByteOrder::Abcd), &words), Some(expect), "{kind:?} {words:04X?}");
+    fn a_counter_too_large_for_a_double_keeps_all_its_digits() {
+        let orders = [ByteOrder::Abcd, ByteOrder::Cdab, ByteOrder::Badc, ByteOrder::Dcba];
+        let two_53 = 1i128 << 53;
+        let unsigned = [two_53 - 1, two_53, two_53 + 1, (1 << 63) - 1, 1 << 63, (1 << 63) + 1, (1 << 64) - 1];
+        let signed = [two_53 + 1, -two_53 + 1, -two_53, -two_53 - 1, (1 << 63) - 1, -(1 << 63), -(1 << 63) + 1];
+        let unsigned = unsigned.map(|number| (DataType::U64, number));
+        for (kind, number) in unsigned.into_iter().chain(signed.map(|number| (DataType::I64, number))) {
+            for order in orders {
+                let point = point(kind, order);
+                let words = from_bytes(order, &Exact::whole(number).bits().to_be_bytes());
+                let decoded = decode(point, &words).expect("a number");
+                assert_eq!(decoded.to_string(), number.to_string(), "{kind:?} {order:?}");
+                assert_eq!(encode(point, decoded), Some(words), "{kind:?} {order:?} {number}");
+            }
         }
+        let field = Point { field: Some((1, 63)), ..point(DataType::U64, ByteOrder::Abcd) };
+        let bits = decode(field, &[0xFFFF; 4]).expect("a field");
+        assert_eq!(bits.to_string(), "9223372036854775807");
     }
 
     #[test]
@@ -249,9 +255,9 @@ mod tests {
     #[test]
     fn a_field_of_bits_is_read_and_never_written() {
         let field = Point { field: Some((4, 2)), ..point(DataType::U16, ByteOrder::Abcd) };
-        assert_eq!(decode(field, &[0x0020]), Some(2.0));
+        assert_eq!(decode(field, &[0x0020]), Some(2.0.into()));
         assert_eq!(encode(field, 2.0), None);
-        assert_eq!(decode(Point { field: Some((0, 16)), ..field }, &[0xFFFF]), Some(65_535.0));
+        assert_eq!(decode(Point { field: Some((0, 16)), ..field }, &[0xFFFF]), Some(65_535.0.into()));
     }
 
     #[test]
@@ -264,7 +270,7 @@ mod tests {
         for (word, value) in [(0x1234u16, 3.0), (0xFFFF, 0.0), (0, 1.0)] {
             let (and, or) = field_masks(field, value).expect("it fits");
             let set = (word & and) | (or & !and);
-            assert_eq!(decode(field, &[set]), Some(value));
+            assert_eq!(decode(field, &[set]), Some(value.into()));
             assert_eq!(set & !0x30, word & !0x30);
         }
         assert_eq!(field_masks(point(DataType::U16, ByteOrder::Abcd), 1.0), None);
@@ -304,12 +310,8 @@ mod tests {
             let point = point(kind, order);
             let words = &words[..usize::from(kind.registers())];
             if let Some(value) = decode(point, words) {
-                // −0.0 and 0.0 are one value with two patterns, what is rounded is never written; every other number has
-                // exactly one.
-                let is_rounded = matches!(kind, DataType::I64 | DataType::U64) && EXACT < value.abs();
-                if is_rounded {
-                    prop_assert_eq!(encode(point, value), None);
-                } else if value != 0.0 {
+                // −0.0 and 0.0 are one value with two patterns; every other number has exactly one.
+                if value != 0.0 {
                     prop_assert_eq!(encode(point, value), Some(words.to_vec()));
                 }
             }

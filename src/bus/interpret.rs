@@ -2,12 +2,13 @@
 
 use super::codec;
 use crate::plant::{
-    number::to_f32,
+    exact::Exact,
+    number::{digits, to_f32},
     tag::{ByteOrder, DataType, Point, Table},
 };
 
 /// Words as a number of a type; `None` where there are too few of them or they hold none.
-pub fn number(kind: DataType, order: ByteOrder, words: &[u16]) -> Option<f64> {
+pub fn number(kind: DataType, order: ByteOrder, words: &[u16]) -> Option<Exact> {
     let point = Point { table: Table::Holding, address: 0, kind, order, field: None };
     codec::decode(point, words.get(..usize::from(kind.registers()))?)
 }
@@ -19,7 +20,13 @@ pub fn text(words: &[u16]) -> String {
 }
 
 /// A number in at most `most` characters: whole numbers whole, others with what fits.
-pub fn short(value: f64, most: usize) -> String {
+pub fn short(value: impl Into<Exact>, most: usize) -> String {
+    let exact = value.into();
+    let all = exact.rest().map(|_| digits(exact, None));
+    if let Some(all) = all.filter(|all| all.len() <= most) {
+        return all;
+    }
+    let value = exact.near();
     let plain = if value.fract() == 0.0 && value.abs() < 1e15 { format!("{value:.0}") } else { format!("{value}") };
     let readable = value == 0.0 || (1e-4..1e9).contains(&value.abs());
     if plain.len() <= most && (readable || value.fract() == 0.0) {
@@ -32,7 +39,7 @@ pub fn short(value: f64, most: usize) -> String {
 
 /// A float of two words as short as it is still exact.
 pub fn float(order: ByteOrder, words: &[u16], most: usize) -> Option<String> {
-    let value = to_f32(number(DataType::F32, order, words)?);
+    let value = to_f32(number(DataType::F32, order, words)?.near());
     let plain = format!("{value}");
     Some(if plain.len() <= most { plain } else { short(f64::from(value), most) })
 }
@@ -72,7 +79,7 @@ pub fn float_orders(words: &[u16; 2]) -> impl Iterator<Item = ByteOrder> + use<>
     let small = |word: u16| word < 0x2000 && word.swap_bytes() < 0x2000;
     let whole = small(a) && small(b);
     let plausible = move |order: &ByteOrder| {
-        let value = number(DataType::F32, *order, &words).unwrap_or(0.0).abs();
+        let value = number(DataType::F32, *order, &words).map_or(0.0, Exact::near).abs();
         let swapped = matches!(order, ByteOrder::Badc | ByteOrder::Dcba);
         // A whole number below 256 has an empty high byte, which no swapped float of a usual size has in its first word.
         let full = !swapped || (a & 0xFF != 0 && a >> 8 != 0 && b & 0xFF != 0);
@@ -109,6 +116,8 @@ mod tests {
         assert_eq!(short(104.69, 11), "104.69");
         assert_eq!(short(1.0 / 3.0, 6), "0.3333");
         assert_eq!(short(2.75e-37, 8), "2.75e-37");
+        let counter = number(DataType::U64, ByteOrder::Abcd, &[0xFFFF; 4]).expect("a number");
+        assert_eq!((short(counter, 20).as_str(), short(counter, 8).as_str()), ("18446744073709551615", "1.845e19"));
         assert_eq!(float(ByteOrder::Abcd, &[0x42D1, 0x6353], 9).as_deref(), Some("104.69399"));
         assert_eq!(text(&[0x4142, 0x0043]), "AB·C");
     }

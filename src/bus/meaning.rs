@@ -5,6 +5,7 @@ use crate::{
     plant::{
         PlantDef, Snapshot,
         def::{DeviceDef, DeviceId, LineId},
+        exact::Exact,
         scale,
         tag::{Point, Table, TagDef},
     },
@@ -155,8 +156,7 @@ fn valued(snapshot: &Snapshot, tag: &TagDef, span: &Span) -> String {
     if let Some(text) = codec::decode_text(tag.point, own) {
         return format!("{name} = {text}");
     }
-    let Some(raw) = codec::decode(tag.point, own).filter(|raw| !tag.bad_if.iter().any(|bad| *bad as f64 == *raw))
-    else {
+    let Some(raw) = codec::decode(tag.point, own).filter(|raw| !tag.is_bad(*raw)) else {
         return t!("{name} = no value", name);
     };
     let known = |tag| snapshot.sample(tag).scaling_value();
@@ -180,11 +180,11 @@ fn valued(snapshot: &Snapshot, tag: &TagDef, span: &Span) -> String {
 }
 
 /// What is unusual about a write: a tag that is only read, a value out of its limits.
-fn warning(snapshot: &Snapshot, tag: &TagDef, value: f64) -> String {
+fn warning(snapshot: &Snapshot, tag: &TagDef, value: Exact) -> String {
     if !tag.writable() {
         return t!(" (the plant file only reads it)").to_owned();
     }
-    match snapshot.range(tag.id) {
+    match snapshot.bounds(tag.id) {
         Some((min, max)) if !scale::is_inside(Some(min), Some(max), value) => {
             let [min, max] = [min, max].map(|limit| snapshot.format(tag.id, limit));
             t!(" (outside {min} … {max})", min, max)
@@ -215,7 +215,7 @@ mod tests {
         let known = decimals.map(|decimals| {
             [("TIC-1.P-DP", decimals), ("TIC-1.P-F", 0.0), ("TIC-1.SV-L", 0.0), ("TIC-1.SV-H", 1200.0)]
         });
-        let values = known.iter().flatten().map(|(name, raw)| (tag(name), *raw)).collect();
+        let values = known.iter().flatten().map(|(name, raw)| (tag(name), (*raw).into())).collect();
         let device = def.devices[0].id;
         let mut plant = Plant::new(def.clone(), at, 1.0);
         let response_time = Duration::from_millis(12);

@@ -6,6 +6,7 @@ use super::codec;
 use crate::plant::{
     PlantDef,
     def::{DeviceDef, Probe},
+    exact::Exact,
     live::AddressSpan,
     number::to_u16,
     tag::{Decimals, Point, TagDef},
@@ -105,7 +106,7 @@ fn holds(def: &PlantDef, probe: &Probe, raw: f64, words: Words) -> bool {
 fn raw_of(point: Point, words: Words) -> Option<f64> {
     let span = span_of(point);
     let read = words(span);
-    (read.len() == usize::from(span.count)).then(|| codec::decode(point, &read)).flatten()
+    (read.len() == usize::from(span.count)).then(|| codec::decode(point, &read).map(Exact::near)).flatten()
 }
 
 fn span_of(point: Point) -> AddressSpan {

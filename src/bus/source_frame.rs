@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::{codec, dissect::message_of, names};
 use crate::plant::{
     event::Fault,
+    exact::Exact,
     line::Framing,
     tag::{DataType, Point},
     traffic::Exchange,
@@ -18,7 +19,7 @@ pub struct TagBytes {
     /// Its words as they came; of a bit: 0 or 1.
     pub words: Vec<u16>,
     /// The number they mean, if they mean one.
-    pub raw: Option<f64>,
+    pub raw: Option<Exact>,
 }
 
 /// Looks a tag up in an exchange; `None` if the answer does not hold it.
@@ -130,7 +131,7 @@ mod tests {
             let found = find(point(Table::Holding, 1_001, DataType::F32), &exchange).expect("it is there");
             assert_eq!(found.range, range, "{framing:?}");
             assert_eq!(found.words, [0x4366, 0x3333]);
-            assert_eq!(found.raw, Some(f64::from(230.2f32)));
+            assert_eq!(found.raw, Some(f64::from(230.2f32).into()));
             let of_wire = &exchange.answer[found.range];
             let expect: &[u8] = if framing == Framing::Ascii { b"43663333" } else { &[0x43, 0x66, 0x33, 0x33] };
             assert_eq!(of_wire, expect);
@@ -158,7 +159,7 @@ mod tests {
         let exchange = exchange(Framing::Rtu, &[2, 1, 0x0C, 0x00, 0, 12], &[2, 1, 2, 0b0000_0101, 0b0000_0010]);
         for (address, range, raw) in [(3_072, 3..4, 1.0), (3_073, 3..4, 0.0), (3_081, 4..5, 1.0)] {
             let found = find(point(Table::Coil, address, DataType::Bool), &exchange).expect("it is there");
-            assert_eq!((found.range, found.raw), (range, Some(raw)), "{address}");
+            assert_eq!((found.range, found.raw), (range, Some(raw.into())), "{address}");
         }
         assert_eq!(find(point(Table::Coil, 3_084, DataType::Bool), &exchange), None);
     }

@@ -7,6 +7,7 @@ use crate::plant::{
     alarm::manager::subject_name,
     command::{CommandKind, Outcome},
     def::TagId,
+    exact::Exact,
 };
 
 use super::{CliError, client, in_runtime, say};
@@ -48,7 +49,7 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
         let kind = CommandKind::Write { tag, value };
         let status = actor.send_command(1, kind).await?;
-        let words = |value: Option<f64>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
+        let words = |value: Option<Exact>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
         // What the station says that the device holds, which need not be what was typed.
         let new = status.command.kind.written().map(|(_, held)| held);
         let (old, new, unit) = (words(status.old), words(new), snapshot.unit(tag));
@@ -98,15 +99,15 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
 }
 
 /// A word of the tag, or a number. The station checks range and decimals.
-fn value(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<f64, String> {
+fn value(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, String> {
     let def = snapshot.def.tag(tag);
     let word = def.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text));
     if let Some((value, _)) = word {
-        return Ok(*value as f64);
+        return Ok(Exact::whole(*value));
     }
     let labels: Vec<&str> = def.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
     let expected = if labels.is_empty() { "a number".to_owned() } else { format!("one of {}", labels.join(", ")) };
-    match text.parse::<f64>() {
+    match text.parse::<Exact>() {
         Ok(value) if value.is_finite() => Ok(value),
         Ok(_) | Err(_) => Err(format!("{}: found `{text}`, expected {expected}", def.name)),
     }

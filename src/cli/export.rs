@@ -77,8 +77,8 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let to = period.to.min(source.now());
     if args.raw {
         let csv = args.csv.dialect(&def);
-        let sql = raw(&def, &tags, (period.from, to), csv);
         let format = if args.format == "parquet" { Format::Parquet } else { Format::Csv(csv) };
+        let sql = raw(&def, &tags, (period.from, to), format);
         let tables = HistoryTables::load(&def, &source).await?;
         return tables.export(&source, &sql, format, &args.out, RAW_TIME_MAX).await;
     }
@@ -110,14 +110,20 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     source.export(&args.out, &bytes).await
 }
 
-/// The stored samples of some tags in a span, with the local time of the plant.
-fn raw(def: &PlantDef, tags: &[TagId], (from, to): (Timestamp, Timestamp), csv: CsvDialect) -> String {
+/// The stored samples of some tags in a span, with the local time of the plant. A text has all digits of a value; a column
+/// of numbers needs another beside it for those that a DOUBLE rounds.
+fn raw(def: &PlantDef, tags: &[TagId], (from, to): (Timestamp, Timestamp), format: Format) -> String {
     let quoted = |text: &str| format!("'{}'", text.replace('\'', "''"));
     let names: Vec<String> = tags.iter().map(|tag| quoted(&def.tag(*tag).name)).collect();
     let zone = quoted(def.time_zone.iana_name().unwrap_or("UTC"));
-    let value = if csv.decimal == ',' { "replace(value::VARCHAR, '.', ',') AS value" } else { "value" };
+    let text = "coalesce(rtrim(rtrim(exact::VARCHAR, '0'), '.'), value::VARCHAR)";
+    let (value, exact) = match format {
+        Format::Csv(CsvDialect { decimal: ',', .. }) => (format!("replace({text}, '.', ',') AS value"), ""),
+        Format::Csv(_) => (format!("{text} AS value"), ""),
+        Format::Parquet | Format::Json => ("value".to_owned(), ", exact"),
+    };
     format!(
-        "SELECT utc, timezone({zone}, timezone('UTC', utc)) AS time_local, tag, {value}, unit, quality FROM sample
+        "SELECT utc, timezone({zone}, timezone('UTC', utc)) AS time_local, tag, {value}, unit, quality{exact} FROM sample
          WHERE utc >= make_timestamp({}) AND utc < make_timestamp({}) AND tag IN ({})",
         from.as_microsecond(),
         to.as_microsecond(),
@@ -139,7 +145,7 @@ async fn latest(
     for tags in scaling_tags.chunks(SERIES_MAX) {
         let query = Query::Series { tags: tags.to_vec(), from, to, buckets: 1 };
         let Answer::Series(series) = source.query(query).await? else { return Err(unexpected()) };
-        latest.extend(series.iter().filter_map(|series| Some((series.tag, (*series.buckets.last()?)?.last))));
+        latest.extend(series.iter().filter_map(|series| Some((series.tag, (*series.buckets.last()?)?.last.near()))));
     }
     Ok(latest)
 }

@@ -43,9 +43,10 @@ const SILENT: Duration = Duration::from_millis(500);
 
 const VIEWS: &str = "\
 Views (times are UTC):
-  sample   utc, tag, value, unit, quality ('good', 'uncertain: …', 'bad: …')
-  m1, h1   minutes and hours of what is archived: utc (begin), tag, min, max, mean, first, last, gain, good_ms, n, unit
-  alarm    utc, subject, message, priority, event, value, limit_value, by_whom, reason
+  sample   utc, tag, value, unit, quality, exact (quality: 'good', 'uncertain: …', 'bad: …')
+  m1, h1   minutes and hours of what is archived: utc (begin), tag, min, max, mean, first, last, gain, good_ms, n, unit,
+           min_exact, max_exact, first_exact, last_exact, gain_exact
+  alarm    utc, subject, message, priority, event, value, limit_value, by_whom, reason, value_exact
   action   utc, by_whom, from_where, action, target, old_value, new_value, outcome, note
   batch    utc (begin), until (NULL while it runs), batch, number, minutes, begin_seen, end_seen
   phase    utc (begin of the batch), batch, number, phase ('unknown' as well), minutes
@@ -54,9 +55,13 @@ Views (times are UTC):
   report   automatic reports: utc (of event, the last one), period, name, begin, until, format, file, sha256, event,
            attempts, error
 
+Numbers are DOUBLE, of 15 digits. One of more, as a 64-bit counter has, stands in exact, DECIMAL(38, 6), and there
+alone if a DOUBLE would round it: value is NULL then, and exact is NULL where value is all of it.
+
 Other programs read the folder beside the history as it lies, Parquet, times UTC: raw/date=…/ utc, tag, value, quality
 (code: 0 good, 64 and up uncertain, 128 and up bad), epoch (how often the clock was set, 65535 imported); m1/… and h1/… as
-above; tag.parquet id, name, unit. Files are replaced by larger ones; none is changed.
+above; tag.parquet id, name, unit. Files with numbers of more than 15 digits have columns rest, min_rest, …: value is the
+nearest DOUBLE there, and the sum of both is the number. Files are replaced by larger ones; none is changed.
 
 Example: sightglass sql tank \"SELECT tag, avg(mean) FROM h1 WHERE utc > '2026-11-01' GROUP BY tag\"";
 

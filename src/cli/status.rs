@@ -265,14 +265,14 @@ fn in_json(snapshot: &Snapshot) -> Value {
         })
     });
     let tags = def.tags.iter().map(|tag| {
-        let Sample { value, quality, at } = snapshot.sample(tag.id);
+        let sample @ Sample { quality, at, .. } = snapshot.sample(tag.id);
         let (word, cause) = match quality {
             Quality::Good => ("good", None),
             Quality::Uncertain(cause) => ("uncertain", Some(cause.word())),
             Quality::Bad(cause) => ("bad", Some(cause.word())),
         };
         json!({
-            "name": tag.name, "value": value, "text": snapshot.text(tag.id), "unit": snapshot.unit(tag.id),
+            "name": tag.name, "value": sample.exact(), "text": snapshot.text(tag.id), "unit": snapshot.unit(tag.id),
             "quality": word, "cause": cause, "at": at.to_string(), "age_s": snapshot.age(tag.id).as_secs_f64(),
         })
     });

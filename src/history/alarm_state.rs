@@ -130,7 +130,7 @@ mod tests {
             let (value, limit, by, reason, until) = more;
             let record = AlarmRecord::new(at, &format!("TIC-{subject}.PV"), "high", Priority::High, event);
             let first_out = first_out.then_some(FirstOut { began: at, rank: 7 });
-            AlarmRecord { value, limit, by, reason, until, first_out, ..record }
+            AlarmRecord { value: value.map(Into::into), limit, by, reason, until, first_out, ..record }
         })
     }
 

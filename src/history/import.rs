@@ -1,7 +1,8 @@
 //! Samples from a CSV file of another program: what is accepted, line by line, and which of them fill a gap.
 //!
 //! A row is one sample: `tag`, `time` (with offset, or a local time of the plant), `value`, and if there is such a column
-//! `quality`, in any order. Cells stand between commas, or between semicolons; then the decimal mark is a comma.
+//! `quality`, in any order. Where there is a column `exact`, as SQL gives it, what it holds is the value. Cells stand
+//! between commas, or between semicolons; then the decimal mark is a comma.
 
 use std::collections::BTreeMap;
 
@@ -13,6 +14,7 @@ use crate::{
     plant::{
         PlantDef,
         def::TagId,
+        exact::Exact,
         keyword::Keyword,
         sample::{Cause, Quality, Sample},
         scale,
@@ -28,7 +30,7 @@ const ROWS_MAX: usize = 2_000_000;
 const PROBLEMS_MAX: usize = 10;
 /// The names of columns, by what they are; of the times the first that is there counts.
 const TIMES: [&str; 5] = ["time_utc", "utc", "time", "timestamp", "time_local"];
-const OTHERS: [&str; 4] = ["tag", "value", "quality", "unit"];
+const OTHERS: [&str; 5] = ["tag", "value", "exact", "quality", "unit"];
 
 /// The rows of each tag, in order of time.
 pub type Rows = BTreeMap<TagId, Vec<Sample>>;
@@ -65,6 +67,7 @@ struct Columns {
     tag: usize,
     time: usize,
     value: usize,
+    exact: Option<usize>,
     quality: Option<usize>,
     unit: Option<usize>,
     decimal_comma: bool,
@@ -130,6 +133,7 @@ fn columns(header: &csv::StringRecord, decimal_comma: bool) -> Result<Columns, S
         tag: needed("tag")?,
         time: TIMES.into_iter().find_map(named).ok_or_else(|| format!("found no column {}", TIMES.join(" or ")))?,
         value: needed("value")?,
+        exact: named("exact"),
         quality: named("quality"),
         unit: named("unit"),
         decimal_comma,
@@ -164,24 +168,26 @@ impl Columns {
         let quality = quality_of(quality).ok_or_else(|| {
             format!("found the quality `{quality}`, expected good, or uncertain or bad with its cause: `bad: stale`")
         })?;
-        let value = match (quality, cell(self.value)) {
+        // What SQL has left out of a value that is a DOUBLE.
+        let exact = self.exact.map(cell).filter(|exact| !exact.is_empty());
+        let value = match (quality, exact.unwrap_or(cell(self.value))) {
             (Quality::Bad(_), "") => None,
             (Quality::Bad(_), found) => {
                 return Err(format!("{name}: found the value `{found}`, which is bad: expected none"));
             }
             (Quality::Good | Quality::Uncertain(_), found) => Some(self.value(tag_def, found)?),
         };
-        Ok((tag, Sample { value, quality, at }))
+        Ok((tag, Sample::new(value, quality, at)))
     }
 
-    fn value(&self, tag: &TagDef, found: &str) -> Result<f64, String> {
+    fn value(&self, tag: &TagDef, found: &str) -> Result<Exact, String> {
         if let Some((value, _)) = tag.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(found)) {
-            return Ok(*value as f64);
+            return Ok(Exact::whole(*value));
         }
         let number = if self.decimal_comma { found.replace(',', ".") } else { found.to_owned() };
-        let number = number.parse::<f64>().ok().filter(|number| number.is_finite());
-        let is_bit = |value: f64| value == 0.0 || value == 1.0;
-        let fits = |value: &f64| match (tag.enum_labels.is_empty(), tag.point.table.is_bits()) {
+        let number = number.parse::<Exact>().ok().filter(|number| number.is_finite());
+        let is_bit = |value: Exact| value == 0.0 || value == 1.0;
+        let fits = |value: &Exact| match (tag.enum_labels.is_empty(), tag.point.table.is_bits()) {
             (false, _) => tag.label_of(*value).is_some(),
             (true, true) => is_bit(*value),
             // With decimals that the device announces its range is smaller still.

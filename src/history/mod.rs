@@ -279,6 +279,8 @@ pub struct ArchiveFile {
     pub bytes: u64,
     /// SHA-256 of them, in hexadecimal.
     pub sha256: String,
+    /// It has numbers of more digits than a DOUBLE holds, and columns for what these lack.
+    pub rests: bool,
 }
 
 /// What can go wrong with the store.

@@ -113,7 +113,7 @@ mod tests {
         let days = if tier == Tier::Hour { 30 } else { 1 };
         let path = format!("{} {day}", tier.word());
         let (from, to) = (day * DAY, (day + days) * DAY);
-        ArchiveFile { tier, path, from, to, rows: 1, bytes, sha256: String::new() }
+        ArchiveFile { tier, path, from, to, rows: 1, bytes, sha256: String::new(), rests: false }
     }
 
     /// Days of samples and minutes, 1 GiB and 0 bytes each.

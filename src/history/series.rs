@@ -79,14 +79,18 @@ impl Curve {
             self.add(CurvePart::Held(piece));
         }
         let Curve { tag, from, columns, stats, whole, steps: _ } = self;
-        let bucket =
-            |stats: IntervalStats| Bucket { min: stats.min, max: stats.max, mean: stats.mean, last: stats.last };
+        let bucket = |stats: IntervalStats| Bucket {
+            min: stats.min.near(),
+            max: stats.max.near(),
+            mean: stats.mean,
+            last: stats.last,
+        };
         Series {
             tag,
             from,
             step: columns.step(),
             buckets: stats.into_iter().map(|stats| stats.map(bucket)).collect(),
-            summary: whole.map(|stats| (stats.min, stats.mean, stats.max)),
+            summary: whole.map(|stats| (stats.min, stats.shown_mean(), stats.max)),
             good: whole.map_or(0.0, |stats| (stats.seconds * 1e9 / columns.nanos as f64).clamp(0.0, 1.0)),
         }
     }
@@ -192,7 +196,7 @@ mod tests {
     /// Buckets as (min, mean, max, last) of 0..40 s in four columns.
     fn check(rows: &[(i64, Option<f64>)], expect: [Option<(f64, f64, f64, f64)>; 4], good: f64) {
         let got = series(TagId(0), samples(rows).into_iter(), span(0, 40), 4);
-        let buckets: Vec<_> = got.buckets.iter().map(|b| b.map(|b| (b.min, b.mean, b.max, b.last))).collect();
+        let buckets: Vec<_> = got.buckets.iter().map(|b| b.map(|b| (b.min, b.mean, b.max, b.last.near()))).collect();
         assert_eq!(buckets, expect);
         assert!((got.good - good).abs() < 1e-9, "{}", got.good);
         assert_eq!(got.step, Duration::from_secs(10));
@@ -237,14 +241,14 @@ mod tests {
             prop_assert_eq!(got.buckets.len(), buckets);
             let columns: Vec<Bucket> = got.buckets.iter().flatten().copied().collect();
             let (min, max) = (columns.iter().map(|b| b.min).reduce(f64::min), columns.iter().map(|b| b.max).reduce(f64::max));
-            prop_assert_eq!(got.summary.map(|s| (s.0, s.2)), min.zip(max));
+            prop_assert_eq!(got.summary.map(|s| (s.0.near(), s.2.near())), min.zip(max));
             for b in &columns {
-                prop_assert!(b.min <= b.mean && b.mean <= b.max && b.min <= b.last && b.last <= b.max);
+                prop_assert!(b.min <= b.mean && b.mean <= b.max && (b.min..=b.max).contains(&b.last.near()));
             }
             prop_assert!(!columns.is_empty() || got.good == 0.0);
             // One column over everything has the mean of the summary.
             let one = series(TagId(0), samples(&rows).into_iter(), span(0, length), 1);
-            prop_assert_eq!(one.buckets[0].map(|b| b.mean), got.summary.map(|s| s.1));
+            prop_assert_eq!(one.buckets[0].map(|b| b.mean), got.summary.map(|s| s.1.near()));
         }
     }
 }

@@ -13,7 +13,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    plant::sample::Sample,
+    plant::{exact::Exact, sample::Sample},
     report::step_series::{HoldInterval, IntervalStats, StepSeries, gain},
 };
 
@@ -81,21 +81,21 @@ pub struct Aggregate {
     /// Of its good values; `seconds` is the time that they stood.
     pub stats: IntervalStats,
     /// The first good value.
-    pub first: f64,
+    pub first: Exact,
     /// How far it counted from the first to the last value, if it is a counter.
-    pub gain: f64,
+    pub gain: Exact,
     /// Samples that were stored in it, good or not.
     pub samples: u32,
 }
 
 impl Aggregate {
     fn new(at: i64, part: HoldInterval) -> Aggregate {
-        Aggregate { at, stats: part.into(), first: part.value, gain: 0.0, samples: 0 }
+        Aggregate { at, stats: part.into(), first: part.value, gain: Exact::default(), samples: 0 }
     }
 
     /// Adds a later one.
     pub fn merge(&mut self, later: Aggregate) {
-        self.gain += gain(self.stats.last, later.first) + later.gain;
+        self.gain = self.gain + gain(self.stats.last, later.first) + later.gain;
         self.stats.merge(later.stats);
         self.samples += later.samples;
     }
@@ -254,6 +254,7 @@ mod tests {
     fn row(aggregate: Aggregate) -> Row {
         let Aggregate { at, stats, first, gain, samples } = aggregate;
         let IntervalStats { min, max, mean, last, seconds } = stats;
+        let [min, max, first, last, gain] = [min, max, first, last, gain].map(Exact::near);
         (at / 1_000_000, min, mean, max, first, last, gain, seconds, samples)
     }
 

@@ -35,10 +35,10 @@ fn differs(def: &MqttDef, tag: TagId, sent: Sample, sample: Sample) -> bool {
     if sent.quality != sample.quality {
         return true;
     }
-    match (sent.value, sample.value) {
+    match (sent.exact(), sample.exact()) {
         (Some(old), Some(new)) => {
             let band = def.deadband(tag);
-            let is_beyond = if band > 0.0 { (new - old).abs() > band } else { new != old };
+            let is_beyond = if band > 0.0 { (new - old).near().abs() > band } else { new != old };
             is_beyond || is_old(def, sent.at, sample.at)
         }
         (None, None) => is_old(def, sent.at, sample.at),

@@ -27,7 +27,7 @@ const SPAN_MIN: Duration = Duration::from_millis(1);
 const FEW: usize = 5_000;
 
 /// Time, tag, value and quality: two samples may have one time.
-type Key = (Timestamp, TagId, Option<u64>, u8);
+type Key = (Timestamp, TagId, [Option<u64>; 2], u8);
 
 /// The state of the samples that go out. A window is asked of the history, its samples are sent, and when the broker has
 /// acknowledged them the cursor moves to its end.
@@ -107,7 +107,7 @@ impl Forwarder {
 }
 
 fn key(tag: TagId, sample: &Sample) -> Key {
-    (sample.at, tag, sample.value.map(f64::to_bits), sample.quality.code())
+    (sample.at, tag, [sample.value, sample.rest].map(|part| part.map(f64::to_bits)), sample.quality.code())
 }
 
 #[cfg(test)]

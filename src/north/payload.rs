@@ -85,7 +85,7 @@ fn fields(sample: Sample) -> Map<String, Value> {
         Quality::Bad(cause) => ("bad", Some(cause.word())),
     };
     let fields = [
-        ("value", sample.value.into()),
+        ("value", sample.exact().into()),
         ("quality", quality.into()),
         ("cause", cause.into()),
         ("at", sample.at.to_string().into()),

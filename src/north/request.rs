@@ -13,6 +13,7 @@ use serde_json::Value;
 use crate::plant::{
     PlantDef,
     def::{DeviceDef, MqttDef, TagId},
+    exact::Exact,
     mqtt_request::MqttRefusal,
     north_def::topic_level,
     visible::is_control_or_bidi,
@@ -66,11 +67,11 @@ pub struct Request {
     /// `TIC-1.SV`.
     pub tag: String,
     /// The new value in the tag's unit.
-    pub value: f64,
+    pub value: Exact,
     /// For the audit log.
     pub reason: Option<String>,
     /// The value that the client saw: over another one nothing is written.
-    pub expected: Option<f64>,
+    pub expected: Option<Exact>,
     /// From then on it is refused.
     pub expires: Timestamp,
 }
@@ -209,7 +210,9 @@ pub(super) mod tests {
         assert!(read(&not_text).is_err_and(|why| why.to_string().contains("not a request")));
         let kept = Received { retained: true, ..message(&json("1", "50")) };
         assert_eq!(read(&kept), Err(MqttRefusal::Retained));
-        assert_eq!(read(&message(&json("1", "50"))).map(|request| request.value), Ok(50.0));
+        assert_eq!(read(&message(&json("1", "50"))).map(|request| request.value), Ok(50.0.into()));
+        let counter = read(&message(&json("1", "18446744073709551.615"))).map(|request| request.value.to_string());
+        assert_eq!(counter.as_deref(), Ok("18446744073709551.615"));
     }
 
     #[test]

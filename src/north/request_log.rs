@@ -8,7 +8,10 @@ use super::{
     payload::Message,
     request::{ReplyTo, Request},
 };
-use crate::plant::command::{NotConfirmed, Outcome};
+use crate::plant::{
+    command::{NotConfirmed, Outcome},
+    exact::Exact,
+};
 
 /// So many of the latest are kept after they have expired.
 const KEPT: usize = 100;
@@ -26,13 +29,13 @@ pub struct RequestLog {
 pub struct Entry {
     pub id: String,
     pub tag: String,
-    pub value: f64,
+    pub value: Exact,
     pub expires: Timestamp,
     /// When it came.
     pub at: Timestamp,
     pub reply: ReplyTo,
     /// What the device will hold, once the plant has accepted it.
-    pub value_held: Option<f64>,
+    pub value_held: Option<Exact>,
     /// `None` while its outcome is awaited.
     pub ended: Option<Ended>,
     /// The number of its command in this run of the station.
@@ -235,8 +238,8 @@ mod tests {
         check(Outcome::Verified, Some(RequestResult::Verified));
         check(Outcome::Unchanged, Some(RequestResult::Verified));
         check(Outcome::Sent, Some(RequestResult::Sent));
-        check(Outcome::NotConfirmed(NotConfirmed::Different(48.0)), Some(RequestResult::Failed));
-        check(Outcome::NotConfirmed(NotConfirmed::NotApplied(48.0)), Some(RequestResult::Failed));
+        check(Outcome::NotConfirmed(NotConfirmed::Different(48.0.into())), Some(RequestResult::Failed));
+        check(Outcome::NotConfirmed(NotConfirmed::NotApplied(48.0.into())), Some(RequestResult::Failed));
         check(Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)), Some(RequestResult::Unknown));
         check(Outcome::NotConfirmed(NotConfirmed::NotRead(Fault::Timeout)), Some(RequestResult::Unknown));
         check(Outcome::NotConfirmed(NotConfirmed::StationStopped), Some(RequestResult::Unknown));

@@ -27,7 +27,9 @@ use crate::{
         PlantDef, Snapshot,
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome},
         def::{MqttDef, TagId},
+        exact::Exact,
         mqtt_request::{LastMqttRequest, MqttRefusal, MqttRequestStatus, MqttResult},
+        number::digits,
         time::elapsed,
     },
 };
@@ -86,8 +88,8 @@ pub struct PassOn {
     /// Of the command.
     pub number: u32,
     tag: TagId,
-    value: f64,
-    expected: Option<f64>,
+    value: Exact,
+    expected: Option<Exact>,
     expires: Timestamp,
     note: String,
 }
@@ -302,10 +304,9 @@ fn what(request: &Request) -> String {
     words(&request.id, &request.tag, request.value)
 }
 
-fn words(id: &str, tag: &str, value: f64) -> String {
+fn words(id: &str, tag: &str, value: Exact) -> String {
     let tag: String = tag.chars().filter(char::is_ascii_graphic).take(40).collect();
-    let value = if value.abs() < 1e15 { value.to_string() } else { format!("{value:e}") };
-    format!("{id} {tag} = {value}")
+    format!("{id} {tag} = {}", digits(value, None))
 }
 
 impl Entry {

@@ -187,7 +187,8 @@ impl BatchTracker {
         // A single answer that is late decides nothing; only a value that is gone leaves the phase unknown.
         let good = |tag: TagId| sample(tag).good_value();
         let known = def.inputs().all(|tag| sample(tag).value.is_some());
-        let (start, end) = (def.start.holds(&good), def.end.holds(&good));
+        let exact = |tag: TagId| sample(tag).good_exact();
+        let (start, end) = (def.start.holds(&exact), def.end.holds(&exact));
         let phase = phase_def.and_then(|tag| Some(phase_name(tag, good(tag.id)?)));
         let ended = if self.known { BatchEvent::Ended } else { BatchEvent::FoundEnded };
         let begins = start == Some(true)

@@ -121,7 +121,7 @@ fn calculate(expr: &Expr, inputs: &[TagId], sample: impl Fn(TagId) -> Sample, no
     if let Some(cause) = find(Quality::is_bad) {
         return Sample::bad(cause, at);
     }
-    let Some(value) = expr.number(&|tag| sample(tag).value) else { return Sample::bad(Cause::Undefined, at) };
+    let Some(value) = expr.number(&|tag| sample(tag).exact()) else { return Sample::bad(Cause::Undefined, at) };
     let good = Sample::good(value, at);
     find(|quality| !quality.is_good()).map_or(good, |cause| good.uncertain(cause))
 }

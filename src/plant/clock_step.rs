@@ -177,7 +177,7 @@ mod tests {
     }
 
     fn values(second: i64) -> Event {
-        let values = vec![(PV, 700.0), (SV, 700.0), (DP, 1.0), (FAULT, 0.0)];
+        let values = fixture::raw([(PV, 700.0), (SV, 700.0), (DP, 1.0), (FAULT, 0.0)]);
         let response_time = Duration::from_millis(12);
         Event::Read { at: at(second), device: TIC, values, texts: Vec::new(), response_time, exchange: None }
     }

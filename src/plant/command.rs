@@ -14,6 +14,7 @@ use super::{
     def::{DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::Diagnostic,
     event::Fault,
+    exact::Exact,
     procedure::ProcedureDef,
     restore::RestoreRequest,
     snapshot::Snapshot,
@@ -31,7 +32,7 @@ pub struct Command {
     /// What to do, to what and with which value.
     pub kind: CommandKind,
     /// The value that the operator saw when confirming a write. A write over another value is refused.
-    pub expected_value: Option<f64>,
+    pub expected_value: Option<Exact>,
     /// The operator's reason.
     pub note: Option<Arc<str>>,
 }
@@ -72,7 +73,7 @@ pub enum CommandKind {
         /// What.
         tag: TagId,
         /// The new value.
-        value: f64,
+        value: Exact,
     },
     /// Acknowledge, silence, reset, shelve: what is done with alarms.
     Alarm(AlarmCommand),
@@ -115,7 +116,7 @@ pub enum CommandKind {
 
 impl CommandKind {
     /// The tag and the value of a write.
-    pub fn written(&self) -> Option<(TagId, f64)> {
+    pub fn written(&self) -> Option<(TagId, Exact)> {
         match self {
             CommandKind::Write { tag, value } => Some((*tag, *value)),
             _ => None,
@@ -124,7 +125,7 @@ impl CommandKind {
 
     /// Each tag with the value that it gets: of a write one, of a restore all its changes, of a procedure those of all steps
     /// and of its safe state.
-    pub fn writes<'a>(&'a self, def: &'a PlantDef) -> impl Iterator<Item = (TagId, f64)> + 'a {
+    pub fn writes<'a>(&'a self, def: &'a PlantDef) -> impl Iterator<Item = (TagId, Exact)> + 'a {
         let changes = match self {
             CommandKind::Restore(request) => &request.changes[..],
             _ => &[],
@@ -134,7 +135,8 @@ impl CommandKind {
             _ => None,
         };
         let changes = changes.iter().map(|change| (change.tag, change.new));
-        self.written().into_iter().chain(changes).chain(procedure.into_iter().flat_map(ProcedureDef::writes))
+        let of_procedure = procedure.into_iter().flat_map(ProcedureDef::writes).map(|(tag, value)| (tag, value.into()));
+        self.written().into_iter().chain(changes).chain(of_procedure)
     }
 }
 
@@ -150,7 +152,7 @@ pub struct CommandStatus {
     /// When the plant accepted it.
     pub at: Timestamp,
     /// The tag's value at that time, for a write.
-    pub old: Option<f64>,
+    pub old: Option<Exact>,
     /// Its outcome so far.
     pub outcome: Outcome,
     /// When it got this outcome; when the plant accepted it, while it is pending.
@@ -245,9 +247,9 @@ pub struct WriteJob {
     /// The tag to write.
     pub tag: TagId,
     /// The raw number, already unscaled.
-    pub raw: f64,
+    pub raw: Exact,
     /// An unlock register to write first (tag and raw number), if the device needs unlocking.
-    pub unlock: Option<(TagId, f64)>,
+    pub unlock: Option<(TagId, Exact)>,
     /// Read the value back afterwards.
     pub verify: bool,
     /// It switches something off and goes before all that waits, see `super::interlock::is_stop`.

@@ -13,6 +13,7 @@ use super::{
     },
     def::{LineId, PlantDef, TagId},
     event::{Fault, WriteResult},
+    exact::Exact,
     process_image::ProcessImage,
     record::{ActionRecord, WRITE_REQUESTED},
     scale,
@@ -60,7 +61,7 @@ impl CommandTracker {
         image: &ProcessImage,
         status: &CommandStatus,
         tag: TagId,
-        value: f64,
+        value: Exact,
     ) -> Result<WriteJob, Box<ActionRecord>> {
         let checked = self.check(image, status, tag, value);
         // What is shown and recorded is what the device will hold, not what was typed.
@@ -68,7 +69,7 @@ impl CommandTracker {
         let rounded = image.scaling_decimals(def).and_then(|decimals| scale::rounded_to_device(def, value, decimals));
         let kind = CommandKind::Write { tag, value: rounded.unwrap_or(value) };
         let command = Command { kind, ..status.command.clone() };
-        let status = CommandStatus { command, old: image.sample(tag).value, ..status.clone() };
+        let status = CommandStatus { command, old: image.sample(tag).exact(), ..status.clone() };
         match checked {
             Err(outcome) => Err(Box::new(self.complete_at_once(&status, outcome, image))),
             Ok(job) => {
@@ -142,7 +143,7 @@ impl CommandTracker {
             at,
             action: "unlock".into(),
             target: unlock_tag.name.as_str().into(),
-            old: image.sample(unlock_tag.id).value.map(|old| value_text(image, unlock_tag, old).into()),
+            old: image.sample(unlock_tag.id).exact().map(|old| value_text(image, unlock_tag, old).into()),
             new: tag.write_unlock.map(|(_, new)| value_text(image, unlock_tag, new).into()),
             outcome: format!("{}; for {}", without_read_back(result), tag.name).into(),
             note: None,

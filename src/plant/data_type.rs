@@ -109,14 +109,14 @@ impl DataType {
     }
 
     /// Lowest and highest whole number that it holds; `None` for floats and texts.
-    pub fn whole_range(self) -> Option<(f64, f64)> {
+    pub fn whole_range(self) -> Option<(i128, i128)> {
         let (_, registers, encoding) = self.row();
-        let bits = 16 * i32::from(registers);
+        let bits = 16 * u32::from(registers);
         match encoding {
-            Encoding::Bit => Some((0.0, 1.0)),
-            Encoding::Unsigned => Some((0.0, 2f64.powi(bits) - 1.0)),
-            Encoding::Signed => Some((-2f64.powi(bits - 1), 2f64.powi(bits - 1) - 1.0)),
-            Encoding::Bcd => Some((0.0, 10f64.powi(bits / 4) - 1.0)),
+            Encoding::Bit => Some((0, 1)),
+            Encoding::Unsigned => Some((0, (1 << bits) - 1)),
+            Encoding::Signed => Some((-(1 << (bits - 1)), (1 << (bits - 1)) - 1)),
+            Encoding::Bcd => Some((0, 10i128.pow(bits / 4) - 1)),
             Encoding::Float | Encoding::Text => None,
         }
     }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     diagnostics::DiagnosticRun,
+    exact::Exact,
     id::{DeviceId, LineId, TagId, WriteId},
     line_report::LineReport,
     north_def::NorthStatus,
@@ -27,7 +28,7 @@ pub enum Event {
         /// The device.
         device: DeviceId,
         /// Raw number of every tag in the block.
-        values: Vec<(TagId, f64)>,
+        values: Vec<(TagId, Exact)>,
         /// Text of every tag in the block that holds text.
         texts: Vec<(TagId, Arc<str>)>,
         /// From the last byte sent to the first byte received.
@@ -133,9 +134,9 @@ pub enum Event {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum WriteResult {
     /// The device accepted it; then it was read back: this raw number.
-    ReadBack(f64),
+    ReadBack(Exact),
     /// No valid answer; read once the unit was in sync again, the device holds this raw number.
-    ReadBackAfterNoResponse(f64),
+    ReadBackAfterNoResponse(Exact),
     /// The device accepted it, but the read-back failed.
     NotRead(Fault),
     /// The device accepted it; the profile excludes a read-back.

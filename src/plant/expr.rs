@@ -1,15 +1,17 @@
 //! The expression language of plant files: a condition `PLC-1.HEATER = ON and PLC-1.LT-1 > 5 cm`, or what a calculated
 //! tag is: `max(TIC-1.PV, TIC-2.PV) - 5`.
 
+use std::ops::Add;
+
 use serde::{Deserialize, Serialize};
 
-use super::{id::TagId, keyword::keyword_enum};
+use super::{exact::Exact, id::TagId, keyword::keyword_enum};
 
 /// An expression over tags. As a number, true is 1 and false 0; as a condition, every number but 0 is true.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Expr {
     /// The same always.
-    Number(f64),
+    Number(Exact),
     /// The value of a tag, in its unit.
     Tag(TagId),
     /// Two numbers become one.
@@ -75,13 +77,13 @@ pub enum Compare {
 
 impl Expr {
     /// A tag is compared with a fixed value.
-    pub fn test(tag: TagId, compare: Compare, value: f64) -> Expr {
-        Expr::Test(Box::new(Expr::Tag(tag)), compare, Box::new(Expr::Number(value)))
+    pub fn test(tag: TagId, compare: Compare, value: impl Into<Exact>) -> Expr {
+        Expr::Test(Box::new(Expr::Tag(tag)), compare, Box::new(Expr::Number(value.into())))
     }
 
     /// Whether it is true; `None` if the known tags do not decide it. `value` gives the good value of a
     /// tag.
-    pub fn holds(&self, value: &impl Fn(TagId) -> Option<f64>) -> Option<bool> {
+    pub fn holds(&self, value: &impl Fn(TagId) -> Option<Exact>) -> Option<bool> {
         match self {
             Expr::Test(left, compare, right) => Some(compare.holds(left.number(value)?, right.number(value)?)),
             Expr::Not(inner) => inner.holds(value).map(|holds| !holds),
@@ -94,7 +96,7 @@ impl Expr {
     }
 
     /// Its value; `None` where a tag is unknown, and for a division by zero and an overflow.
-    pub fn number(&self, value: &impl Fn(TagId) -> Option<f64>) -> Option<f64> {
+    pub fn number(&self, value: &impl Fn(TagId) -> Option<Exact>) -> Option<Exact> {
         let number = match self {
             Expr::Number(number) => *number,
             Expr::Tag(tag) => value(*tag)?,
@@ -108,15 +110,18 @@ impl Expr {
                 }
             }
             Expr::Call(function, of) => {
-                let numbers = of.iter().map(|part| part.number(value)).collect::<Option<Vec<f64>>>()?;
+                let count = Exact::from(of.len() as f64);
+                let mut numbers = of.iter().map(|part| part.number(value)).collect::<Option<Vec<Exact>>>()?.into_iter();
                 match function {
-                    Function::Min => numbers.into_iter().fold(f64::INFINITY, f64::min),
-                    Function::Max => numbers.into_iter().fold(f64::NEG_INFINITY, f64::max),
-                    Function::Mean => numbers.iter().sum::<f64>() / numbers.len() as f64,
-                    Function::Abs => numbers.first()?.abs(),
+                    Function::Min => numbers.reduce(|least, next| if next < least { next } else { least })?,
+                    Function::Max => numbers.reduce(|most, next| if most < next { next } else { most })?,
+                    Function::Mean => numbers.reduce(Exact::add)? / count,
+                    Function::Abs => numbers.next()?.abs(),
                 }
             }
-            Expr::Test(..) | Expr::Not(_) | Expr::All(_) | Expr::Any(_) => f64::from(u8::from(self.holds(value)?)),
+            Expr::Test(..) | Expr::Not(_) | Expr::All(_) | Expr::Any(_) => {
+                f64::from(u8::from(self.holds(value)?)).into()
+            }
         };
         Some(number).filter(|number| number.is_finite())
     }
@@ -134,7 +139,7 @@ impl Expr {
 }
 
 impl Compare {
-    fn holds(self, value: f64, with: f64) -> bool {
+    fn holds(self, value: Exact, with: Exact) -> bool {
         match self {
             Compare::Equal => value == with,
             Compare::Differs => value != with,
@@ -147,7 +152,7 @@ impl Compare {
 }
 
 /// One part that is `decisive` decides, whatever is unknown beside it.
-fn decided(parts: &[Expr], value: &impl Fn(TagId) -> Option<f64>, decisive: bool) -> Option<bool> {
+fn decided(parts: &[Expr], value: &impl Fn(TagId) -> Option<Exact>, decisive: bool) -> Option<bool> {
     let mut unknown = false;
     for part in parts {
         match part.holds(value) {
@@ -168,8 +173,8 @@ mod tests {
         let test = |n, compare| Expr::test(TagId(n), compare, 5.0);
         let (low, high, unknown) = (TagId(0), TagId(1), TagId(2));
         let value = |tag: TagId| match tag {
-            _ if tag == low => Some(4.0),
-            _ if tag == high => Some(5.0),
+            _ if tag == low => Some(4.0.into()),
+            _ if tag == high => Some(5.0.into()),
             _ => None,
         };
         let (yes, no, maybe) = (test(0, Compare::Below), test(1, Compare::Above), test(unknown.0, Compare::Equal));
@@ -194,11 +199,11 @@ mod tests {
 
     #[test]
     fn a_number_that_does_not_exist_is_none() {
-        let (tag, zero) = (|n| Box::new(Expr::Tag(TagId(n))), || Box::new(Expr::Number(0.0)));
-        let value = |of: TagId| [Some(6.0), Some(f64::MAX), None].get(of.index()).copied().flatten();
+        let (tag, zero) = (|n| Box::new(Expr::Tag(TagId(n))), || Box::new(Expr::Number(0.0.into())));
+        let value = |of: TagId| [Some(6.0), Some(f64::MAX), None].get(of.index()).copied().flatten().map(Exact::from);
         let call = |function, tags: &[u16]| Expr::Call(function, tags.iter().map(|n| Expr::Tag(TagId(*n))).collect());
         for (expr, expect) in [
-            (Expr::Arithmetic(tag(0), Operator::Subtract, Box::new(Expr::Number(8.0))), Some(-2.0)),
+            (Expr::Arithmetic(tag(0), Operator::Subtract, Box::new(Expr::Number(8.0.into()))), Some(-2.0)),
             (Expr::Arithmetic(tag(0), Operator::Divide, zero()), None),
             (Expr::Arithmetic(zero(), Operator::Divide, zero()), None),
             (Expr::Arithmetic(tag(1), Operator::Add, tag(1)), None),
@@ -209,7 +214,7 @@ mod tests {
             (call(Function::Min, &[0, 2]), None),
             (Expr::test(TagId(0), Compare::Above, 5.0), Some(1.0)),
         ] {
-            assert_eq!(expr.number(&value), expect, "{expr:?}");
+            assert_eq!(expr.number(&value), expect.map(Exact::from), "{expr:?}");
         }
     }
 }

@@ -9,6 +9,7 @@ use super::{
         AlarmDef, AlarmId, Condition, DeviceDef, DeviceId, Level, Limits, LineDef, LineId, MimicDef, PlantDef,
         ReportDef, Serial, Subject, TagId, Transport,
     },
+    exact::Exact,
     tag::{Access, Bound, ByteOrder, DataType, Decimals, Point, Table, TagDef},
 };
 
@@ -69,8 +70,8 @@ pub fn plant() -> PlantDef {
             TagDef {
                 decimals: Decimals::From(DP),
                 access: Access::ReadWrite,
-                min: Some(Bound::Fixed(0.0)),
-                max: Some(Bound::Fixed(100.0)),
+                min: Some(Bound::Fixed(0.0.into())),
+                max: Some(Bound::Fixed(100.0.into())),
                 ..tag(SV, "SV", Table::Holding, 1002)
             },
             tag(DP, "DP", Table::Holding, 1019),
@@ -107,6 +108,11 @@ pub fn plant() -> PlantDef {
         simulation: None,
         file_sha256: String::new(),
     }
+}
+
+/// Raw numbers as a line reads them.
+pub fn raw(values: impl IntoIterator<Item = (TagId, f64)>) -> Vec<(TagId, Exact)> {
+    values.into_iter().map(|(tag, raw)| (tag, raw.into())).collect()
 }
 
 /// The same behind an [`Arc`].

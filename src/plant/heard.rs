@@ -101,7 +101,7 @@ mod tests {
         let line = LineId(0);
         let scan = Scan { first: 1, last: 2, serials: Vec::new(), timeout: Duration::from_secs(1) };
         let sending = [
-            CommandKind::Write { tag: SV, value: 1.0 },
+            CommandKind::Write { tag: SV, value: 1.0.into() },
             CommandKind::Refresh(TIC),
             CommandKind::Configure(Box::new(def.lines[0].clone())),
             CommandKind::SaveSettings(line),

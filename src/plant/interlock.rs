@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     alarm::condition::is_set,
     def::{ActionDef, PlantDef},
+    exact::Exact,
     id::TagId,
     role::Role,
     sample::{Cause, Sample},
@@ -69,12 +70,12 @@ pub enum InterlockStatus {
 impl InterlockDef {
     /// How it stands with this sample of the tag that decides.
     pub fn status(&self, sample: Sample) -> InterlockStatus {
-        let Some(value) = sample.good_value() else {
+        let Some(value) = sample.good_exact() else {
             return InterlockStatus::Unknown(sample.quality.cause().unwrap_or(Cause::NotRead));
         };
         let blocked = match self.when {
-            InterlockCondition::Below(limit) => value < limit,
-            InterlockCondition::Above(limit) => limit < value,
+            InterlockCondition::Below(limit) => value < Exact::from(limit),
+            InterlockCondition::Above(limit) => value > Exact::from(limit),
             InterlockCondition::Is(state) => value == state,
             InterlockCondition::Bit(bit) => is_set(value, bit),
         };
@@ -112,13 +113,13 @@ pub struct SequenceDef {
 
 impl ControlLogic {
     /// The interlocks of one value of a command, as the device will hold it or does.
-    pub fn interlocks_of(&self, tag: TagId, value: f64) -> impl Iterator<Item = &InterlockDef> {
-        self.interlocks.iter().filter(move |lock| lock.tag == tag && lock.value == value)
+    pub fn interlocks_of(&self, tag: TagId, value: Exact) -> impl Iterator<Item = &InterlockDef> {
+        self.interlocks.iter().filter(move |lock| lock.tag == tag && value == lock.value)
     }
 
     /// The interlock for which this command is certainly without effect and is not to be sent. What will be sent decides, not
     /// what was typed: `value` is as the device will hold it, `super::scale::rounded_to_device`.
-    pub fn refusal(&self, tag: TagId, value: f64, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
+    pub fn refusal(&self, tag: TagId, value: Exact, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
         let blocks = |lock: &&InterlockDef| lock.refuse && lock.status(sample(lock.of)) == InterlockStatus::Blocked;
         self.interlocks_of(tag, value).find(blocks)
     }
@@ -136,7 +137,7 @@ impl ControlLogic {
             return false;
         };
         let is_effective = actuator.needs.iter().all(|(tag, state)| sample(*tag).good_value() == Some(*state));
-        let mut locks = self.interlocks_of(actuator.command, command);
+        let mut locks = self.interlocks_of(actuator.command, command.into());
         let blocked = locks.any(|lock| lock.status(sample(lock.of)) == InterlockStatus::Blocked);
         actuator.travel.is_some() && is_effective && !blocked && (command != actuator.off) != (output != 0.0)
     }
@@ -153,17 +154,17 @@ pub fn stops<'a>(logic: &'a ControlLogic, actions: &'a [ActionDef], tag: TagId) 
 
 /// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::rounded_to_device`]: a typed number
 /// that is only rounded to a stop counts as none.
-pub fn is_stop(def: &PlantDef, tag: TagId, rounded: f64) -> bool {
-    stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| off == rounded)
+pub fn is_stop(def: &PlantDef, tag: TagId, rounded: Exact) -> bool {
+    stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| rounded == off)
 }
 
 /// The least role that may write this value to a tag: that of the action that writes it, else that of the tag. A stop is for
 /// everybody who may operate.
-pub fn role_to_write(def: &PlantDef, tag: TagId, rounded: f64) -> Role {
+pub fn role_to_write(def: &PlantDef, tag: TagId, rounded: Exact) -> Role {
     if is_stop(def, tag, rounded) {
         return Role::Technician;
     }
-    let mut actions = actions_on(def, tag).filter(|action| action.value == rounded);
+    let mut actions = actions_on(def, tag).filter(|action| rounded == action.value);
     actions.find_map(|action| action.role).unwrap_or(def.tag(tag).role)
 }
 
@@ -275,7 +276,11 @@ mod tests {
     fn only_what_is_certainly_blocked_is_refused() {
         let check = |refuse, value, level: Sample, refused: bool| {
             let logic = logic(refuse);
-            assert_eq!(logic.refusal(COMMAND, value, |_| level).is_some(), refused, "{value} at {level:?}");
+            assert_eq!(
+                logic.refusal(COMMAND, Exact::plain(value), |_| level).is_some(),
+                refused,
+                "{value} at {level:?}"
+            );
         };
         check(true, 1.0, good(4.0), true);
         check(true, 1.0, good(6.0), false);

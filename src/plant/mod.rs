@@ -8,6 +8,7 @@
 //! ```
 
 pub(crate) mod number;
+pub mod exact;
 pub(crate) mod time;
 pub(crate) mod keyword;
 pub mod visible;

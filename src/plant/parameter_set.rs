@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     def::{DeviceId, PlantDef, TagId},
+    exact::Exact,
     scale,
     tag::TagDef,
     visible::is_control_or_bidi,
@@ -49,7 +50,7 @@ pub struct SetValue {
     /// `SV`.
     pub tag: String,
     /// In the tag's unit; the number of an enumeration.
-    pub value: f64,
+    pub value: Exact,
 }
 
 /// A set in the station's folder.
@@ -62,7 +63,7 @@ pub struct StoredSet {
 }
 
 /// The good values by tag, of a snapshot or the process image.
-pub type Trusted<'a> = &'a dyn Fn(TagId) -> Option<f64>;
+pub type Trusted<'a> = &'a dyn Fn(TagId) -> Option<Exact>;
 
 /// Most characters of a name.
 pub const NAME_MAX: usize = 32;
@@ -103,7 +104,7 @@ pub fn capture(
     for tag in def.tags_of(device).filter(|tag| tag.in_sets) {
         let unit = tag.unit_from.as_ref().map(|(from, _)| (def.tag(*from), trusted(*from)));
         // A number that the profile has no word for cannot be checked when it comes back.
-        let known = |value: &f64| tag.enum_labels.is_empty() || tag.label_of(*value).is_some();
+        let known = |value: &Exact| tag.enum_labels.is_empty() || tag.label_of(*value).is_some();
         match (trusted(tag.id).filter(known), unit) {
             // A number without its unit is another number.
             (None, _) | (_, Some((_, None))) => missing.push(tag.short.clone()),
@@ -138,11 +139,11 @@ pub struct Compared {
     /// The tag of the device; `None` where it has none of this name.
     pub tag: Option<TagId>,
     /// In the set; `None` if it is not there.
-    pub set: Option<f64>,
+    pub set: Option<Exact>,
     /// The unit of the value of the set, where the set says one.
     pub unit: Option<String>,
     /// In the device; `None` where it is not known.
-    pub device: Option<f64>,
+    pub device: Option<Exact>,
     /// The device would hold the same raw number.
     pub same: bool,
 }
@@ -170,7 +171,7 @@ pub fn compare(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: Tr
 }
 
 /// Would the device hold the same raw number for both?
-fn same(tag: &TagDef, one: f64, other: f64, trusted: Trusted) -> bool {
+fn same(tag: &TagDef, one: Exact, other: Exact, trusted: Trusted) -> bool {
     let raw = |value| tag.scaling_decimals(trusted).and_then(|decimals| scale::to_raw(tag, value, decimals));
     raw(one).zip(raw(other)).map_or(one == other, |(one, other)| scale::same_raw(tag, one, other))
 }

@@ -8,13 +8,14 @@ use super::{
     calculation::Calculator,
     def::{DeviceId, PlantDef, TagId},
     event::{ExceptionCode, Fault, FaultKind},
+    exact::Exact,
     heard::{Heard, Stated},
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
     tag::{Decimals, Poll, StorePolicy, TagDef},
 };
-use crate::plant::{number::to_i64, time::elapsed};
+use crate::plant::time::elapsed;
 
 /// A value is uncertain after so many poll periods without an answer, and bad after [`PERIODS_BAD`].
 pub const PERIODS_UNCERTAIN: u32 = 3;
@@ -50,7 +51,7 @@ pub struct ProcessImage {
 /// A raw number, when it was read, and what has made it uncertain since.
 #[derive(Debug, Clone, Copy)]
 struct Reading {
-    raw: f64,
+    raw: Exact,
     at: Timestamp,
     uncertain: Option<Cause>,
 }
@@ -96,9 +97,9 @@ impl ProcessImage {
     }
 
     /// Takes the raw numbers of one answer. A fault word or decimals among them count for their dependents at once.
-    pub fn read(&mut self, values: &[(TagId, f64)], at: Timestamp) {
+    pub fn read(&mut self, values: &[(TagId, impl Into<Exact> + Copy)], at: Timestamp) {
         for (tag, raw) in values {
-            self.raw[tag.index()] = Some(Reading { raw: *raw, at, uncertain: None });
+            self.raw[tag.index()] = Some(Reading { raw: (*raw).into(), at, uncertain: None });
             self.heard[tag.index()].hear(at);
         }
         for (tag, _) in values {
@@ -118,7 +119,7 @@ impl ProcessImage {
                 Arc::make_mut(&mut self.texts)[tag.index()] = Some(text.clone());
             }
             self.heard[tag.index()].hear(at);
-            self.set(*tag, Sample { value: None, quality: Quality::Good, at });
+            self.set(*tag, Sample::new(None, Quality::Good, at));
         }
     }
 
@@ -257,11 +258,11 @@ impl ProcessImage {
         stored.quality != sample.quality
             // Once an hour in any case: what a past instant was like need not be looked for further back.
             || !sample.quality.is_good() && is_later_hour(stored.at, at)
-            || match (stored.value, sample.value) {
+            || match (stored.exact(), sample.exact()) {
                 (Some(old), Some(new)) => {
                     let changed = match tag.store {
                         StorePolicy::Always => stored.at < sample.at,
-                        StorePolicy::Change => self.deadband(tag) < (new - old).abs(),
+                        StorePolicy::Change => (new - old).abs() > Exact::from(self.deadband(tag)),
                         StorePolicy::Never => false,
                     };
                     changed || (sample.quality.is_good() && tag.store_every <= waited)
@@ -290,7 +291,7 @@ impl ProcessImage {
     }
 
     /// The raw number last read, if the sample still stands on it.
-    pub fn good_raw(&self, tag: TagId) -> Option<f64> {
+    pub fn good_raw(&self, tag: TagId) -> Option<Exact> {
         self.sample(tag).good_value()?;
         self.raw[tag.index()].map(|reading| reading.raw)
     }
@@ -335,7 +336,7 @@ impl ProcessImage {
             self.decimals_seen[tag.id.index()] = decimals;
         }
         let fault_word = tag.quality_from.map(|(from, mask)| (self.sample(from), self.good_raw(from), mask));
-        let no_value = tag.bad_if.iter().any(|bad| *bad as f64 == raw);
+        let no_value = tag.is_bad(raw);
         let sample = match (no_value, self.scaling_decimals(tag)) {
             (true, _) => Sample::bad(Cause::SensorFault, at),
             (false, None) => Sample::bad(Cause::Unscaled, at),
@@ -345,7 +346,7 @@ impl ProcessImage {
             None => sample,
             // The raw number: a status word may be signed, and is never meant to be scaled.
             Some((word, bits, mask)) => match bits {
-                Some(bits) if to_i64(bits).cast_unsigned() & mask != 0 => Sample::bad(Cause::SensorFault, at),
+                Some(word) if word.bits() & mask != 0 => Sample::bad(Cause::SensorFault, at),
                 Some(_) => sample,
                 None => sample.uncertain(word.quality.cause().unwrap_or(Cause::NotRead)),
             },

@@ -9,6 +9,7 @@ use super::{
     batch::BatchRecord,
     control_run::ControlRun,
     def::{Priority, TagId},
+    exact::Exact,
     keyword::keyword_enum,
     line_minute::LineMinute,
     report::ReportRecord,
@@ -50,7 +51,7 @@ pub struct AlarmRecord {
     /// What happened.
     pub event: AlarmEvent,
     /// The value at that moment, in the tag's unit.
-    pub value: Option<f64>,
+    pub value: Option<Exact>,
     /// The limit, in the tag's unit.
     pub limit: Option<f64>,
     /// Who, for what an operator did.

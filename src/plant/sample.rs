@@ -6,7 +6,7 @@ use std::fmt;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::keyword::keyword_enum;
+use super::{exact::Exact, keyword::keyword_enum};
 
 /// Quality of a value, as in OPC UA. Ordered: `Good < Uncertain < Bad`, so `max` is "the worst of".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -129,6 +129,8 @@ pub struct Sample {
     /// In the tag's unit; bits are 0 or 1, enumerations their number. `None` exactly when the quality is bad; a tag that
     /// holds text never has a number, its text stands in the snapshot.
     pub value: Option<f64>,
+    /// What `value` lacks of the number, see [`Sample::exact`]; `None` for nearly all.
+    pub rest: Option<f64>,
     /// Its quality.
     pub quality: Quality,
     /// When the answer arrived; for a value never read, when that was found.
@@ -137,13 +139,23 @@ pub struct Sample {
 
 impl Sample {
     /// A good value.
-    pub fn good(value: f64, at: Timestamp) -> Sample {
-        Sample { value: Some(value), quality: Quality::Good, at }
+    pub fn good(value: impl Into<Exact>, at: Timestamp) -> Sample {
+        Sample::new(Some(value.into()), Quality::Good, at)
+    }
+
+    /// A value, if there is one, with its quality.
+    pub fn new(value: Option<Exact>, quality: Quality, at: Timestamp) -> Sample {
+        Sample { value: value.map(Exact::near), rest: value.and_then(Exact::rest), quality, at }
     }
 
     /// No value, and why.
     pub fn bad(cause: Cause, at: Timestamp) -> Sample {
-        Sample { value: None, quality: Quality::Bad(cause), at }
+        Sample::new(None, Quality::Bad(cause), at)
+    }
+
+    /// The value with all its digits: what is shown, stored, compared and sent on.
+    pub fn exact(self) -> Option<Exact> {
+        self.value.map(|value| Exact::of_parts(value, self.rest))
     }
 
     /// The last value kept, as uncertain; a sample without a value becomes bad.
@@ -157,6 +169,11 @@ impl Sample {
     /// The value only if it is good.
     pub fn good_value(self) -> Option<f64> {
         self.value.filter(|_| self.quality.is_good())
+    }
+
+    /// The value with all its digits, only if it is good.
+    pub fn good_exact(self) -> Option<Exact> {
+        self.exact().filter(|_| self.quality.is_good())
     }
 
     /// The value only if others may be scaled by it: it is good, or the plant file states it.

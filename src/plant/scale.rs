@@ -1,39 +1,70 @@
 //! Raw numbers to values in engineering units and back.
 
-use super::tag::{Encoding, TagDef};
-use crate::plant::number::to_f32;
+use super::{
+    exact::{Exact, PLAIN},
+    number::to_f32,
+    tag::{Encoding, TagDef},
+};
 
 /// The value of a raw number: `raw · scale · 10^-decimals + offset`. `decimals` are those that the device
 /// announces for this tag ([`super::tag::Decimals::From`]), 0 for all others.
-pub fn to_value(tag: &TagDef, raw: f64, decimals: u8) -> f64 {
-    multiply(multiply(raw, tag.scale), 10f64.powi(-i32::from(decimals))) + tag.offset
+pub fn to_value(tag: &TagDef, raw: impl Into<Exact>, decimals: u8) -> Exact {
+    scaled(raw.into(), tag.scale, tag.offset, decimals)
+}
+
+/// The same of any scale and offset.
+pub fn scaled(raw: Exact, scale: f64, offset: f64, decimals: u8) -> Exact {
+    let exact = raw.rest().and_then(|_| Scaling::new(scale, offset, decimals)?.value(raw.as_whole()?));
+    exact.unwrap_or_else(|| (multiply(multiply(raw.near(), scale), 10f64.powi(-i32::from(decimals))) + offset).into())
 }
 
 /// The raw number to write for a value, rounded to what the type can hold; `None` if it does not fit the type.
-pub fn to_raw(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
-    let exact = (value - tag.offset) / (tag.scale * 10f64.powi(-i32::from(decimals)));
+pub fn to_raw(tag: &TagDef, value: impl Into<Exact>, decimals: u8) -> Option<Exact> {
+    let value = value.into();
     let raw = match tag.point.kind.encoding() {
-        Encoding::Float => as_stored(tag, exact),
-        Encoding::Bit | Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => exact.round(),
+        Encoding::Float => {
+            let held = as_stored(tag, unscaled(value, tag.scale, tag.offset, decimals));
+            let max = if tag.point.kind.registers() == 2 { f64::from(f32::MAX) } else { f64::MAX };
+            return (held.abs() <= max).then(|| held.into());
+        }
         Encoding::Text => return None,
+        Encoding::Bit | Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => {
+            whole_raw(value, tag.scale, tag.offset, decimals)?
+        }
     };
-    let (low, high) = limits(tag);
-    (raw.is_finite() && low <= raw && raw <= high).then_some(raw)
+    let (low, high) = match tag.point.field {
+        Some((_, bits)) => (0, (1 << bits) - 1),
+        None => tag.point.kind.whole_range()?,
+    };
+    (low..=high).contains(&raw).then(|| Exact::whole(raw))
+}
+
+/// The whole raw number that is nearest to a value; `None` if not all of its digits are known.
+pub fn whole_raw(value: Exact, scale: f64, offset: f64, decimals: u8) -> Option<i128> {
+    match unscaled(value, scale, offset, decimals) {
+        near if near.abs() < PLAIN => Exact::from(near.round()).as_whole(),
+        // By way of an `f64` it would silently become another number.
+        _ => Scaling::new(scale, offset, decimals)?.raw(value),
+    }
+}
+
+fn unscaled(value: Exact, scale: f64, offset: f64, decimals: u8) -> f64 {
+    (value.near() - offset) / (scale * 10f64.powi(-i32::from(decimals)))
 }
 
 /// The value as the device will hold it once it is written: rounded to what the type can hold; `None` if it does not fit.
-pub fn rounded_to_device(tag: &TagDef, value: f64, decimals: u8) -> Option<f64> {
+pub fn rounded_to_device(tag: &TagDef, value: impl Into<Exact>, decimals: u8) -> Option<Exact> {
     to_raw(tag, value, decimals).map(|raw| to_value(tag, raw, decimals))
 }
 
 /// Do two raw numbers of a tag mean the same stored value?
-pub fn same_raw(tag: &TagDef, one: f64, other: f64) -> bool {
+pub fn same_raw(tag: &TagDef, one: Exact, other: Exact) -> bool {
     match tag.point.kind.encoding() {
         // What was lost in scaling forth and back is lost in the value, which an offset makes much larger than the raw number.
         Encoding::Float if tag.point.kind.registers() == 4 => {
-            alike(one, other) || alike(to_value(tag, one, 0), to_value(tag, other, 0))
+            alike(one.near(), other.near()) || alike(to_value(tag, one, 0).near(), to_value(tag, other, 0).near())
         }
-        Encoding::Float => as_stored(tag, one) == as_stored(tag, other),
+        Encoding::Float => as_stored(tag, one.near()) == as_stored(tag, other.near()),
         Encoding::Bit => (one != 0.0) == (other != 0.0),
         Encoding::Text => false,
         Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => one == other,
@@ -51,24 +82,39 @@ pub fn alike(one: f64, other: f64) -> bool {
 }
 
 /// Is a value that a device will hold between its bounds, where there are any?
-pub fn is_inside(min: Option<f64>, max: Option<f64>, held: f64) -> bool {
-    let at_most = |low: f64, high: f64| low <= high || alike(low, high);
+pub fn is_inside(min: Option<Exact>, max: Option<Exact>, held: Exact) -> bool {
+    let at_most =
+        |low: Exact, high: Exact| low <= high || low.rest().or(high.rest()).is_none() && alike(low.near(), high.near());
     held.is_finite() && min.is_none_or(|min| at_most(min, held)) && max.is_none_or(|max| at_most(held, max))
 }
 
-/// Lowest and highest raw number of a tag's type or bit field.
-fn limits(tag: &TagDef) -> (f64, f64) {
-    if let Some((_, bits)) = tag.point.field {
-        return (0.0, 2f64.powi(i32::from(bits)) - 1.0);
+/// How the raw numbers of a tag are scaled, all in units of `10^-decimals`: as the profile writes it, not as an `f64` has it.
+struct Scaling {
+    scale: i128,
+    offset: i128,
+    decimals: u32,
+}
+
+impl Scaling {
+    fn new(scale: f64, offset: f64, decimals: u8) -> Option<Scaling> {
+        let (scale, of_scale) = Exact::from(scale).as_decimal()?;
+        let (offset, of_offset) = Exact::from(offset).as_decimal()?;
+        let of_scale = of_scale + u32::from(decimals);
+        let decimals = of_scale.max(of_offset);
+        let shifted = |mantissa: i128, from: u32| mantissa.checked_mul(10i128.checked_pow(decimals - from)?);
+        Some(Scaling { scale: shifted(scale, of_scale)?, offset: shifted(offset, of_offset)?, decimals })
     }
-    // An f64 counts whole numbers up to 2^53; beyond, a 64-bit value would silently become another one.
-    let exact = 2f64.powi(53);
-    match (tag.point.kind.whole_range(), tag.point.kind.encoding(), tag.point.kind.registers()) {
-        (Some((low, high)), ..) => (low.max(-exact), high.min(exact)),
-        (None, Encoding::Float, 2) => (f64::from(f32::MIN), f64::from(f32::MAX)),
-        (None, Encoding::Float, _) => (f64::MIN, f64::MAX),
-        // An empty range: nothing is inside.
-        (None, ..) => (0.0, -1.0),
+
+    fn value(&self, raw: i128) -> Option<Exact> {
+        Exact::decimal(raw.checked_mul(self.scale)?.checked_add(self.offset)?, self.decimals)
+    }
+
+    /// The nearest raw number; `None` if not all digits of the value are known.
+    fn raw(&self, value: Exact) -> Option<i128> {
+        value.as_decimal()?;
+        let scaled = value.mantissa(self.decimals)?.checked_sub(self.offset)?;
+        let (size, over) = (self.scale.checked_abs().filter(|size| 0 < *size)?, scaled.checked_abs()?);
+        Some((over + size / 2) / size * scaled.signum() * self.scale.signum())
     }
 }
 
@@ -94,7 +140,7 @@ mod tests {
         ] {
             (tag.scale, tag.offset) = (scale, offset);
             assert_eq!(to_value(&tag, raw, decimals), value);
-            assert_eq!(to_raw(&tag, value, decimals), Some(raw));
+            assert_eq!(to_raw(&tag, value, decimals), Some(raw.into()));
         }
     }
 
@@ -109,7 +155,45 @@ mod tests {
             (DataType::U32, f64::NAN, None),
         ] {
             tag.point.kind = kind;
-            assert_eq!(to_raw(&tag, value, 1), raw, "{kind:?} {value}");
+            assert_eq!(to_raw(&tag, value, 1), raw.map(Exact::from), "{kind:?} {value}");
         }
+    }
+
+    #[test]
+    fn a_counter_of_64_bits_is_scaled_to_its_last_digit_and_back() {
+        let mut tag = fixture::plant().tags[0].clone();
+        for (kind, scale, offset, decimals, raw, value) in [
+            (DataType::U64, 1.0, 0.0, 0, "9007199254740993", "9007199254740993"),
+            (DataType::U64, 0.001, 0.0, 0, "9007199254740991", "9007199254740.991"),
+            (DataType::U64, 0.001, 0.0, 0, "9007199254740993", "9007199254740.993"),
+            (DataType::U64, 0.001, 0.0, 0, "18446744073709551615", "18446744073709551.615"),
+            (DataType::U64, 1.0, 0.0, 3, "18446744073709551615", "18446744073709551.615"),
+            (DataType::U64, 0.001, 0.5, 0, "18446744073709551615", "18446744073709552.115"),
+            (DataType::U64, 2.5, -10.0, 0, "18446744073709551615", "46116860184273879027.5"),
+            (DataType::I64, 10.0, 0.0, 0, "-9223372036854775807", "-92233720368547758070"),
+            (DataType::I64, -0.01, 0.0, 0, "-9223372036854775808", "92233720368547758.08"),
+        ] {
+            (tag.point.kind, tag.scale, tag.offset) = (kind, scale, offset);
+            let parsed = |text: &str| text.parse::<Exact>().expect("a number");
+            assert_eq!(to_value(&tag, parsed(raw), decimals).to_string(), value, "{raw} · {scale}");
+            assert_eq!(
+                to_raw(&tag, parsed(value), decimals).map(|raw| raw.to_string()).as_deref(),
+                Some(raw),
+                "{value}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_an_f64_has_rounded_is_not_written() {
+        let mut tag = fixture::plant().tags[0].clone();
+        (tag.point.kind, tag.scale, tag.offset) = (DataType::U64, 1.0, 0.0);
+        assert_eq!(to_raw(&tag, 2f64.powi(53) + 2.0, 0), None);
+        let at_most = "18446744073709551615".parse::<Exact>().expect("a number");
+        let beyond = "18446744073709551616".parse::<Exact>().expect("a number");
+        assert_eq!((to_raw(&tag, at_most, 0), to_raw(&tag, beyond, 0)), (Some(at_most), None));
+        let limit = Some(Exact::from(2f64.powi(53)));
+        let above = "9007199254740993".parse::<Exact>().expect("a number");
+        assert!(!is_inside(None, limit, above) && is_inside(limit, None, above), "one more than the limit");
     }
 }

@@ -18,6 +18,7 @@ use super::{
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::DiagnosticRun,
     event::{Fault, LineCounters, LineState},
+    exact::Exact,
     interlock::ActuatorTracker,
     line_report::LineReport,
     ne107,
@@ -146,18 +147,18 @@ impl Snapshot {
         if let Some(text) = &self.texts[tag.index()] {
             return Some(text.to_string());
         }
-        let value = self.sample(tag).value?;
-        Some(self.format(tag, value))
+        Some(self.format(tag, self.sample(tag).exact()?))
     }
     /// Any value of a tag as text with its decimals or enumeration label.
-    pub fn format(&self, tag: TagId, value: f64) -> String {
+    pub fn format(&self, tag: TagId, value: impl Into<Exact>) -> String {
+        let value = value.into();
         match self.def.tag(tag).label_of(value) {
             Some(label) => label.to_owned(),
             None => digits(value, Some(self.decimals[tag.index()])),
         }
     }
     /// A value as the device will hold it once it is written; as it is where it cannot be sent.
-    pub fn rounded_to_device(&self, tag: TagId, value: f64) -> f64 {
+    pub fn rounded_to_device(&self, tag: TagId, value: Exact) -> Exact {
         scale::rounded_to_device(self.def.tag(tag), value, self.scaling_decimals(tag)).unwrap_or(value)
     }
     /// The smallest change of a value that a whole number in the device can hold.
@@ -171,18 +172,21 @@ impl Snapshot {
         }
     }
     /// The displayed value of the tag that a command writes; `None` where it writes none, or none is displayed.
-    pub fn expected_value(&self, kind: &CommandKind) -> Option<f64> {
-        let (tag, _) = kind.written()?;
-        self.samples.get(tag.index())?.value
+    pub fn expected_value(&self, kind: &CommandKind) -> Option<Exact> {
+        self.samples.get(kind.written()?.0.index())?.exact()
     }
     /// The unit of a tag, which the device may choose (°C or °F).
     pub fn unit(&self, tag: TagId) -> &str {
         self.def.tag(tag).unit_now(|tag| self.sample(tag))
     }
     /// Lowest and highest permitted value of a tag, where both are known now.
-    pub fn range(&self, tag: TagId) -> Option<(f64, f64)> {
-        let (min, max) = self.def.tag(tag).limits(|from| self.sample(from).value).ok()?;
+    pub fn bounds(&self, tag: TagId) -> Option<(Exact, Exact)> {
+        let (min, max) = self.def.tag(tag).limits(|from| self.sample(from).exact()).ok()?;
         min.zip(max)
+    }
+    /// The same, to draw by.
+    pub fn range(&self, tag: TagId) -> Option<(f64, f64)> {
+        self.bounds(tag).map(|(min, max)| (min.near(), max.near()))
     }
     /// The state of a line.
     pub fn line(&self, id: LineId) -> &LineStatus {
@@ -302,7 +306,7 @@ pub struct ActiveAlarm {
     /// When it returned to normal, if it did.
     pub returned_at: Option<Timestamp>,
     /// The value that raised it.
-    pub value: Option<f64>,
+    pub value: Option<Exact>,
     /// Who acknowledged it, when, with which note.
     pub acknowledged: Option<OperatorNote>,
     /// The steps of its action that were done: who, when, and the step as the reason.

@@ -12,6 +12,7 @@ pub use super::{
     store_policy::{STORE_EVERY_MAX, StorePolicy},
 };
 use super::{
+    exact::Exact,
     id::{DeviceId, TagId},
     keyword::keyword_enum,
     number::to_u8,
@@ -46,7 +47,7 @@ pub struct TagDef {
     /// `°C`, `%`, `s`; empty for none.
     pub unit: String,
     /// A tag whose value picks the unit from this list (PXR 41017: 0 °C, 1 °F).
-    pub unit_from: Option<(TagId, Vec<(i64, String)>)>,
+    pub unit_from: Option<(TagId, Vec<(i128, String)>)>,
     /// Lowest value that may be written, and low end of bars.
     pub min: Option<Bound>,
     /// Highest value that may be written, and high end of bars.
@@ -62,11 +63,11 @@ pub struct TagDef {
     /// The least role that may write it: operating is for a technician, tuning and setting up for a supervisor.
     pub role: Role,
     /// Names of the numbers of an enumeration; empty for a quantity.
-    pub enum_labels: Vec<(i64, String)>,
+    pub enum_labels: Vec<(i128, String)>,
     /// Names of the bits of a status word.
     pub bit_labels: Vec<(u8, String)>,
     /// Raw numbers (before scaling) that mean "no value".
-    pub bad_if: Vec<i64>,
+    pub bad_if: Vec<i128>,
     /// Another tag that makes this one bad while `value & mask != 0` (PXR 31008 for PV).
     pub quality_from: Option<(TagId, u64)>,
     /// Function code to write with; `None` picks 5/6 for one word, 16 for more.
@@ -173,12 +174,12 @@ impl TagDef {
     }
     /// Decimals that scale its raw number, as its device announces them; 0 where the profile fixes them, `None` while they
     /// are not known. A register that holds anything else would scale every value to nothing.
-    pub fn scaling_decimals(&self, value: impl Fn(TagId) -> Option<f64>) -> Option<u8> {
+    pub fn scaling_decimals<N: Into<Exact>>(&self, value: impl Fn(TagId) -> Option<N>) -> Option<u8> {
         let Some(source) = self.decimals.source() else { return Some(0) };
-        value(source).and_then(Decimals::announced)
+        value(source).and_then(|value| Decimals::announced(value.into().near()))
     }
     /// Least and greatest value that may be written now; `Err` names a tag that one of them needs and that is not known.
-    pub fn limits(&self, value: impl Fn(TagId) -> Option<f64>) -> Result<(Option<f64>, Option<f64>), TagId> {
+    pub fn limits(&self, value: impl Fn(TagId) -> Option<Exact>) -> Result<(Option<Exact>, Option<Exact>), TagId> {
         let now = |bound: Option<Bound>| match bound {
             None => Ok(None),
             Some(Bound::Fixed(value)) => Ok(Some(value)),
@@ -212,14 +213,19 @@ impl TagDef {
         }
     }
     /// The unit, as the device chooses it; `None` while its choice is not known.
-    pub fn unit_by(&self, value: impl Fn(TagId) -> Option<f64>) -> Option<&str> {
+    pub fn unit_by<N: Into<Exact>>(&self, value: impl Fn(TagId) -> Option<N>) -> Option<&str> {
         let Some((from, units)) = &self.unit_from else { return Some(&self.unit) };
-        let chosen = value(*from)?;
-        units.iter().find(|(number, _)| *number as f64 == chosen).map(|(_, unit)| unit.as_str())
+        let chosen = value(*from)?.into();
+        units.iter().find(|(number, _)| Exact::whole(*number) == chosen).map(|(_, unit)| unit.as_str())
     }
     /// The text of an enumeration's number.
-    pub fn label_of(&self, value: f64) -> Option<&str> {
-        self.enum_labels.iter().find(|(number, _)| *number as f64 == value).map(|(_, text)| text.as_str())
+    pub fn label_of(&self, value: impl Into<Exact>) -> Option<&str> {
+        let value = value.into();
+        self.enum_labels.iter().find(|(number, _)| Exact::whole(*number) == value).map(|(_, text)| text.as_str())
+    }
+    /// Does this raw number mean "no value"?
+    pub fn is_bad(&self, raw: Exact) -> bool {
+        self.bad_if.iter().any(|bad| Exact::whole(*bad) == raw)
     }
 }
 
@@ -325,7 +331,7 @@ impl Decimals {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Bound {
     /// A number in the tag's unit.
-    Fixed(f64),
+    Fixed(Exact),
     /// The present value of another tag.
     From(TagId),
 }
@@ -370,7 +376,7 @@ mod tests {
     use super::*;
     use crate::plant::{
         fixture::{self, DP, PV},
-        sample::{Cause, Quality},
+        sample::Cause,
     };
 
     #[test]
@@ -378,7 +384,7 @@ mod tests {
         let tag = fixture::plant().tags[PV.index()].clone();
         let units = vec![(0, "°F".to_owned()), (1, "°C".to_owned())];
         let tag = TagDef { unit: "°F".into(), unit_from: Some((DP, units)), ..tag };
-        let good = |value| Sample { value: Some(value), quality: Quality::Good, at: Timestamp::UNIX_EPOCH };
+        let good = |value: f64| Sample::good(value, Timestamp::UNIX_EPOCH);
         let never = Sample::bad(Cause::NotRead, Timestamp::UNIX_EPOCH);
         let unit = |said: Sample, own: Sample| tag.unit_now(|of| if of == DP { said } else { own }).to_owned();
         assert_eq!(unit(good(1.0), good(70.0)), "°C");

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::plant::{
     def::{AlarmClass, Condition, Level, Priority, Subject},
+    exact::Exact,
     keyword::keyword_enum,
     ne107::Signal,
     tag::{Bound, TagDef},
@@ -274,9 +275,9 @@ fn check_limit(limit: At<f64>, tag: &TagDef, problems: &mut Problems) {
         Some(Bound::Fixed(value)) => Some(value),
         Some(Bound::From(_)) | None => None,
     };
-    let (low, high) = range_of(tag).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+    let (low, high) = range_of(tag).unwrap_or((f64::NEG_INFINITY.into(), f64::INFINITY.into()));
     let (low, high) = (fixed(tag.min).unwrap_or(low), fixed(tag.max).unwrap_or(high));
-    if limit.value < low || limit.value > high {
+    if !(low..=high).contains(&Exact::from(limit.value)) {
         let problem = problems.add(limit.at, format!("the limit {} is outside the range of {}", limit.value, tag.name));
         problem.label(format!("it goes from {low} to {high}"));
     }

@@ -7,12 +7,13 @@ use over_time::is_over_time;
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Defs, check_number, number_of},
+    names::{Defs, check_number, exact_of},
     reader::{At, Choice},
 };
 use crate::plant::{
     calculation::OverTime,
     delay::Edge,
+    exact::Exact,
     expr::{Compare, Expr, Function, Operator},
     tag::TagDef,
     totalizer::Total,
@@ -222,7 +223,7 @@ impl<'a> Reader<'a, '_> {
             self.close(token.at)?;
             return Some(inner);
         }
-        if let Some(number) = token.value.parse::<f64>().ok().filter(|number| number.is_finite()) {
+        if let Some(number) = token.value.parse::<Exact>().ok().filter(|number| number.is_finite()) {
             return Some(Expr::Number(number));
         }
         if self.peek().is_some_and(|next| next.value == "(") {
@@ -312,7 +313,7 @@ impl<'a> Reader<'a, '_> {
         }
         let (first, rest) = (first.value, text[first.value.len()..].trim());
         self.next += count;
-        if let Ok(number) = first.parse::<f64>()
+        if let Ok(number) = first.parse::<Exact>()
             && number.is_finite()
             && tag.enum_labels.is_empty()
         {
@@ -328,7 +329,7 @@ impl<'a> Reader<'a, '_> {
             return Some(Expr::Number(number));
         }
         let choice = text.parse().map_or(Choice::Word(text), Choice::Number);
-        number_of(&At { value: choice, at }, tag, self.problems).map(Expr::Number)
+        exact_of(&At { value: choice, at }, tag, self.problems).map(Expr::Number)
     }
 }
 

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use super::{
     diagnostic::{Problems, Span},
-    reader::{At, Choice},
+    reader::{At, Choice, Node, Value},
 };
 use crate::plant::{
     def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
+    exact::Exact,
     number::digits,
     scale,
     tag::{Decimals, Encoding, TagDef},
@@ -157,13 +158,21 @@ impl Unique {
     }
 }
 
-/// The number that a choice means for a tag: a label of its enumeration, or a number that the tag can hold.
+/// The number that a choice means for a tag, see [`exact_of`]; one that is kept with 15 digits.
 pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
+    let exact = exact_of(choice, tag, problems)?;
+    f64::read(&Node::Number(exact), choice.at, problems)
+}
+
+/// The number that a choice means for a tag: a label of its enumeration, or a number that the tag can hold.
+pub(crate) fn exact_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<Exact> {
     let labels = || tag.enum_labels.iter().map(|(_, text)| text.as_str());
     let known = match &choice.value {
-        Choice::Word(word) => tag.enum_labels.iter().find(|(_, text)| text == word).map(|(number, _)| *number as f64),
+        Choice::Word(word) => {
+            tag.enum_labels.iter().find(|(_, text)| text == word).map(|(number, _)| Exact::whole(*number))
+        }
         Choice::Number(number) => Some(*number).filter(|n| tag.enum_labels.is_empty() || tag.label_of(*n).is_some()),
-        Choice::Flag(flag) => Some(f64::from(u8::from(*flag))).filter(|_| has_two_states(tag)),
+        Choice::Flag(flag) => Some(f64::from(u8::from(*flag)).into()).filter(|_| has_two_states(tag)),
     };
     if known.is_none() {
         let written = match &choice.value {
@@ -184,7 +193,7 @@ pub(crate) fn number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Proble
 /// Can a tag be true or false: a bit, states 0 and 1, or an expression?
 fn has_two_states(tag: &TagDef) -> bool {
     let is_bit = tag.point.kind.encoding() == Encoding::Bit || tag.point.field.is_some_and(|(_, bits)| bits == 1);
-    let is_flag = |number: i64| (0..=1).contains(&number);
+    let is_flag = |number: i128| (0..=1).contains(&number);
     let labels = !tag.enum_labels.is_empty() && tag.enum_labels.iter().all(|(number, _)| is_flag(*number));
     is_bit || labels || tag.calculation.is_some()
 }
@@ -200,7 +209,7 @@ pub(crate) fn held_number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut P
         problem.label("expected a value that its type can hold");
     }
     match tag.decimals {
-        Decimals::Fixed(_) => held,
+        Decimals::Fixed(_) => held.map(Exact::near),
         Decimals::From(_) => held.map(|_| number),
     }
 }

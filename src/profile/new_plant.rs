@@ -327,9 +327,9 @@ pub fn suggested_alarms(device: &str, tags: &[TagDef]) -> Vec<NewAlarm> {
                     if is_fast(tag) && !tag.unit.is_empty() && tag.unit != "%" =>
                 {
                     let reason = "The end of the range that the profile gives";
-                    let deadband = (max - min) / 100.0;
-                    let low = (min != 0.0).then(|| alarm(tag, Suggestion::Low, min, deadband, reason));
-                    [Some(alarm(tag, Suggestion::High, max, deadband, reason)), low]
+                    let deadband = (max - min).near() / 100.0;
+                    let low = (min != 0.0).then(|| alarm(tag, Suggestion::Low, min.near(), deadband, reason));
+                    [Some(alarm(tag, Suggestion::High, max.near(), deadband, reason)), low]
                 }
                 _ => [None, None],
             };

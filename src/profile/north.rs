@@ -189,7 +189,7 @@ fn percent_of(percent: At<f64>, problems: &mut Problems) -> f64 {
 /// How far a quantity goes, where its profile says so. A number that names a state has no deadband.
 fn range(tag: &TagDef) -> Option<f64> {
     match (tag.min, tag.max) {
-        (Some(Bound::Fixed(min)), Some(Bound::Fixed(max))) if tag.enum_labels.is_empty() => Some(max - min),
+        (Some(Bound::Fixed(min)), Some(Bound::Fixed(max))) if tag.enum_labels.is_empty() => Some((max - min).near()),
         _ => None,
     }
 }

@@ -17,7 +17,7 @@ use self::{
 use super::{diagnostic::Problems, names::Defs, reader::At};
 use crate::plant::{
     def::{MimicItem, MimicRect, Picture, TagId},
-    number::to_u16,
+    number::{digits, to_u16},
     tag::{Bound, Decimals, TagDef},
 };
 
@@ -219,7 +219,7 @@ fn columns(tag: &TagDef) -> Option<usize> {
     else {
         return None;
     };
-    let number = [min, max].map(|value| format!("{value:.*}", usize::from(decimals)).len());
+    let number = [min, max].map(|value| digits(value, Some(decimals)).len());
     let unit = if tag.unit.is_empty() { 0 } else { 1 + tag.unit.chars().count() };
     Some(number[0].max(number[1]) + unit)
 }

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, ProcedureDef, ProcedureStep, Reference, RunDef, TagId},
+    exact::Exact,
     number::digits,
     scale,
     tag::{Access, Bound, TagDef},
@@ -246,8 +247,8 @@ fn check_limits(value: &At<Choice>, held: f64, tag: &TagDef, problems: &mut Prob
         Some(Bound::From(_)) | None => None,
     };
     let (min, max) = (fixed(&tag.min), fixed(&tag.max));
-    if !scale::is_inside(min, max, held) {
-        let text = |bound: Option<f64>, none: &str| bound.map_or(none.to_owned(), |bound| digits(bound, None));
+    if !scale::is_inside(min, max, held.into()) {
+        let text = |bound: Option<Exact>, none: &str| bound.map_or(none.to_owned(), |bound| digits(bound, None));
         let held = digits(held, None);
         let problem = problems.add(value.at, format!("{held} is outside the range of {}", tag.name));
         problem.label(format!("expected {} … {}", text(min, "−∞"), text(max, "∞")));

@@ -18,7 +18,7 @@ use super::{
     diagnostic::{Problems, Span},
     renamed,
 };
-use crate::plant::{keyword::Keyword, visible::first_hidden};
+use crate::plant::{exact::Exact, keyword::Keyword, visible::first_hidden};
 
 /// Most unknown keys of one table that are reported.
 const UNKNOWN_MAX: usize = 40;
@@ -36,7 +36,7 @@ pub(crate) enum Node {
     Text(String),
     /// As written: what range is right depends on the key.
     Whole(i128),
-    Number(f64),
+    Number(Exact),
     Flag(bool),
     Time(String),
     Array(Vec<At<Node>>),
@@ -147,9 +147,9 @@ fn node_of(value: &Spanned<DeValue<'_>>, source: usize) -> At<Node> {
         DeValue::String(text) => Node::Text(text.as_ref().to_owned()),
         // TOML itself promises 64 bits; a longer number is as wrong as a number that is not finite.
         DeValue::Integer(number) => {
-            i128::from_str_radix(number.as_str(), number.radix()).map_or(Node::Number(f64::NAN), Node::Whole)
+            i128::from_str_radix(number.as_str(), number.radix()).map_or(Node::Number(f64::NAN.into()), Node::Whole)
         }
-        DeValue::Float(number) => Node::Number(number.as_str().parse().unwrap_or(f64::NAN)),
+        DeValue::Float(number) => Node::Number(number.as_str().parse().unwrap_or(f64::NAN.into())),
         DeValue::Boolean(flag) => Node::Flag(*flag),
         DeValue::Datetime(time) => Node::Time(time.to_string()),
         DeValue::Array(array) => Node::Array(array.iter().map(|item| node_of(item, source)).collect()),

@@ -9,11 +9,13 @@ use jiff::Timestamp;
 
 use super::{
     diagnostic::Problems,
-    names::number_of,
+    names::exact_of,
     reader::{self, At, Choice, Node, Raw, Value, text, toml_tables},
 };
 use crate::plant::{
     def::PlantDef,
+    exact::Exact,
+    number::digits,
     parameter_set::{ParameterSet, SetValue},
     tag::TagDef,
     visible::is_control_or_bidi,
@@ -131,7 +133,7 @@ fn values(table: &At<Raw>, tags: &[&TagDef], settings: bool, problems: &mut Prob
             continue;
         }
         let Some(value) = Choice::read(&node.value, node.at, problems) else { continue };
-        let value = number_of(&At { value, at: node.at }, tags[place], problems);
+        let value = exact_of(&At { value, at: node.at }, tags[place], problems);
         found.extend(value.map(|value| (place, SetValue { tag: short.clone(), value })));
     }
     found.sort_by_key(|(place, _)| *place);
@@ -208,7 +210,11 @@ fn row(value: &SetValue, tag: Option<&TagDef>, unit: &str) -> String {
 }
 
 /// A number that TOML reads back as the same one.
-fn number(value: f64) -> String {
+fn number(exact: Exact) -> String {
+    if exact.rest().is_some() {
+        return digits(exact, None);
+    }
+    let value = exact.near();
     if value.fract() == 0.0 && value.abs() < 1e15 { format!("{value:.0}") } else { format!("{value:?}") }
 }
 

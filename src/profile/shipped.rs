@@ -105,7 +105,11 @@ fn a_temperature_needs_its_decimals_unit_and_sensor_state() {
     }
     assert_eq!(pv.unit_from, Some((id("TIC-1.P-F"), vec![(0, "°C".to_owned()), (1, "°F".to_owned())])));
     assert_eq!(pv.unit, "°C");
-    assert_eq!((pv.min, pv.max), (Some(Bound::Fixed(0.0)), Some(Bound::Fixed(100.0))), "the plant file's bounds win");
+    assert_eq!(
+        (pv.min, pv.max),
+        (Some(Bound::Fixed(0.0.into())), Some(Bound::Fixed(100.0.into()))),
+        "the plant file's bounds win"
+    );
     let sv = plant.tag(id("TIC-1.SV"));
     assert_eq!((sv.min, sv.max), (Some(Bound::From(id("TIC-1.SV-L"))), Some(Bound::From(id("TIC-1.SV-H")))));
 }

@@ -163,7 +163,7 @@ fn check(table: &CheckTable, scope: &Scope, problems: &mut Problems) -> Option<C
     if let Some(is) = &table.is {
         // Bits of a word have no names of their own.
         let number = |choice: &At<Choice>, problems: &mut Problems| match (&choice.value, field) {
-            (Choice::Number(number), Some(_)) => Some(*number),
+            (Choice::Number(number), Some(_)) => Some(number.near()),
             _ => number_of(choice, target, problems),
         };
         let wanted: Vec<f64> = is.value.0.iter().filter_map(|choice| number(choice, problems)).collect();

@@ -21,6 +21,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceId, Limits, Role, TagId},
+    exact::Exact,
     tag::{
         Access, Bound, ByteOrder, Confidence, DataType, Decimals, Encoding, Point, Poll, PollClass, STORE_EVERY_MAX,
         StorePolicy, Table, TagDef,
@@ -360,6 +361,6 @@ fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Acce
     access
 }
 
-fn fixed(bound: &Option<At<f64>>) -> Option<Bound> {
+fn fixed(bound: &Option<At<Exact>>) -> Option<Bound> {
     bound.map(|bound| Bound::Fixed(bound.value))
 }

@@ -337,7 +337,8 @@ fn a_plant_file_may_change_a_tag_but_not_contradict_itself() {
     let plant =
         load(PLANT.replacen("fast = \"1s\"", moved, 1).as_bytes(), METER, PLC).unwrap_or_else(|e| panic!("{e}"));
     let tag = plant.tag(plant.tag_named("D1.T").unwrap());
-    assert_eq!((tag.point.address, tag.max, tag.min), (1010, Some(Bound::Fixed(90.0)), Some(Bound::Fixed(0.0))));
+    let fixed = |bound: f64| Some(Bound::Fixed(bound.into()));
+    assert_eq!((tag.point.address, tag.max, tag.min), (1010, fixed(90.0), fixed(0.0)));
     assert_eq!(tag.unit, "°C", "what the plant file does not say stays as the profile has it");
     let both = "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\nmax = 90\nmax_from = \"DP\"";
     check("fast = \"1s\"", both, &["`max` and `max_from` exclude each other"]);

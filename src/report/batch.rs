@@ -14,6 +14,8 @@ use crate::plant::{
     batch::Batch,
     def::{CsvDialect, PlantDef},
     energy::{self, Measures},
+    exact::Exact,
+    number::digits,
 };
 
 /// A batch, what its tags did, and the alarms of its time.
@@ -50,8 +52,8 @@ impl BatchReport {
 pub fn energy(figures: &TagFigures, time: Duration) -> Option<(f64, f64)> {
     let hours = time.as_secs_f64() / 3_600.0;
     let kwh = match energy::of_unit(&figures.unit)? {
-        Measures::Power(kw) => figures.mean? * kw * hours * figures.good,
-        Measures::Energy(kwh) => figures.difference? * kwh,
+        Measures::Power(kw) => figures.mean?.near() * kw * hours * figures.good,
+        Measures::Energy(kwh) => figures.difference?.near() * kwh,
     };
     Some((kwh, figures.good))
 }
@@ -123,7 +125,7 @@ fn own_cells(report: &BatchReport, def: &PlantDef, dialect: CsvDialect) -> Vec<S
 }
 
 fn figures(tag: &TagFigures, dialect: CsvDialect) -> [String; 5] {
-    let value = |value: Option<f64>| number(value, tag.decimals, dialect);
+    let value = |value: Option<Exact>| number(value, tag.decimals, dialect);
     let mean = match tag.difference {
         Some(difference) => value(Some(difference)),
         // One more decimal than the device has: a mean is finer than its samples.
@@ -164,9 +166,7 @@ pub fn text(batches: &[BatchReport], def: &PlantDef) -> String {
             lines.push(format!("    {}", phases.join(", ")));
         }
         for tag in tags {
-            let value = |value: Option<f64>| {
-                value.map_or("—".into(), |value| format!("{value:.*}", usize::from(tag.decimals)))
-            };
+            let value = |value: Option<Exact>| value.map_or("—".into(), |value| digits(value, Some(tag.decimals)));
             let (min, max, last) = (value(tag.min), value(tag.max), value(tag.last));
             let (mean, good) = (mean_or_difference(tag), floor_percent(tag.good));
             let unit = &tag.unit;

@@ -5,10 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     curve::Bucket,
-    document::digits,
     drawing::{Anchor, Drawing, Ink, TEXT},
 };
-use crate::plant::number::{to_f32, to_u8, to_u16, to_usize};
+use crate::plant::number::{digits, to_f32, to_u8, to_u16, to_usize};
 
 /// Curves over one time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -201,8 +200,8 @@ fn paths(curve: &ChartCurve, from: Timestamp, x: impl Fn(f64) -> f32, y: impl Fn
                 if bucket.min < bucket.max {
                     path.extend([(here, y(bucket.min)), (here, y(bucket.max))]);
                 }
-                path.push((here, y(bucket.last)));
-                path.push((x(at + curve.step), y(bucket.last)));
+                path.push((here, y(bucket.last.near())));
+                path.push((x(at + curve.step), y(bucket.last.near())));
             }
             (None, Some(path)) if path.is_empty() => {}
             (None, _) | (Some(_), None) => paths.push(Vec::new()),
@@ -218,7 +217,7 @@ mod tests {
     use crate::report::testing::{at, zone};
 
     fn curve(name: &str, unit: &str, values: &[Option<f64>]) -> ChartCurve {
-        let bucket = |value: f64| Bucket { min: value, max: value, mean: value, last: value };
+        let bucket = |value: f64| Bucket { min: value, max: value, mean: value, last: value.into() };
         let columns = values.iter().map(|value| value.map(bucket)).collect();
         let from = at("2026-11-21T06:00+07");
         ChartCurve { name: name.into(), unit: unit.into(), decimals: 1, from, step: 3_600.0, columns }

@@ -20,6 +20,7 @@ use crate::{
     plant::{
         commands::{HAND_OVER, TAKE_OVER},
         def::{PlantDef, Priority, Section as Kind},
+        exact::Exact,
         record::ActionRecord,
     },
     t,
@@ -174,7 +175,7 @@ fn values(tags: &[TagFigures]) -> Table {
         Column::number("good %"),
     ];
     Table::new(columns).with(tags.iter().map(|tag| {
-        let value = |value: Option<f64>| Cell::number(value, tag.decimals);
+        let value = |value: Option<Exact>| Cell::number(value, tag.decimals);
         vec![
             Cell::text(&tag.tag),
             Cell::text(&tag.unit),
@@ -209,7 +210,8 @@ fn comparison(report: &ShiftReport, zone: &TimeZone) -> Table {
 fn compared_row(tag: &TagFigures, compared: &[Compared]) -> Vec<Cell> {
     let counts = tag.difference.is_some();
     let figure = |tag: &TagFigures| if counts { tag.difference } else { tag.mean };
-    let cell = |value| Cell::number(value, if counts { tag.decimals } else { tag.decimals.saturating_add(1) });
+    let cell =
+        |value: Option<Exact>| Cell::number(value, if counts { tag.decimals } else { tag.decimals.saturating_add(1) });
     let word = if counts { t!("difference") } else { t!("mean") };
     let mut row = vec![Cell::text(&tag.tag), Cell::text(&tag.unit), Cell::text(word), cell(figure(tag))];
     for Compared { tags, .. } in compared {
@@ -251,14 +253,14 @@ fn batches(batches: &[BatchReport]) -> Table {
         let phases: Vec<String> = batch.phases.iter().map(phase).collect();
         vec![
             Cell::text(&batch.name),
-            Cell::Number(f64::from(batch.number), Some(0)),
+            Cell::number(Some(f64::from(batch.number)), 0),
             Cell::Time(batch.from),
             batch.to.map_or(Cell::Empty, Cell::Time),
             minutes(batch.lasted),
             Cell::text(batch::state(batch)),
             Cell::number(kwh, 3),
             Cell::number(good.map(floor_percent), 1),
-            alarms.map_or(Cell::Empty, |alarms| Cell::Number(alarms as f64, Some(0))),
+            Cell::number(alarms.map(|alarms| alarms as f64), 0),
             Cell::text(phases.join(" | ")),
         ]
     }))
@@ -330,7 +332,7 @@ fn provenance(report: &ShiftReport, def: &PlantDef) -> Vec<Fact> {
         fact("time zone", Cell::text(zone_name(&def.time_zone))),
     ];
     if let Some(entry) = report.audit {
-        facts.push(fact("audit entry", Cell::Number(entry.number as f64, Some(0))));
+        facts.push(fact("audit entry", Cell::number(Some(entry.number as f64), 0)));
         facts.push(fact("audit hash", Cell::text(entry.hash_hex())));
     }
     facts

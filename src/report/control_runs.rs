@@ -12,6 +12,7 @@ use crate::{
     plant::{
         control_run::{ControlRun, Figure, WHOLE},
         def::{CsvDialect, PlantDef},
+        number::digits,
     },
     t,
 };
@@ -127,7 +128,7 @@ pub fn text(runs: &[ControlRun], def: &PlantDef) -> String {
 
 /// `setpoint 27.0 → 70.0 °C`, `program step 2, 70.0 °C`, `batch hot-water-3, 70.0 °C`.
 pub fn setpoint(run: &ControlRun) -> String {
-    let value = |value: f64| format!("{value:.*}", usize::from(run.decimals));
+    let value = |value: f64| digits(value, Some(run.decimals));
     let (cause, sv, unit) = (crate::text::translate(run.cause.word()), value(run.sv), &run.unit);
     let detail = run.detail.strip_prefix("step ").unwrap_or(&run.detail);
     match (detail, run.sv_before) {
@@ -139,9 +140,8 @@ pub fn setpoint(run: &ControlRun) -> String {
 
 /// The figures in words: `first at SV 12:45`, `steady from 17:46`, …
 pub fn figures(run: &ControlRun) -> Vec<String> {
-    let decimals = usize::from(run.decimals);
     let (running, unit) = (run.is_running(), &run.unit);
-    let value = |value: f64| format!("{value:.decimals$}");
+    let value = |value: f64| digits(value, Some(run.decimals));
     // Of a time without good values a sum or an extreme is a lower bound.
     let least = |is_bound: bool| if is_bound { t!("at least ") } else { "" };
     let bound = least(run.is_partial());
@@ -167,7 +167,7 @@ pub fn figures(run: &ControlRun) -> Vec<String> {
         Figure::Unknown => Some(t!("rise unknown").to_owned()),
         Figure::NotYet => None,
     };
-    let iae = format!("IAE {bound}{:.decimals$} {unit} min", run.iae);
+    let iae = format!("IAE {bound}{} {unit} min", value(run.iae));
     let energy = run.energy.map(|(kwh, good)| format!("{}{kwh:.3} kWh", least(good < WHOLE)));
     let good = run.is_partial().then(|| t!("good {percent} %", percent = format!("{:.1}", floor_percent(run.good))));
     [Some(at_sv), Some(steady), overshoot, Some(offset), rise, Some(iae), energy, good].into_iter().flatten().collect()

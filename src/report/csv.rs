@@ -2,8 +2,7 @@
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use super::document::digits;
-use crate::plant::def::CsvDialect;
+use crate::plant::{def::CsvDialect, exact::Exact, number::digits};
 
 impl CsvDialect {
     /// The dialect of a plant with other settings from the command line. The decimal mark follows the separator.
@@ -57,8 +56,8 @@ pub(super) fn plain(cell: impl Into<String>) -> String {
 }
 
 /// A number with fixed decimals; empty if there is none.
-pub(super) fn number(value: Option<f64>, decimals: u8, dialect: CsvDialect) -> String {
-    let Some(value) = value.filter(|value| value.is_finite()) else { return String::new() };
+pub(super) fn number(value: Option<impl Into<Exact>>, decimals: u8, dialect: CsvDialect) -> String {
+    let Some(value) = value.map(Into::<Exact>::into).filter(|value| value.is_finite()) else { return String::new() };
     localised(digits(value, Some(decimals)), dialect)
 }
 

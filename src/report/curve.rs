@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::def::TagId;
+use crate::plant::{def::TagId, exact::Exact};
 
 /// A curve reduced to columns of equal width.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub struct Series {
     /// The columns; `None` where there was no good value: a gap is a gap.
     pub buckets: Vec<Option<Bucket>>,
     /// Of the whole span: (min, time-weighted mean, max) of good values.
-    pub summary: Option<(f64, f64, f64)>,
+    pub summary: Option<(Exact, Exact, Exact)>,
     /// Share of the span with a good value, 0–1.
     pub good: f64,
 }
@@ -34,5 +34,5 @@ pub struct Bucket {
     /// Time-weighted mean.
     pub mean: f64,
     /// The value at the end of the column.
-    pub last: f64,
+    pub last: Exact,
 }

@@ -6,7 +6,7 @@ use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 
 use super::chart::Chart;
 use crate::{
-    plant::def::Section as Kind,
+    plant::{def::Section as Kind, exact::Exact, number::digits},
     text::{Locale, translate},
 };
 
@@ -160,7 +160,7 @@ pub enum Cell {
     /// A text.
     Text(String),
     /// A finite number with its decimals; `None` prints as many as it has.
-    Number(f64, Option<u8>),
+    Number(Exact, Option<u8>),
     /// An instant.
     Time(Timestamp),
 }
@@ -175,18 +175,18 @@ impl Cell {
     }
 
     /// A number with fixed decimals.
-    pub fn number(value: Option<f64>, decimals: u8) -> Cell {
+    pub fn number(value: Option<impl Into<Exact>>, decimals: u8) -> Cell {
         Cell::finite(value, Some(decimals))
     }
 
     /// A number with as many digits as it has.
-    pub fn shortest(value: Option<f64>) -> Cell {
+    pub fn shortest(value: Option<impl Into<Exact>>) -> Cell {
         Cell::finite(value, None)
     }
 
     /// A whole number.
     pub fn count(count: usize) -> Cell {
-        Cell::Number(count as f64, Some(0))
+        Cell::Number((count as f64).into(), Some(0))
     }
 
     /// The kind of the column that it would stand in.
@@ -198,7 +198,8 @@ impl Cell {
         }
     }
 
-    fn finite(value: Option<f64>, decimals: Option<u8>) -> Cell {
+    fn finite(value: Option<impl Into<Exact>>, decimals: Option<u8>) -> Cell {
+        let value = value.map(Into::<Exact>::into);
         value.filter(|value| value.is_finite()).map_or(Cell::Empty, |value| Cell::Number(value, decimals))
     }
 }
@@ -206,16 +207,6 @@ impl Cell {
 /// Without the places where a screen may break a line.
 pub fn plain(text: &str) -> String {
     text.replace('\u{200b}', "")
-}
-
-/// A number as digits, with `.`; what rounds to nothing has no sign.
-pub fn digits(value: f64, decimals: Option<u8>) -> String {
-    let Some(decimals) = decimals else { return value.to_string() };
-    let digits = format!("{value:.*}", usize::from(decimals));
-    match digits.strip_prefix('-') {
-        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
-        _ => digits,
-    }
 }
 
 /// `2026-11-21 06:12:45`, as spreadsheets take for a date; in a column of milliseconds with three decimals.

@@ -9,11 +9,12 @@ use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
     DECIMALS_UNKNOWN, Outage, RecordRow, RunFigures, SuppressedSummary, TagFigures,
-    step_series::{IntervalStats, gain, good_value},
+    step_series::{IntervalStats, gain, good_exact},
 };
 use crate::plant::{
     alarm::manager::subject_name,
     def::{Condition, PlantDef, TagId},
+    exact::Exact,
     record::{AlarmEvent, AlarmRecord},
     sample::Sample,
     tag::{Decimals, TagDef},
@@ -61,31 +62,36 @@ pub fn scaling_tags(def: &TagDef) -> impl Iterator<Item = TagId> + use<> {
 #[derive(Debug, Clone, Copy)]
 pub struct Figures {
     seconds: f64,
-    first: Option<f64>,
+    first: Option<Exact>,
     stats: Option<IntervalStats>,
-    counted: f64,
+    counted: Exact,
 }
 
 impl Figures {
     /// Over `from..until`; nothing has come yet.
     pub fn new(from: Timestamp, until: Timestamp) -> Figures {
-        Figures { seconds: until.duration_since(from).as_secs_f64(), first: None, stats: None, counted: 0.0 }
+        Figures {
+            seconds: until.duration_since(from).as_secs_f64(),
+            first: None,
+            stats: None,
+            counted: Exact::default(),
+        }
     }
 
     /// The next stretch, by its first value, its figures, and how far it counted from the first to the last.
-    pub fn add(&mut self, first: f64, stats: IntervalStats, counted: f64) {
+    pub fn add(&mut self, first: Exact, stats: IntervalStats, counted: Exact) {
         self.first.get_or_insert(first);
-        self.counted += self.stats.map_or(0.0, |stats| gain(stats.last, first)) + counted;
+        self.counted = self.counted + self.stats.map_or(Exact::default(), |stats| gain(stats.last, first)) + counted;
         IntervalStats::add(&mut self.stats, stats);
     }
 
     /// How long and how often the tag, 0 or 1, was on.
     pub fn runs(self, tag: String) -> RunFigures {
-        let two_states = self.stats.filter(|stats| 0.0 <= stats.min && stats.max <= 1.0);
+        let two_states = self.stats.filter(|stats| 0.0 <= stats.min.near() && stats.max.near() <= 1.0);
         RunFigures {
             tag,
             on: two_states.map(|stats| Duration::from_secs_f64((stats.mean * stats.seconds).max(0.0))),
-            starts: two_states.map(|_| self.counted),
+            starts: two_states.map(|_| self.counted.near()),
             good: self.stats.map_or(0.0, |stats| (stats.seconds / self.seconds).clamp(0.0, 1.0)),
         }
     }
@@ -95,7 +101,7 @@ impl Figures {
         let Figures { seconds, first, stats, counted } = self;
         let (mean, difference) = match label.counts {
             true => (None, stats.map(|_| counted)),
-            false => (stats.map(|stats| stats.mean), None),
+            false => (stats.map(|stats| stats.shown_mean()), None),
         };
         TagFigures {
             tag: label.tag,
@@ -205,7 +211,7 @@ pub fn time_in_alarm<'a>(events: impl Iterator<Item = &'a AlarmRecord>, from: Ti
 
 /// The rows of the thesis's record, from what stood at each of its instants.
 pub fn record(instants: &[Timestamp], sv: &[Option<Sample>], pv: &[Option<Sample>]) -> Vec<RecordRow> {
-    let good = |sample: &Option<Sample>| sample.and_then(good_value);
+    let good = |sample: &Option<Sample>| sample.and_then(good_exact);
     let row = |((at, sv), pv): ((&Timestamp, &Option<Sample>), &Option<Sample>)| {
         let (sv, pv) = (good(sv), good(pv));
         RecordRow { at: *at, sv, pv, er: sv.zip(pv).map(|(sv, pv)| sv - pv) }

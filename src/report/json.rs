@@ -5,8 +5,9 @@ use serde_json::{Map, Value, json};
 use super::{
     ReportFormat, Style,
     csv::{iso, iso_millis},
-    document::{Cell, ColumnKind, Content, Document, Fact, Table, digits},
+    document::{Cell, ColumnKind, Content, Document, Fact, Table},
 };
+use crate::plant::number::digits;
 
 /// The format `json`.
 #[derive(Debug)]

@@ -44,6 +44,7 @@ use crate::{
         alarm::PeriodMetrics,
         control_run::ControlRun,
         def::{CsvDialect, Paper, PlantDef, Priority},
+        exact::Exact,
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
         report::PeriodKind,
     },
@@ -305,17 +306,17 @@ pub struct TagFigures {
     /// Decimals to print.
     pub decimals: u8,
     /// First good value.
-    pub first: Option<f64>,
+    pub first: Option<Exact>,
     /// Least good value.
-    pub min: Option<f64>,
+    pub min: Option<Exact>,
     /// Time-weighted mean over good time.
-    pub mean: Option<f64>,
+    pub mean: Option<Exact>,
     /// Greatest good value.
-    pub max: Option<f64>,
+    pub max: Option<Exact>,
     /// Last good value.
-    pub last: Option<f64>,
+    pub last: Option<Exact>,
     /// Of a counter (energy, volume, pieces): by how much it has counted up. It has no mean.
-    pub difference: Option<f64>,
+    pub difference: Option<Exact>,
     /// Time in which an alarm of this tag was active.
     pub in_alarm: Duration,
     /// Share of the period with a good value, 0–1.
@@ -378,9 +379,9 @@ pub struct RecordRow {
     /// When.
     pub at: Timestamp,
     /// Setpoint in use, if good.
-    pub sv: Option<f64>,
+    pub sv: Option<Exact>,
     /// Process value, if good.
-    pub pv: Option<f64>,
+    pub pv: Option<Exact>,
     /// SV − PV, if both are good.
-    pub er: Option<f64>,
+    pub er: Option<Exact>,
 }

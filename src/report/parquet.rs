@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use parquet::{
     basic::{LogicalType, Repetition, TimeUnit, Type as Physical},
-    data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type},
+    data_type::{ByteArray, ByteArrayType, DoubleType, FixedLenByteArray, FixedLenByteArrayType, Int64Type},
     errors::ParquetError,
     file::{
         metadata::KeyValue,
@@ -18,9 +18,9 @@ use parquet::{
 use super::{
     ReportFormat, Style,
     csv::iso,
-    document::{Cell, Column, ColumnKind, Content, Document, Fact, Table, digits},
+    document::{Cell, Column, ColumnKind, Content, Document, Fact, Table},
 };
-use crate::plant::def::Section as Kind;
+use crate::plant::{def::Section as Kind, number::digits};
 
 /// The format `parquet`.
 #[derive(Debug)]
@@ -59,7 +59,13 @@ impl ReportFormat for Parquet {
 }
 
 fn table(document: &Document, table: &Table) -> Result<Vec<u8>, ParquetError> {
-    let fields = table.columns.iter().map(|column| field(column).map(Arc::new)).collect::<Result<_, _>>()?;
+    let cells = |place: usize| table.rows.iter().map(move |row| &row[place]);
+    // A column whose numbers a DOUBLE would round has another one with all their digits.
+    let has_rests = |place: &usize| cells(*place).any(|cell| exact(cell).is_some());
+    let rests: Vec<usize> = (0..table.columns.len()).filter(has_rests).collect();
+    let fields = table.columns.iter().map(|column| field(column).map(Arc::new));
+    let exacts = rests.iter().map(|place| exact_field(&table.columns[*place]).map(Arc::new));
+    let fields = fields.chain(exacts).collect::<Result<_, _>>()?;
     let schema = Type::group_type_builder("report").with_fields(fields).build()?;
     let properties = WriterProperties::builder()
         .set_created_by(concat!("sightglass ", env!("CARGO_PKG_VERSION")).to_owned())
@@ -68,7 +74,14 @@ fn table(document: &Document, table: &Table) -> Result<Vec<u8>, ParquetError> {
     let mut group = file.next_row_group()?;
     for (place, column) in table.columns.iter().enumerate() {
         if let Some(mut writer) = group.next_column()? {
-            write(&mut writer, column.kind, table.rows.iter().map(|row| &row[place]))?;
+            write(&mut writer, column.kind, cells(place))?;
+            writer.close()?;
+        }
+    }
+    for place in rests {
+        if let Some(mut writer) = group.next_column()? {
+            let (values, levels) = split(cells(place), exact);
+            writer.typed::<FixedLenByteArrayType>().write_batch(&values, Some(&levels), None)?;
             writer.close()?;
         }
     }
@@ -92,6 +105,30 @@ fn field(column: &Column) -> Result<Type, ParquetError> {
         .build()
 }
 
+/// Decimals of a number with all its digits, and digits and bytes of its type.
+const EXACT: (i32, i32, i32) = (6, 38, 16);
+
+fn exact_field(column: &Column) -> Result<Type, ParquetError> {
+    let (scale, precision, bytes) = EXACT;
+    Type::primitive_type_builder(&format!("{}_exact", column.id), Physical::FIXED_LEN_BYTE_ARRAY)
+        .with_repetition(Repetition::OPTIONAL)
+        .with_logical_type(Some(LogicalType::Decimal { scale, precision }))
+        .with_scale(scale)
+        .with_precision(precision)
+        .with_length(bytes)
+        .build()
+}
+
+/// All digits of a number that has more than a DOUBLE keeps.
+fn exact(cell: &Cell) -> Option<FixedLenByteArray> {
+    let Cell::Number(number, decimals) = cell else { return None };
+    let scale = EXACT.0.unsigned_abs();
+    let printed = decimals.map_or(scale, u32::from).min(scale);
+    let mantissa = number.rest().and_then(|_| number.mantissa(printed))?;
+    let mantissa = mantissa.checked_mul(10i128.pow(scale - printed))?;
+    Some(ByteArray::from(mantissa.to_be_bytes().to_vec()).into())
+}
+
 /// The cells of a column; one of another kind than its column would be empty.
 fn write<'a>(
     writer: &mut SerializedColumnWriter,
@@ -108,7 +145,9 @@ fn write<'a>(
         }
         ColumnKind::Number => {
             let (values, levels) = split(cells, |cell| match cell {
-                Cell::Number(value, decimals) => digits(*value, *decimals).parse::<f64>().ok(),
+                Cell::Number(value, decimals) => {
+                    value.as_f64().and_then(|_| digits(*value, *decimals).parse::<f64>().ok())
+                }
                 Cell::Empty | Cell::Text(_) | Cell::Time(_) => None,
             });
             writer.typed::<DoubleType>().write_batch(&values, Some(&levels), None)
@@ -157,6 +196,7 @@ mod tests {
     use super::*;
     use crate::{
         report::{
+            ShiftReport,
             content::document,
             testing::{THREE, plant, shift_report},
         },
@@ -165,8 +205,12 @@ mod tests {
 
     /// The rows of a table, and the keys of its file with their values.
     fn read(word: &str) -> (Vec<Vec<(String, Field)>>, Vec<KeyValue>) {
+        read_of(&shift_report(), word)
+    }
+
+    fn read_of(report: &ShiftReport, word: &str) -> (Vec<Vec<(String, Field)>>, Vec<KeyValue>) {
         let def = plant("Asia/Bangkok", &THREE);
-        let document = document(&shift_report(), &def, Locale::ENGLISH);
+        let document = document(report, &def, Locale::ENGLISH);
         let tables = Parquet.tables(&document, &Style::of(&def)).expect("it can be made");
         let (_, bytes) = tables.into_iter().find(|(name, _)| *name == word).expect("the table");
         let reader = SerializedFileReader::new(bytes::Bytes::from(bytes)).expect("Parquet");
@@ -189,6 +233,22 @@ mod tests {
         let value = |key: &str| keys.iter().find(|pair| pair.key == key).and_then(|pair| pair.value.clone());
         assert_eq!(value("from").as_deref(), Some("2026-11-21T06:00:00+07:00"));
         assert_eq!(value("program").as_deref(), Some(concat!("sightglass ", env!("CARGO_PKG_VERSION"))));
+    }
+
+    #[test]
+    fn what_a_double_rounds_stands_in_a_decimal_beside_it() {
+        let mut report = shift_report();
+        (report.tags[2].last, report.tags[2].decimals) = ("18446744073709551.615".parse().ok(), 3);
+        let (rows, _) = read_of(&report, "values");
+        let Field::Decimal(decimal) = cell(&rows[2], "last_exact") else { panic!("{:?}", rows[2]) };
+        let digits = decimal.data().iter().fold(0_i128, |digits, byte| digits << 8 | i128::from(*byte));
+        assert_eq!((digits, decimal.scale()), (18_446_744_073_709_551_615_000, 6));
+        assert_eq!((cell(&rows[2], "last"), cell(&rows[0], "last_exact")), (Field::Null, Field::Null));
+        assert!(
+            rows[0].iter().all(|(name, _)| name != "first_exact"),
+            "a column only where it is needed: {:?}",
+            rows[0]
+        );
     }
 
     #[test]

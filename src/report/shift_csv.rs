@@ -5,9 +5,12 @@ use jiff::tz::TimeZone;
 use super::{
     ReportFormat, Style,
     csv::{self, localised, text},
-    document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table, digits, local, offset},
+    document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table, local, offset},
 };
-use crate::{plant::def::CsvDialect, t};
+use crate::{
+    plant::{def::CsvDialect, number::digits},
+    t,
+};
 
 /// The format `csv`.
 #[derive(Debug)]

@@ -11,7 +11,10 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::sample::{Quality, Sample};
+use crate::plant::{
+    exact::Exact,
+    sample::{Quality, Sample},
+};
 
 /// The plant stores every change of quality, and of value beyond the deadband, at once, and an unchanged value at least every 60 s. A value
 /// without a successor for longer than this was therefore not stored any more: from here on it is not known.
@@ -25,7 +28,7 @@ pub struct HoldInterval {
     /// To, exclusive.
     pub to: Timestamp,
     /// The value.
-    pub value: f64,
+    pub value: Exact,
 }
 
 impl HoldInterval {
@@ -63,7 +66,7 @@ impl StepSeries {
     }
 
     fn span(&self, sample: Sample, successor: Timestamp) -> Option<HoldInterval> {
-        let value = good_value(sample)?;
+        let value = good_exact(sample)?;
         let to = successor.min(expiry(sample)).min(self.until);
         let from = sample.at.max(self.from);
         (from < to).then_some(HoldInterval { from, to, value })
@@ -108,14 +111,14 @@ impl ValuesAt {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HeldValue {
     /// In the tag's unit; `None` exactly when the quality is bad.
-    pub value: Option<f64>,
+    pub value: Option<Exact>,
     /// How far to trust it.
     pub quality: Quality,
 }
 
 impl From<Sample> for HeldValue {
     fn from(sample: Sample) -> HeldValue {
-        HeldValue { value: sample.value, quality: sample.quality }
+        HeldValue { value: sample.exact(), quality: sample.quality }
     }
 }
 
@@ -123,13 +126,13 @@ impl From<Sample> for HeldValue {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IntervalStats {
     /// Least.
-    pub min: f64,
+    pub min: Exact,
     /// Greatest.
-    pub max: f64,
+    pub max: Exact,
     /// Time-weighted mean.
     pub mean: f64,
     /// Latest.
-    pub last: f64,
+    pub last: Exact,
     /// Time with a good value, in seconds.
     pub seconds: f64,
 }
@@ -137,7 +140,7 @@ pub struct IntervalStats {
 impl From<HoldInterval> for IntervalStats {
     fn from(span: HoldInterval) -> IntervalStats {
         let HoldInterval { value, .. } = span;
-        IntervalStats { min: value, max: value, mean: value, last: value, seconds: span.seconds() }
+        IntervalStats { min: value, max: value, mean: value.near(), last: value, seconds: span.seconds() }
     }
 }
 
@@ -150,13 +153,19 @@ impl IntervalStats {
         }
     }
 
+    /// The mean as it is shown: that of a value which has not changed is the value.
+    pub fn shown_mean(&self) -> Exact {
+        if self.min == self.max { self.min } else { self.mean.into() }
+    }
+
     /// Adds those of a later span.
     pub fn merge(&mut self, later: IntervalStats) {
         self.seconds += later.seconds;
-        self.min = self.min.min(later.min);
-        self.max = self.max.max(later.max);
+        self.min = if later.min < self.min { later.min } else { self.min };
+        self.max = if later.max > self.max { later.max } else { self.max };
         // Kept as a running mean, so that a constant stays exactly what it is; rounding never leaves the extremes.
-        self.mean = (self.mean + (later.mean - self.mean) * (later.seconds / self.seconds)).clamp(self.min, self.max);
+        self.mean = (self.mean + (later.mean - self.mean) * (later.seconds / self.seconds))
+            .clamp(self.min.near(), self.max.near());
         self.last = later.last;
     }
 }
@@ -164,13 +173,13 @@ impl IntervalStats {
 /// How far a counter counted between two values. One that shows less than half of its last value, but not less than
 /// nothing, was reset or has rolled over: it counts from zero. Any other step back is that of a balance, as of energy taken
 /// and fed back.
-pub fn gain(last: f64, value: f64) -> f64 {
-    if (0.0..last / 2.0).contains(&value) { value } else { value - last }
+pub fn gain(last: Exact, value: Exact) -> Exact {
+    if (0.0..last.near() / 2.0).contains(&value.near()) { value } else { value - last }
 }
 
 /// A good value that is a number. A stored NaN or infinity is no value, whatever its quality says.
-pub fn good_value(sample: Sample) -> Option<f64> {
-    sample.good_value().filter(|value| value.is_finite())
+pub fn good_exact(sample: Sample) -> Option<Exact> {
+    sample.good_exact().filter(|value| value.is_finite())
 }
 
 /// When a sample is not in force any more, even without a successor.
@@ -197,7 +206,7 @@ mod tests {
         });
         let got: Vec<_> = held(samples, sec(window.0), sec(window.1))
             .iter()
-            .map(|span| (span.from.as_second(), span.to.as_second(), span.value))
+            .map(|span| (span.from.as_second(), span.to.as_second(), span.value.near()))
             .collect();
         assert_eq!(got, expect);
     }
@@ -223,7 +232,10 @@ mod tests {
     #[test]
     fn an_uncertain_value_is_not_counted_as_good() {
         let samples = [Sample::good(5.0, sec(0)), Sample::good(5.0, sec(4)).uncertain(Cause::Stale)];
-        assert_eq!(held(samples.into_iter(), sec(0), sec(10)), [HoldInterval { from: sec(0), to: sec(4), value: 5.0 }]);
+        assert_eq!(
+            held(samples.into_iter(), sec(0), sec(10)),
+            [HoldInterval { from: sec(0), to: sec(4), value: 5.0.into() }]
+        );
     }
 
     #[test]
@@ -231,7 +243,7 @@ mod tests {
         let samples = [Sample::good(1.0, sec(0)), Sample::bad(Cause::Timeout, sec(10)), Sample::good(3.0, sec(20))];
         let mut as_of = ValuesAt::new([-1, 0, 9, 10, 19, 20, 169, 170].map(sec).into());
         samples.into_iter().for_each(|sample| as_of.next(sample));
-        let got: Vec<_> = as_of.end().into_iter().map(|sample| sample.and_then(good_value)).collect();
+        let got: Vec<_> = as_of.end().into_iter().map(|sample| sample.and_then(Sample::good_value)).collect();
         assert_eq!(got, [None, Some(1.0), Some(1.0), None, None, Some(3.0), Some(3.0), None]);
     }
 }

@@ -130,7 +130,7 @@ pub fn tag(id: u16, short: &str) -> TagDef {
 pub fn figures_of(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Figures {
     let (mut figures, mut steps) = (Figures::new(from, until), StepSeries::new(from, until));
     let held: Vec<_> = samples.filter_map(|sample| steps.next(sample)).collect();
-    held.into_iter().chain(steps.end()).for_each(|held| figures.add(held.value, held.into(), 0.0));
+    held.into_iter().chain(steps.end()).for_each(|held| figures.add(held.value, held.into(), 0.0.into()));
     figures
 }
 
@@ -158,11 +158,11 @@ pub fn shift_report() -> ShiftReport {
                 tag: "TIC-1.PV".into(),
                 unit: "°C".into(),
                 decimals: 1,
-                first: Some(20.0),
-                min: Some(20.0),
-                mean: Some(50.0),
-                max: Some(70.0),
-                last: Some(27.0),
+                first: Some(20.0.into()),
+                min: Some(20.0.into()),
+                mean: Some(50.0.into()),
+                max: Some(70.0.into()),
+                last: Some(27.0.into()),
                 difference: None,
                 in_alarm: Duration::ZERO,
                 good: 1.0,
@@ -198,11 +198,11 @@ pub fn shift_report() -> ShiftReport {
                 tag: "TIC-1.PV".into(),
                 unit: "°C".into(),
                 decimals: 1,
-                first: Some(27.0),
-                min: Some(-0.04),
-                mean: Some(54.3219),
-                max: Some(71.2),
-                last: Some(70.0),
+                first: Some(27.0.into()),
+                min: Some((-0.04).into()),
+                mean: Some(54.3219.into()),
+                max: Some(71.2.into()),
+                last: Some(70.0.into()),
                 difference: None,
                 in_alarm: Duration::from_secs(90),
                 good: 0.99999,
@@ -224,12 +224,12 @@ pub fn shift_report() -> ShiftReport {
                 tag: "PM-1.E".into(),
                 unit: "kWh".into(),
                 decimals: 2,
-                first: Some(1250.0),
-                min: Some(1250.0),
+                first: Some(1250.0.into()),
+                min: Some(1250.0.into()),
                 mean: None,
-                max: Some(1262.5),
-                last: Some(1262.5),
-                difference: Some(12.5),
+                max: Some(1262.5.into()),
+                last: Some(1262.5.into()),
+                difference: Some(12.5.into()),
                 in_alarm: Duration::ZERO,
                 good: 1.0,
             },
@@ -247,7 +247,7 @@ pub fn shift_report() -> ShiftReport {
             message: "temperature high; \"check\" heater".into(),
             priority: Priority::High,
             event: AlarmEvent::Raised,
-            value: Some(-85.25),
+            value: Some((-85.25).into()),
             limit: Some(85.0),
             by: None,
             reason: None,
@@ -268,13 +268,13 @@ pub fn shift_report() -> ShiftReport {
             chain_hash: None,
         }],
         record: vec![
-            RecordRow { at: from, sv: Some(70.0), pv: Some(72.5), er: Some(-2.5) },
-            RecordRow { at: from + Duration::from_secs(10), sv: Some(70.0), pv: None, er: None },
+            RecordRow { at: from, sv: Some(70.0.into()), pv: Some(72.5.into()), er: Some((-2.5).into()) },
+            RecordRow { at: from + Duration::from_secs(10), sv: Some(70.0.into()), pv: None, er: None },
         ],
         record_of: Some(("TIC-1".into(), "°C".into())),
     }
 }
 
 fn bucket(value: f64) -> Bucket {
-    Bucket { min: value, max: value, mean: value, last: value }
+    Bucket { min: value, max: value, mean: value, last: value.into() }
 }

@@ -72,6 +72,34 @@ fn names_do_not_become_markup() {
 }
 
 #[test]
+fn a_counter_of_64_bits_has_all_its_digits_in_every_format() {
+    let mut report = shift_report();
+    let counter = report.tags.iter_mut().find(|figures| figures.difference.is_some()).expect("a counter");
+    counter.decimals = 3;
+    let exact = |text: &str| text.parse().ok();
+    (counter.first, counter.last) = (exact("18446744073709550.613"), exact("18446744073709551.615"));
+    counter.difference = exact("9007199254740993.001");
+    let def = plant("Asia/Bangkok", &THREE);
+    let document = document(&report, &def, Locale::ENGLISH);
+    for format in FORMATS.iter().filter(|format| !["pdf", "record", "parquet"].contains(&format.name())) {
+        let bytes = format.render(&document, &Style::of(&def)).expect("every format can be made");
+        let text = match zip::ZipArchive::new(std::io::Cursor::new(&bytes)) {
+            Ok(mut archive) => (0..archive.len()).fold(String::new(), |mut text, place| {
+                let mut bytes = Vec::new();
+                let mut file = archive.by_index(place).expect("a file");
+                std::io::Read::read_to_end(&mut file, &mut bytes).expect("its bytes");
+                text.push_str(&String::from_utf8_lossy(&bytes));
+                text
+            }),
+            Err(_) => String::from_utf8(bytes).expect("it is text"),
+        };
+        for digits in ["18446744073709550.613", "18446744073709551.615", "9007199254740993.001"] {
+            assert!(text.contains(digits), "no {digits} in {}: {text}", format.name());
+        }
+    }
+}
+
+#[test]
 fn text_keeps_to_80_columns_and_every_number_whole() {
     let text = text("text", Locale::ENGLISH);
     let long: Vec<&str> = text.lines().filter(|line| unicode_width::UnicodeWidthStr::width(*line) > 80).collect();

@@ -6,7 +6,10 @@ use super::{
     ReportFormat, Style, TagFigures,
     document::{Cell, ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
 };
-use crate::t;
+use crate::{
+    plant::{exact::Exact, number::digits},
+    t,
+};
 
 /// Columns of a page.
 const WIDTH: usize = 80;
@@ -142,11 +145,13 @@ fn padded(text: &str, width: usize, right: bool) -> String {
 
 /// `54.32`; of a counter `+12.5`, its difference; of neither a dash.
 pub fn mean_or_difference(tag: &TagFigures) -> String {
-    let decimals = usize::from(tag.decimals);
     match (tag.mean, tag.difference) {
         // A mean has one decimal more than its values.
-        (Some(mean), _) => format!("{mean:.*}", decimals + 1),
-        (None, Some(difference)) => format!("{difference:+.decimals$}"),
+        (Some(mean), _) => digits(mean, Some(tag.decimals.saturating_add(1))),
+        (None, Some(difference)) => {
+            let sign = if difference < Exact::default() { "" } else { "+" };
+            format!("{sign}{}", digits(difference, Some(tag.decimals)))
+        }
         (None, None) => "—".into(),
     }
 }

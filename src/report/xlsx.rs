@@ -8,12 +8,12 @@ use rust_xlsxwriter::{
 
 use super::{
     ReportFormat, Style, chart,
-    document::{Cell, ColumnKind, Content, Document, Fact, Section, Table, digits, offset, plain},
+    document::{Cell, ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
 };
 use crate::{
     plant::{
         def::Paper,
-        number::{to_u8, to_u16, to_u32},
+        number::{digits, to_u8, to_u16, to_u32},
     },
     t,
 };
@@ -147,9 +147,14 @@ fn write(
         Cell::Text(text) => {
             sheet.write_string(row, column, text)?;
         }
+        // A sheet keeps 15 digits of a number.
+        Cell::Number(value, decimals) if value.rest().is_some() => {
+            let format = Format::new().set_align(FormatAlign::Right);
+            sheet.write_string_with_format(row, column, digits(*value, *decimals), &format)?;
+        }
         Cell::Number(value, decimals) => {
             // The figure of the report, not a finer one behind it.
-            let figure = digits(*value, *decimals).parse().unwrap_or(*value);
+            let figure = digits(*value, *decimals).parse().unwrap_or(value.near());
             sheet.write_number_with_format(row, column, figure, &number_format(*decimals))?;
         }
         Cell::Time(at) => {

@@ -98,7 +98,7 @@ impl OperatorAction {
                 seen.alarms.iter().find(|alarm| alarm.id == id).map(ActiveAlarm::acknowledge)
             }
             OperatorAction::AcknowledgeAll => seen.acknowledge_all(),
-            OperatorAction::Write(tag, value) => Some(CommandKind::Write { tag, value }),
+            OperatorAction::Write(tag, value) => Some(CommandKind::Write { tag, value: value.into() }),
         }
     }
 }

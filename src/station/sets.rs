@@ -121,7 +121,7 @@ mod tests {
     const COMMAND: CommandId = CommandId { terminal: 1, number: 1 };
 
     fn winter(sv: f64) -> ParameterSet {
-        let value = crate::plant::parameter_set::SetValue { tag: "SV".into(), value: sv };
+        let value = crate::plant::parameter_set::SetValue { tag: "SV".into(), value: sv.into() };
         ParameterSet {
             name: "winter".into(),
             device: "TIC-1".into(),
@@ -144,7 +144,7 @@ mod tests {
         let save = |sv, replace| {
             let work_to_do = SetWork::Write { command: COMMAND, set: Box::new(winter(sv)), replace };
             let (written, sets) = work(&folder, &def, work_to_do);
-            let held = sets.first().and_then(|stored| stored.set.as_ref().ok()).map(|set| set.values[0].value);
+            let held = sets.first().and_then(|stored| stored.set.as_ref().ok()).map(|set| set.values[0].value.near());
             (written.unwrap().1, held, fs::read_dir(&folder).unwrap().count())
         };
         assert_eq!(save(70.0, false), (Ok(()), Some(70.0), 1));

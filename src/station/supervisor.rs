@@ -114,8 +114,14 @@ mod tests {
         ));
         // A tag that this plant does not have: inside, ids are taken on trust.
         let tag = TagId(u16::MAX);
-        let request =
-            BusRequest::Write(WriteJob { id: WriteId(1), tag, raw: 0.0, unlock: None, verify: true, urgent: false });
+        let request = BusRequest::Write(WriteJob {
+            id: WriteId(1),
+            tag,
+            raw: 0.0.into(),
+            unlock: None,
+            verify: true,
+            urgent: false,
+        });
         for _ in 0..3 {
             let (ours, _theirs) = tokio::io::duplex(64);
             ports.try_send(ours).expect("room for a port");

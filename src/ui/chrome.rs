@@ -27,6 +27,7 @@ use crate::plant::{
     commands::alarm_action,
     def::LineDef,
     event::LineState,
+    exact::Exact,
     number::to_u16,
 };
 
@@ -235,7 +236,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
 }
 
 /// What was requested, in words: `TIC-1.SV 60.0 → 70.0 °C`.
-pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<f64>) -> String {
+pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<Exact>) -> String {
     match kind {
         CommandKind::Write { tag, value } => {
             let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));

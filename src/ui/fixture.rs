@@ -114,11 +114,14 @@ impl Fixture {
         plant.set("TIC-1.PV", 72.4);
         let ago = |seconds| now() - SignedDuration::from_secs(seconds);
         plant.alarms = vec![
-            ActiveAlarm { value: Some(72.1), ..ActiveAlarm::new(AlarmId(0), AlarmState::Unacknowledged, ago(41)) },
+            ActiveAlarm {
+                value: Some(72.1.into()),
+                ..ActiveAlarm::new(AlarmId(0), AlarmState::Unacknowledged, ago(41))
+            },
             ActiveAlarm::new(AlarmId(3), AlarmState::Acknowledged, ago(269)),
             ActiveAlarm {
                 returned_at: Some(ago(2_400)),
-                value: Some(3.9),
+                value: Some(3.9.into()),
                 ..ActiveAlarm::new(AlarmId(2), AlarmState::ReturnedToNormal, ago(2_540))
             },
         ];

@@ -15,6 +15,7 @@ use super::{
 use crate::plant::{
     command::{CommandKind, CommandStatus, NotConfirmed, Outcome},
     def::TagId,
+    exact::Exact,
     interlock::{ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
     tag::{DataType, TagDef},
     time::elapsed,
@@ -44,7 +45,7 @@ fn two_states(def: &TagDef) -> Option<(f64, f64)> {
 }
 
 /// Is this value of a tag certainly without effect, so that it is not to be sent?
-pub fn is_refused(cx: &ViewContext, tag: TagId, value: f64) -> bool {
+pub fn is_refused(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
     cx.def().logic.refusal(tag, cx.snapshot.rounded_to_device(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
 }
 
@@ -56,9 +57,9 @@ pub fn forbidden_text(cx: &ViewContext, tag: TagId) -> Option<String> {
         Some(_) => other_state(cx, tag),
         None => cx.snapshot.sample(tag).good_value(),
     };
-    let kind = CommandKind::Write { tag, value: value.unwrap_or_default() };
-    let blocks = |value| {
-        let value = cx.snapshot.rounded_to_device(tag, value);
+    let kind = CommandKind::Write { tag, value: value.unwrap_or_default().into() };
+    let blocks = |value: f64| {
+        let value = cx.snapshot.rounded_to_device(tag, value.into());
         cx.def().logic.interlocks_of(tag, value).find_map(|lock| interlock_text(cx, lock)).map(|(words, _)| words)
     };
     rights::missing(cx, &kind)
@@ -69,7 +70,7 @@ pub fn forbidden_text(cx: &ViewContext, tag: TagId) -> Option<String> {
 }
 
 /// All there is to say before a value is written, with its look.
-pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, Style)> {
+pub fn before_write(cx: &ViewContext, tag: TagId, value: Exact) -> Vec<(String, Style)> {
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
     let gone = gone.map(|why| (t!("! Writing is not possible now. {why}", why), cx.theme.trouble()));
     let locks = cx
@@ -85,8 +86,8 @@ pub fn before_write(cx: &ViewContext, tag: TagId, value: f64) -> Vec<(String, St
         rows.push((format!("! {words}"), cx.theme.strong()));
     }
     rows.extend(unlock_text(cx, tag).into_iter().map(|words| (words, cx.theme.strong())));
-    rows.extend(sequence_text(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
-    rows.extend(taken_over(cx, tag, value).into_iter().map(|words| (words, cx.theme.normal())));
+    rows.extend(sequence_text(cx, tag, value.near()).into_iter().map(|words| (words, cx.theme.normal())));
+    rows.extend(taken_over(cx, tag, value.near()).into_iter().map(|words| (words, cx.theme.normal())));
     rows
 }
 
@@ -227,7 +228,7 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
             (Some(command), Some(output)) if (command != actuator.off) != (output != 0.0) => {
                 let arrow = cx.theme.pick("→", "->");
                 let new = cx.snapshot.format(actuator.command, command);
-                let mut locks = cx.def().logic.interlocks_of(actuator.command, command);
+                let mut locks = cx.def().logic.interlocks_of(actuator.command, command.into());
                 let blocked = locks.any(|lock| lock.status(cx.snapshot.sample(lock.of)) == InterlockStatus::Blocked);
                 let but = if blocked { t!(", blocked") } else { "" };
                 changes.push(format!("{name} {} {arrow} {new}{but}", value::show(cx, actuator.output).with_unit()));

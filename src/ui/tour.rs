@@ -12,11 +12,7 @@ use super::{
     widgets::text::{Canvas, fit_words, running, width},
 };
 use crate::{
-    plant::{
-        alarm::AlarmState,
-        command::{CommandKind, Outcome},
-        def::Subject,
-    },
+    plant::{alarm::AlarmState, command::CommandKind, def::Subject},
     sim::{
         drill::SimCommand,
         faults::{FaultTarget, InjectedFault},
@@ -192,10 +188,7 @@ impl Tour {
 /// Is a write of this terminal verified?
 fn is_written(model: &Model) -> bool {
     let status = model.last_command.as_ref().and_then(|last| last.status.as_ref());
-    status.is_some_and(|status| {
-        matches!(status.command.kind, CommandKind::Write { .. })
-            && matches!(status.outcome, Outcome::Verified | Outcome::Unchanged)
-    })
+    status.is_some_and(|status| matches!(status.command.kind, CommandKind::Write { .. }) && status.outcome.is_done())
 }
 
 /// Is the alarm of a device acknowledged?

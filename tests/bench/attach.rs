@@ -159,8 +159,8 @@ async fn live(mut plant: Plant, def: Arc<PlantDef>, publish: watch::Sender<Arc<s
         let at = Timestamp::now();
         for device in def.devices.iter().filter(|device| u64::from(device.id.0) % 10 == round % 10) {
             let (request, answer): (Arc<[u8]>, Arc<[u8]>) = ([1; 8].into(), [2; 205].into());
-            let values =
-                tags_of(device.id.0).map(|tag| (tag, (round * 7 + u64::from(tag.0)) as f64 % 60_000.0)).collect();
+            let raw = |tag: u16| (round * 7 + u64::from(tag)) as f64 % 60_000.0;
+            let values = tags_of(device.id.0).map(|tag| (tag, raw(tag.0).into())).collect();
             let response_time = Duration::from_millis(12);
             let (framing, outcome, tries) = (Framing::Rtu, Ok(()), 1);
             let (sent, got) = (request.clone(), answer.clone());

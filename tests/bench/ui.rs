@@ -79,8 +79,8 @@ fn running(def: &Arc<PlantDef>, round: u32) -> Plant {
         plant.on_event(Event::Line { at, line: line.id, state: LineState::Connected });
     }
     for device in &def.devices {
-        let values =
-            tags_of(device.id.0).map(|tag| (tag, f64::from((u32::from(tag.0) * 7 + round) % 60_000))).collect();
+        let raw = |tag: u16| f64::from((u32::from(tag) * 7 + round) % 60_000);
+        let values = tags_of(device.id.0).map(|tag| (tag, raw(tag.0).into())).collect();
         let response_time = std::time::Duration::from_millis(12);
         plant.on_event(Event::Read { at, device: device.id, values, texts: Vec::new(), response_time, exchange: None });
     }

@@ -115,7 +115,7 @@ fn the_quality_of_the_alarms_is_reported_in_lines_and_in_json() {
             message: "temperature high".into(),
             priority: Priority::High,
             event: AlarmEvent::Raised,
-            value: Some(76.0),
+            value: Some(76.0.into()),
             limit: Some(75.0),
             by: None,
             reason: None,

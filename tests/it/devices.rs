@@ -258,7 +258,7 @@ async fn check(golden: Golden<'_>) {
     tokio::time::sleep(Duration::from_secs(5)).await;
     for (number, (short, value)) in golden.writes.iter().enumerate() {
         let tag = def.tag_named(&full(short)).unwrap();
-        session.send_command(number as u32, CommandKind::Write { tag, value: *value }).unwrap();
+        session.send_command(number as u32, CommandKind::Write { tag, value: (*value).into() }).unwrap();
         tokio::time::sleep(Duration::from_secs(10)).await;
     }
     let asked: Vec<Vec<u8>> = asked.lock().unwrap().clone();

@@ -212,7 +212,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
         let kind = match to_acknowledge(&session.snapshots.borrow()) {
             Some(acknowledge) => acknowledge,
             None if number % 2 == 0 => CommandKind::Alarm(shelve),
-            None => CommandKind::Write { tag, value },
+            None => CommandKind::Write { tag, value: value.into() },
         };
         writes += usize::from(kind.written().is_some());
         let command = Command::on(&session.snapshots.borrow(), id, kind.clone());

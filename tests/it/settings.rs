@@ -134,7 +134,7 @@ async fn a_command_made_before_a_reload_is_refused() {
     let (socket, history) = (folder.path().join("tank.sock"), folder.path().join("tank.duckdb"));
     let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
     let write = |snapshot: &Snapshot, number| {
-        let kind = CommandKind::Write { tag: snapshot.def.tag_named("TIC-1.SV").unwrap(), value: 61.0 };
+        let kind = CommandKind::Write { tag: snapshot.def.tag_named("TIC-1.SV").unwrap(), value: 61.0.into() };
         Command::on(snapshot, CommandId { terminal: 1, number }, kind)
     };
     let mut listener = listen(&socket).unwrap();
@@ -158,7 +158,7 @@ async fn a_command_made_before_a_reload_is_refused() {
     until(&mut session, "the other plant", |snapshot| snapshot.def.title == "Another tank" && all_answer(snapshot))
         .await;
 
-    let (id, before) = (open.id, session.snapshots.borrow().sample(changed.tag_named("TIC-1.SV").unwrap()).value);
+    let (id, before) = (open.id, session.snapshots.borrow().sample(changed.tag_named("TIC-1.SV").unwrap()).exact());
     session.send(Request::Command(open, None)).unwrap();
     let of = |snapshot: &Snapshot, id| snapshot.commands.iter().find(|status| status.command.id == id).cloned();
     let ended = |snapshot: &Snapshot, id| of(snapshot, id).is_some_and(|status| !status.is_pending());

@@ -155,7 +155,7 @@ async fn wait(session: &Session, clock: Clock, seconds: u64) {
 }
 
 async fn write(session: &Session, def: &PlantDef, tag: &str, value: f64, number: u32) {
-    send_command(session, CommandKind::Write { tag: def.tag_named(tag).unwrap(), value }, number).await;
+    send_command(session, CommandKind::Write { tag: def.tag_named(tag).unwrap(), value: value.into() }, number).await;
 }
 
 /// Sends a command and waits for its good end.

@@ -192,7 +192,7 @@ async fn a_tag_for_two_users_is_written_after_the_second_approves() {
     .await;
     let tom = guarded.person("tom").await;
     let tag = guarded.tag("TIC-1.SV");
-    let write = |number: u32| request(&tom, number, CommandKind::Write { tag, value: 61.0 });
+    let write = |number: u32| request(&tom, number, CommandKind::Write { tag, value: 61.0.into() });
     let credentials =
         |(user, password): (&str, &str)| Credentials { user: Some(user.into()), password: password.into() };
     let refused = [
@@ -222,9 +222,9 @@ async fn of_two_writes_at_once_the_second_finds_the_value_changed() {
     let guarded = Guarded::start(|_| {}).await;
     let (tom, tina) = (guarded.person("tom").await, guarded.person("tina").await);
     let (tag, seen) = (guarded.tag("TIC-1.SV"), guarded.value("TIC-1.SV"));
-    let write = |session, number, value, expected_value| Command {
-        expected_value,
-        ..request(session, number, CommandKind::Write { tag, value })
+    let write = |session, number, value: f64, expected: Option<f64>| Command {
+        expected_value: expected.map(Into::into),
+        ..request(session, number, CommandKind::Write { tag, value: value.into() })
     };
     assert_eq!(guarded.send_command(&tom, write(&tom, 1, 61.0, seen)).await.outcome, Outcome::Verified);
     let second = guarded.send_command(&tina, write(&tina, 1, 62.0, seen)).await;

@@ -16,6 +16,7 @@ use crate::{
         PlantDef,
         command::{Command, CommandKind, Outcome, Refusal},
         def::{Reauthentication, TagId},
+        exact::Exact,
         interlock,
     },
 };
@@ -115,7 +116,7 @@ impl AccessControl {
 
 /// The reauthentication that a command requires; none for a stop.
 pub fn required(def: &PlantDef, kind: &CommandKind) -> Option<Reauthentication> {
-    let asks = |tag: TagId, value: f64| {
+    let asks = |tag: TagId, value: Exact| {
         let kind = def.tags.get(tag.index())?.reauthenticate?;
         (!interlock::is_stop(def, tag, value)).then_some(kind)
     };

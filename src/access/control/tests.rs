@@ -13,6 +13,7 @@ use crate::{
     plant::{
         command::{Command, CommandId, CommandKind, Refusal},
         def::Reauthentication,
+        exact::Exact,
         fixture,
         role::AccessDef,
         time::elapsed,
@@ -154,8 +155,8 @@ impl Bench {
     }
 }
 
-const RUN: CommandKind = CommandKind::Write { tag: fixture::RUN, value: 1.0 };
-const SV: CommandKind = CommandKind::Write { tag: fixture::SV, value: 50.0 };
+const RUN: CommandKind = CommandKind::Write { tag: fixture::RUN, value: Exact::plain(1.0) };
+const SV: CommandKind = CommandKind::Write { tag: fixture::SV, value: Exact::plain(50.0) };
 
 #[test]
 fn failed_logins_look_alike_and_the_log_has_the_reason() {

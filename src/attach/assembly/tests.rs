@@ -58,7 +58,7 @@ fn check(sent: &Snapshot) {
 fn full() -> Snapshot {
     let mut snapshot = Snapshot::clone(&Fixture::traffic_trouble().snapshot());
     snapshot.alarms = Fixture::alarm().snapshot().alarms.clone();
-    Arc::make_mut(&mut snapshot.alarms)[0].value = Some(72.1);
+    Arc::make_mut(&mut snapshot.alarms)[0].value = Some(72.1.into());
     for (index, sample) in snapshot.samples.iter_mut().enumerate() {
         let at = now() + SignedDuration::from_millis(index as i64 % 3 * 250);
         *sample = if index % 4 == 0 { Sample::bad(Cause::Timeout, at) } else { Sample::good(index as f64 / 8.0, at) };
@@ -75,7 +75,7 @@ fn full() -> Snapshot {
     });
     Arc::make_mut(&mut snapshot.source_frames)[..3].fill(Some(exchange));
     let id = CommandId { terminal: 1, number: 7 };
-    let command = Command::new(0, id, CommandKind::Write { tag: TagId(0), value: 1.0 });
+    let command = Command::new(0, id, CommandKind::Write { tag: TagId(0), value: 1.0.into() });
     snapshot.commands.insert(0, CommandStatus::new(command, "anna", now()));
     snapshot.lines[0].test = Some(Arc::new(DiagnosticRun {
         id,

@@ -80,7 +80,7 @@ fn the_place_of_a_terminal_is_one_harmless_line() {
 #[test]
 fn requests_and_news_survive_the_way() {
     let command =
-        Command::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(0), value: 0.1 });
+        Command::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(0), value: 0.1.into() });
     let asked = [
         ClientMessage::Command(Box::new(command), None),
         ClientMessage::Ask { ticket: 1, query: Query::Journal { from: now(), to: now(), limit: 5 } },
@@ -133,7 +133,7 @@ fn what_this_plant_does_not_have_never_reaches_it() {
     let def = Fixture::normal().snapshot().def.clone();
     let far = u16::MAX;
     let commands = [
-        CommandKind::Write { tag: TagId(far), value: 1.0 },
+        CommandKind::Write { tag: TagId(far), value: 1.0.into() },
         CommandKind::Alarm(AlarmCommand::Reset(AlarmId(far))),
         CommandKind::Refresh(DeviceId(far)),
         CommandKind::Connect(LineId(far), true),
@@ -157,7 +157,7 @@ fn what_this_plant_does_not_have_never_reaches_it() {
         assert!(why.contains("expected"), "{why}");
     }
     assert_eq!(check::command(&def, &CommandKind::Configure(Box::new(def.lines[0].clone()))), Ok(()));
-    assert_eq!(check::command(&def, &CommandKind::Write { tag: TagId(0), value: 1.0 }), Ok(()));
+    assert_eq!(check::command(&def, &CommandKind::Write { tag: TagId(0), value: 1.0.into() }), Ok(()));
     let series = |tags: Vec<TagId>, buckets| Query::Series { tags, from: now(), to: now(), buckets };
     let report = |days: i64| {
         let to = now() + jiff::SignedDuration::from_hours(24 * days);
@@ -195,7 +195,7 @@ proptest! {
         let credentials = crate::access::Credentials { user: Some("somchai".into()), password: "secret".into() };
         let command = Command {
             note: Some("because".into()),
-            ..Command::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5 })
+            ..Command::new(7, CommandId { terminal: 1, number: 2 }, CommandKind::Write { tag: TagId(3), value: 7.5.into() })
         };
         let mut bytes = body(encode(&ClientMessage::Command(Box::new(command), Some(credentials)), REQUEST_BYTES_MAX).unwrap());
         let place = place % bytes.len();

@@ -216,9 +216,9 @@ fn a_write_is_sent_once_and_read_back() {
     held.set(700);
     let refused = Outcome::Refused(Refusal::Exception(ExceptionCode(3)));
     assert_eq!(written(&held, |_| Err(Fault::Exception(ExceptionCode(3)))), (refused, 1));
-    let differs = Outcome::NotConfirmed(NotConfirmed::Different(700.0));
+    let differs = Outcome::NotConfirmed(NotConfirmed::Different(700.0.into()));
     assert_eq!(written(&held, |_| Ok(())), (differs, 1), "accepted and not done");
-    let silent = Outcome::NotConfirmed(NotConfirmed::NotApplied(700.0));
+    let silent = Outcome::NotConfirmed(NotConfirmed::NotApplied(700.0.into()));
     assert_eq!(written(&held, |_| Err(Fault::Timeout)), (silent, 1), "never repeated");
     let late = |word| {
         held.set(word);

@@ -7,6 +7,7 @@ use crate::{
         command::{NotConfirmed, Outcome, Refusal},
         diagnostics::RegisterWrite,
         event::Fault,
+        exact::Exact,
         number::to_u16,
     },
 };
@@ -87,8 +88,11 @@ pub fn words_of(request: &[u8], answer: &[u8]) -> Option<Vec<u16>> {
 }
 
 /// Several words as one number, the first the most significant.
-fn number(words: &[u16]) -> f64 {
-    words.iter().fold(0.0, |number, word| number * 65_536.0 + f64::from(*word))
+fn number(words: &[u16]) -> Exact {
+    match words.len() {
+        0..=4 => Exact::whole(words.iter().fold(0, |number, word| number << 16 | i128::from(*word))),
+        _ => words.iter().fold(0.0, |number, word| number * 65_536.0 + f64::from(*word)).into(),
+    }
 }
 
 fn text(words: &[u16]) -> String {

@@ -30,7 +30,7 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "The first line names the columns: tag, time (or time_utc, time_local), value, and if there are such \
-    quality and unit. Times have an offset, or are local times of the plant. Rows for which a value is in force already \
+    quality, unit and exact, whose number is the value. Times have an offset, or are local times of the plant. Rows for which a value is in force already \
     are left out; one error, and nothing is stored. An import that was interrupted is completed by the same command."
 )]
 pub struct Args {

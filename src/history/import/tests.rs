@@ -85,6 +85,27 @@ fn what_is_wrong_is_said_with_line_and_expectation() {
 }
 
 #[test]
+fn a_counter_of_64_bits_is_imported_to_its_last_digit() {
+    let mut def = plant("Europe/Berlin", &THREE);
+    (def.tags[0].point.kind, def.tags[0].scale) = (DataType::U64, 0.001);
+    let pv = def.tags[0].name.clone();
+    let read = |text: &str| {
+        let rows = crate::history::io::import::parse(&def, text.as_bytes(), Timestamp::UNIX_EPOCH, at(NOW));
+        rows.map(|rows| rows[&TagId(0)][0].exact().map(|value| value.to_string()))
+    };
+    let text = Ok(Some("9007199254740993.001".to_owned()));
+    assert_eq!(read(&format!("tag,time,value\n{pv},2026-11-21T05:00Z,9007199254740993.001\n")), text);
+    assert_eq!(read(&format!("tag;time;value\n{pv};2026-11-21T05:00Z;9007199254740993,001\n")), text);
+    // What SQL gives of it.
+    assert_eq!(read(&format!("utc,tag,value,exact\n2026-11-21T05:00Z,{pv},,9007199254740993.001000\n")), text);
+    assert_eq!(read(&format!("utc,tag,value,exact\n2026-11-21T05:00Z,{pv},1.5,\n")), Ok(Some("1.5".to_owned())));
+    assert!(
+        read(&format!("tag,time,value\n{pv},2026-11-21T05:00Z,18446744073709551.616\n")).is_err(),
+        "beyond its type"
+    );
+}
+
+#[test]
 fn only_rows_without_a_value_in_force_are_accepted() {
     let hold = HOLD_MAX.as_secs() as i64;
     let row = |second: i64| Sample::good(second as f64, sec(second));

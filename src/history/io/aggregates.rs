@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, ops::Range};
 
 use duckdb::{
     arrow::{
-        array::{AsArray, StructArray},
+        array::{Array, AsArray, StructArray},
         datatypes::{Float64Type, TimestampMicrosecondType, UInt16Type, UInt32Type},
     },
     params,
@@ -12,6 +12,7 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
+    archive::any_rests,
     read::SAMPLES_MAX,
     samples::Wanted,
     sql,
@@ -22,7 +23,7 @@ use crate::{
         ArchiveFile, HistoryError,
         tiers::{Aggregate, CurvePart, Tier, pieces},
     },
-    plant::def::TagId,
+    plant::{def::TagId, exact::Exact},
     report::{
         Gap,
         step_series::{IntervalStats, StepSeries},
@@ -123,7 +124,8 @@ impl Store {
         if files.is_empty() {
             return Ok(());
         }
-        let sql = sql::aggregates(&self.parquet(files), &wanted.tags);
+        let rests = any_rests(files);
+        let sql = sql::aggregates(&self.parquet(files, rests), &wanted.tags, rests);
         let mut statement = self.db.prepare(&sql).map_err(engine)?;
         // By `step`, see `samples`.
         let _ = statement.stream_arrow(params![utc(from), utc(to)]).map_err(engine)?;
@@ -150,7 +152,9 @@ fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>) -> Vec<Ra
 
 /// Hands over the rows of a batch; `None` if its columns are not those of aggregates.
 fn hand_over(batch: &StructArray, wanted: &Wanted, each: &mut impl FnMut(usize, CurvePart)) -> Option<()> {
-    let [utc, tags, min, max, mean, first, last, gain, good, samples] = batch.columns() else { return None };
+    let [utc, tags, min, max, mean, first, last, gain, good, samples, rests @ ..] = batch.columns() else {
+        return None;
+    };
     let micros = utc.as_primitive_opt::<TimestampMicrosecondType>()?.values();
     let tags = tags.as_primitive_opt::<UInt16Type>()?.values();
     let mut numbers = Vec::new();
@@ -158,13 +162,19 @@ fn hand_over(batch: &StructArray, wanted: &Wanted, each: &mut impl FnMut(usize, 
         numbers.push(column.as_primitive_opt::<Float64Type>()?.values());
     }
     let [min, max, mean, first, last, gain] = numbers[..] else { return None };
+    // Of min, max, first, last and gain.
+    let rests: Vec<_> = rests.iter().map(|rest| rest.as_primitive_opt::<Float64Type>()).collect::<Option<_>>()?;
     let good = good.as_primitive_opt::<UInt32Type>()?.values();
     let samples = samples.as_primitive_opt::<UInt32Type>()?.values();
     for (row, tag) in tags.iter().enumerate() {
         let Some(place) = wanted.place(*tag) else { continue };
         let seconds = f64::from(good[row]) / 1_000.0;
-        let stats = IntervalStats { min: min[row], max: max[row], mean: mean[row], last: last[row], seconds };
-        let aggregate = Aggregate { at: micros[row], stats, first: first[row], gain: gain[row], samples: samples[row] };
+        let rest = |place: usize| rests.get(place).filter(|rests| rests.is_valid(row)).map(|rests| rests.value(row));
+        let exact = |numbers: &[f64], place: usize| Exact::of_parts(numbers[row], rest(place));
+        let (min, max, last) = (exact(min, 0), exact(max, 1), exact(last, 3));
+        let stats = IntervalStats { min, max, mean: mean[row], last, seconds };
+        let (first, gain) = (exact(first, 2), exact(gain, 4));
+        let aggregate = Aggregate { at: micros[row], stats, first, gain, samples: samples[row] };
         each(place, CurvePart::Aggregate(aggregate));
     }
     Some(())

@@ -162,15 +162,16 @@ impl Store {
     }
 
     fn enter_file(&self, file: &ArchiveFile) -> duckdb::Result<()> {
-        let ArchiveFile { tier, path, from, to, rows, bytes, sha256 } = file;
+        let ArchiveFile { tier, path, from, to, rows, bytes, sha256, rests } = file;
         let [from, to] = [*from, *to].map(|at| instant(at).map(utc));
-        self.db.execute(sql::ENTER_FILE, params![tier.word(), path, from, to, rows, bytes, sha256]).map(drop)
+        self.db.execute(sql::ENTER_FILE, params![tier.word(), path, from, to, rows, bytes, sha256, rests]).map(drop)
     }
 
-    /// Writes rows as a new file of the archive, in this order; it is not in the manifest yet. `None` if there are none.
+    /// Writes rows as a new file of the archive, in this order, with or without what their numbers lack; it is not in the
+    /// manifest yet. `None` if there are none.
     fn write_file(
         &self,
-        tier: Tier,
+        (tier, rests): (Tier, bool),
         span: Range<i64>,
         rows: &str,
         order: &str,
@@ -186,7 +187,7 @@ impl Store {
         let copy = sql::copy_to(tier, self.def.history.parquet, &format!("{rows} {order}"), &to);
         self.db.execute_batch(&copy).map_err(engine)?;
         let sum = |from: &str| {
-            let sql = format!("SELECT count(*), sum(hash({}))::VARCHAR FROM {from}", sql::columns(tier));
+            let sql = format!("SELECT count(*), sum(hash({}))::VARCHAR FROM {from}", sql::columns(tier, rests));
             self.db.query_row(&sql, [], |row| Ok((row.get::<_, u64>(0)?, row.get::<_, Option<String>>(1)?)))
         };
         let meant = sum(&format!("({rows})")).map_err(engine)?;
@@ -200,7 +201,11 @@ impl Store {
         }
         let (bytes, sha256) = sync_and_hash(&new).map_err(|error| wrong(&new, &error))?;
         let Range { start: from, end: to } = span;
-        Ok(Some(NewFile { file: ArchiveFile { tier, path, from, to, rows: written.0, bytes, sha256 }, new, last }))
+        Ok(Some(NewFile {
+            file: ArchiveFile { tier, path, from, to, rows: written.0, bytes, sha256, rests },
+            new,
+            last,
+        }))
     }
 
     /// Removes files that the manifest does not name any more. One that stays is removed at the next start.
@@ -291,8 +296,8 @@ fn free_path(folder: &Path, tier: Tier, span: &Range<i64>) -> String {
 fn file(row: &Row) -> duckdb::Result<ArchiveFile> {
     let word: String = row.get(0)?;
     let tier = Tier::from_word(&word).ok_or(duckdb::Error::InvalidQuery)?;
-    let (from, to) = (row.get(2)?, row.get(3)?);
-    Ok(ArchiveFile { tier, path: row.get(1)?, from, to, rows: row.get(4)?, bytes: row.get(5)?, sha256: row.get(6)? })
+    let (path, from, to, rests) = (row.get(1)?, row.get(2)?, row.get(3)?, row.get(7)?);
+    Ok(ArchiveFile { tier, path, from, to, rows: row.get(4)?, bytes: row.get(5)?, sha256: row.get(6)?, rests })
 }
 
 /// The files that touch a span.
@@ -303,6 +308,29 @@ pub(super) fn overlapping(files: &[ArchiveFile], span: &Range<i64>) -> Vec<Archi
 /// The folder of the archive of a database.
 pub(super) fn folder(db: &Path) -> PathBuf {
     db.with_extension("archive")
+}
+
+/// Files of a tier as a table in SQL, with or without what their numbers lack: NULL for a file that has no such columns.
+pub(super) fn table(folder: &Path, files: &[ArchiveFile], rests: bool) -> String {
+    let list = |files: &[ArchiveFile]| {
+        let paths: Vec<String> = files.iter().map(|file| quoted(&folder.join(&file.path))).collect();
+        format!("read_parquet([{}], hive_partitioning = false)", paths.join(", "))
+    };
+    if files.iter().all(|file| file.rests == rests) {
+        return list(files);
+    }
+    let alike = |alike: &[ArchiveFile]| match (rests, alike[0].rests) {
+        (true, false) => format!("SELECT {} FROM {}", sql::columns_without_rests(alike[0].tier), list(alike)),
+        _ => format!("SELECT {} FROM {}", sql::columns(alike[0].tier, rests), list(alike)),
+    };
+    // One after the other, as they follow each other in time.
+    let parts: Vec<String> = files.chunk_by(|one, next| one.rests == next.rests).map(alike).collect();
+    format!("({})", parts.join(" UNION ALL "))
+}
+
+/// Has any of these files what its numbers lack?
+pub(super) fn any_rests(files: &[ArchiveFile]) -> bool {
+    files.iter().any(|file| file.rests)
 }
 
 /// A path in SQL.

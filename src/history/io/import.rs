@@ -122,8 +122,8 @@ impl Store {
         let piece = &importing.rows[left..];
         self.commit(piece.iter().map(|(_, sample)| sample.at), self.epoch(), || {
             let mut appender = self.db.appender("sample")?;
-            for (id, Sample { at, value, quality }) in piece {
-                appender.append_row((utc(*at), *id, *value, quality.code(), sql::IMPORTED))?;
+            for (id, Sample { at, value, rest, quality }) in piece {
+                appender.append_row((utc(*at), *id, *value, quality.code(), sql::IMPORTED, *rest))?;
             }
             appender.flush()?;
             drop(appender);

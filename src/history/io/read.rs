@@ -16,6 +16,7 @@ use crate::{
     },
     plant::{
         def::{Priority, TagId},
+        exact::Exact,
         keyword::Keyword,
         line_minute::LineMinute,
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash, FirstOut},
@@ -231,7 +232,7 @@ pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
             n => return Err(duckdb::Error::IntegralValueOutOfRange(3, i128::from(n))),
         },
         event: AlarmEvent::from_word(&row.get::<_, String>(4)?).ok_or(duckdb::Error::InvalidQuery)?,
-        value: row.get(5)?,
+        value: exact(row.get(5)?, row.get(12)?),
         limit: row.get(6)?,
         by: maybe_shared(row, 7)?,
         reason: maybe_shared(row, 8)?,
@@ -241,6 +242,10 @@ pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
             (_, None) | (None, _) => None,
         },
     })
+}
+
+fn exact(value: Option<f64>, rest: Option<f64>) -> Option<Exact> {
+    value.map(|value| Exact::of_parts(value, rest))
 }
 
 pub(super) fn action(row: &Row) -> duckdb::Result<ActionRecord> {

@@ -24,6 +24,7 @@ use crate::{
     plant::{
         PlantDef,
         def::{Section, TagId, TrendGroup},
+        exact::Exact,
         record::AlarmRecord,
         report::PeriodKind,
         tag::DataType,
@@ -45,13 +46,13 @@ const COLUMNS: usize = 240;
 /// What is gathered of one tag.
 struct Gathered {
     figures: Option<Figures>,
-    latest_good: Option<f64>,
+    latest_good: Option<Exact>,
 }
 
 impl Gathered {
     fn add(&mut self, part: CurvePart) {
         let (first, stats, gain) = match part {
-            CurvePart::Held(held) => (held.value, held.into(), 0.0),
+            CurvePart::Held(held) => (held.value, held.into(), Exact::default()),
             CurvePart::Aggregate(Aggregate { stats, first, gain, .. }) => (first, stats, gain),
         };
         if let Some(figures) = &mut self.figures {
@@ -247,8 +248,11 @@ impl Store {
         };
         let mut gathered: Vec<Gathered> = tags.iter().map(gather).collect();
         let unreadable = self.each_part(&tags, (from, until), Tier::Hour, |place, part| gathered[place].add(part))?;
-        let latest =
-            tags.iter().zip(&gathered).filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?))).collect();
+        let latest = tags
+            .iter()
+            .zip(&gathered)
+            .filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?.near())))
+            .collect();
         Ok(GatheredTags { span: (from, until), of: tags.into_iter().zip(gathered).collect(), latest, unreadable })
     }
 

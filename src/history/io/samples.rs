@@ -13,7 +13,7 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
-    archive::overlapping,
+    archive::{any_rests, overlapping},
     read::{check_span, within},
     sql,
     store::{Store, engine, instant, utc},
@@ -22,6 +22,7 @@ use crate::{
     history::{ArchiveFile, HistoryError, tiers::Tier},
     plant::{
         def::TagId,
+        exact::Exact,
         number::{to_i64, to_u32, to_u64},
         sample::{Cause, Quality, Sample},
     },
@@ -46,10 +47,13 @@ const NONE: u32 = u32::MAX;
 /// A stored sample, as small as it can be.
 struct Row {
     micros: i64,
-    value: Option<f64>,
+    value: f64,
+    rest: f64,
     /// Where its tag stands among those asked for.
     place: u32,
     quality: u8,
+    /// Whether it has a value, and a rest.
+    has: (bool, bool),
 }
 
 /// What is handed over.
@@ -232,16 +236,16 @@ impl Store {
     /// The samples of this plant's tags that are not archived, in a span.
     pub(super) fn unarchived(&self, from: Timestamp, to: Timestamp) -> Result<Vec<(TagId, Sample)>, HistoryError> {
         check_span(from, to)?;
-        let row = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?));
+        let row = |row: &duckdb::Row| {
+            let (micros, value, rest): (_, Option<f64>, Option<f64>) = (row.get(0)?, row.get(2)?, row.get(4)?);
+            Ok((row.get(1)?, Row::new(micros, 0, row.get(3)?, value, rest)))
+        };
         let params = params![utc(from), utc(to), UNARCHIVED_MAX + 1];
-        let rows: Vec<(i64, u16, Option<f64>, u8)> = self.list(sql::UNARCHIVED, params, row)?;
+        let rows: Vec<(u16, Row)> = self.list(sql::UNARCHIVED, params, row)?;
         within(rows.len() as u64, UNARCHIVED_MAX)?;
         let tags: HashMap<u16, TagId> =
             self.def.tags.iter().filter_map(|tag| Some((self.id(tag.id)?, tag.id))).collect();
-        let sample = |(micros, tag, value, quality)| {
-            let row = Row { micros, value, place: 0, quality };
-            Some((*tags.get(&tag)?, row.sample()?.1))
-        };
+        let sample = |(tag, row): (u16, Row)| Some((*tags.get(&tag)?, row.sample()?.1));
         Ok(rows.into_iter().filter_map(sample).collect())
     }
 
@@ -279,8 +283,9 @@ impl Store {
         if !sources.table && sources.files.is_empty() {
             return Ok(Piece::Whole);
         }
-        let files = (!sources.files.is_empty()).then(|| self.parquet(&sources.files));
-        let sql = sql::samples(&wanted.tags, sources.table, files.as_deref());
+        let rests = sources.table || any_rests(&sources.files);
+        let files = (!sources.files.is_empty()).then(|| self.parquet(&sources.files, rests));
+        let sql = sql::samples(&wanted.tags, sources.table, files.as_deref(), rests);
         // Not from the cache: a statement that is left before its end must go.
         let mut statement = self.db.prepare(&sql).map_err(engine)?;
         // The rows are fetched by `step`, because the stream itself panics where it meets an error.
@@ -343,12 +348,18 @@ impl Store {
 }
 
 impl Row {
+    fn new(micros: i64, place: u32, quality: u8, value: Option<f64>, rest: Option<f64>) -> Row {
+        let has = (value.is_some(), rest.is_some());
+        Row { micros, value: value.unwrap_or_default(), rest: rest.unwrap_or_default(), place, quality, has }
+    }
+
     fn sample(&self) -> Option<(u32, Sample)> {
         let at = instant(self.micros)?;
         // A number that no version wrote is no value.
         let quality = Quality::from_code(self.quality).unwrap_or(Quality::Bad(Cause::Corrupt));
-        let sample = match (self.value, quality) {
-            (value @ Some(_), Quality::Good | Quality::Uncertain(_)) => Sample { value, quality, at },
+        let rest = self.has.1.then_some(self.rest);
+        let sample = match (self.has.0.then(|| Exact::of_parts(self.value, rest)), quality) {
+            (value @ Some(_), Quality::Good | Quality::Uncertain(_)) => Sample::new(value, quality, at),
             (None, Quality::Good) => Sample::bad(Cause::Corrupt, at),
             (None, Quality::Uncertain(cause)) | (_, Quality::Bad(cause)) => Sample::bad(cause, at),
         };
@@ -358,15 +369,18 @@ impl Row {
 
 /// Adds the rows of a batch that are asked for; `None` if its columns are not those of samples.
 fn push(batch: &StructArray, wanted: &Wanted, rows: &mut Vec<Row>) -> Option<()> {
-    let [utc, tags, values, qualities] = batch.columns() else { return None };
+    let [utc, tags, values, qualities, rests @ ..] = batch.columns() else { return None };
     let micros = utc.as_primitive_opt::<TimestampMicrosecondType>()?.values();
     let tags = tags.as_primitive_opt::<UInt16Type>()?.values();
     let values = values.as_primitive_opt::<Float64Type>()?;
     let qualities = qualities.as_primitive_opt::<UInt8Type>()?.values();
+    let rests = rests.first().and_then(|rests| rests.as_primitive_opt::<Float64Type>());
+    let rests = rests.filter(|rests| rests.null_count() < rests.len());
     for (index, tag) in tags.iter().enumerate() {
         if let Some(place) = wanted.place(*tag) {
             let value = values.is_valid(index).then(|| values.value(index));
-            rows.push(Row { micros: micros[index], value, place: to_u32(place), quality: qualities[index] });
+            let rest = rests.filter(|rests| rests.is_valid(index)).map(|rests| rests.value(index));
+            rows.push(Row::new(micros[index], to_u32(place), qualities[index], value, rest));
         }
     }
     Some(())

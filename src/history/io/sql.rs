@@ -19,7 +19,7 @@ pub const ENTER_IMPORT: &str = "INSERT INTO import VALUES (?, ?, ?, ?, ?)";
 pub const IMPORTS: &str = "SELECT utc, file, from_utc, to_utc, rows FROM import ORDER BY rowid";
 
 /// Columns of an alarm event, in the order that it is read.
-pub const EVENT_COLUMNS: [&str; 12] = [
+pub const EVENT_COLUMNS: [&str; 13] = [
     "utc",
     "subject",
     "message",
@@ -32,6 +32,7 @@ pub const EVENT_COLUMNS: [&str; 12] = [
     "until_utc",
     "first_out_utc",
     "first_out_rank",
+    "value_rest",
 ];
 
 /// Holds the number of migrations done.
@@ -54,16 +55,18 @@ pub const COUNT_ROWS: &str = "SELECT (SELECT count(*) FROM sample) + (SELECT cou
     + (SELECT count(*) FROM operator_action) + (SELECT count(*) FROM line_minute) + (SELECT count(*) FROM batch)
     + (SELECT count(*) FROM report) + (SELECT count(*) FROM control_run)";
 
-/// Ends every curve: a row (time, no value, quality, epoch) for each tag whose last row since an instant has another quality.
+/// Ends every curve: a row (time, no value, quality, epoch, no rest) for each tag whose last row since an instant has another quality.
 pub const END_CURVES: &str = "INSERT INTO sample
-    SELECT $1, tag, NULL, $2, $3 FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= $4 GROUP BY tag)
+    SELECT $1, tag, NULL, $2, $3, NULL FROM (SELECT tag, arg_max(quality, rowid) AS last FROM sample WHERE utc >= $4 GROUP BY tag)
     WHERE last <> $2";
 
 /// Samples in a span, of some stored numbers of tags or of all, from the table or from files as well, each in the order in
-/// which they were written.
-pub fn samples(tags: &str, table: bool, files: Option<&str>) -> String {
-    let from =
-        |source: &str| format!("SELECT utc, tag, value, quality FROM {source} WHERE utc >= $1 AND utc < $2{tags}");
+/// which they were written; with what their values lack, where the files have that.
+pub fn samples(tags: &str, table: bool, files: Option<&str>, rests: bool) -> String {
+    let rest = if rests { ", rest" } else { "" };
+    let from = |source: &str| {
+        format!("SELECT utc, tag, value, quality{rest} FROM {source} WHERE utc >= $1 AND utc < $2{tags}")
+    };
     let sources = files.into_iter().chain(table.then_some("sample"));
     sources.map(from).collect::<Vec<_>>().join(" UNION ALL ")
 }
@@ -81,7 +84,7 @@ pub const ROWS_ABOUT: &str =
     "SELECT estimated_size + (SELECT coalesce(sum(rows), 0) FROM archive WHERE tier = 'raw')::BIGINT
     FROM duckdb_tables() WHERE table_name = 'sample'";
 /// Samples of the table in a span.
-pub const UNARCHIVED: &str = "SELECT epoch_us(utc), tag, value, quality FROM sample WHERE utc >= $1 AND utc < $2
+pub const UNARCHIVED: &str = "SELECT epoch_us(utc), tag, value, quality, rest FROM sample WHERE utc >= $1 AND utc < $2
     ORDER BY utc, rowid LIMIT $3";
 /// When the oldest sample of the table was stored.
 pub const OLDEST_IN_TABLE: &str = "SELECT min(utc) FROM sample";
@@ -215,9 +218,9 @@ pub const OLDEST_SAMPLE: &str = "SELECT min(utc) FROM sample WHERE utc >= ?";
 pub const COUNT_SAMPLES: &str = "SELECT count(*) FROM sample";
 /// The files of the archive, oldest first.
 pub const FILES: &str =
-    "SELECT tier, path, from_utc, to_utc, rows, bytes, sha256 FROM archive ORDER BY from_utc, to_utc, rowid";
+    "SELECT tier, path, from_utc, to_utc, rows, bytes, sha256, rests FROM archive ORDER BY from_utc, to_utc, rowid";
 /// Enters a file.
-pub const ENTER_FILE: &str = "INSERT INTO archive VALUES (?, ?, ?, ?, ?, ?, ?)";
+pub const ENTER_FILE: &str = "INSERT INTO archive VALUES (?, ?, ?, ?, ?, ?, ?, ?)";
 /// Removes one.
 pub const REMOVE_FILE: &str = "DELETE FROM archive WHERE path = ?";
 /// Notes a file that is deleted.
@@ -233,11 +236,42 @@ pub const DELETE_SAMPLES: &str = "DELETE FROM sample WHERE utc >= ? AND utc < ?"
 pub const WIDEN: &str = "UPDATE last_commit SET
     first_utc = least(coalesce(first_utc, $1), $1), last_utc = greatest(coalesce(last_utc, $2), $2)";
 
-/// Columns of a file of a tier.
-pub fn columns(tier: Tier) -> &'static str {
+/// Columns of a file of a tier; of one with `rests` those too that hold what its numbers lack.
+pub fn columns(tier: Tier, rests: bool) -> &'static str {
+    match (tier, rests) {
+        (Tier::Raw, false) => "utc, tag, value, quality, epoch",
+        (Tier::Raw, true) => "utc, tag, value, quality, epoch, rest",
+        (Tier::Minute | Tier::Hour, false) => "utc, tag, min, max, mean, first, last, gain, good_ms, n",
+        (Tier::Minute | Tier::Hour, true) => {
+            "utc, tag, min, max, mean, first, last, gain, good_ms, n, min_rest, max_rest, first_rest, last_rest, gain_rest"
+        }
+    }
+}
+
+/// The same of a file without such columns.
+pub fn columns_without_rests(tier: Tier) -> String {
+    let columns = columns(tier, true).split(", ");
+    let column = |name: &str| if name.ends_with("rest") { format!("NULL::DOUBLE AS {name}") } else { name.to_owned() };
+    columns.map(column).collect::<Vec<_>>().join(", ")
+}
+
+/// Whether a file has such columns.
+pub fn has_rests(file: &str) -> String {
+    format!("SELECT count(*) > 0 FROM parquet_schema({file}) WHERE name LIKE '%rest'")
+}
+
+/// Whether anything in a span of the table, or of what was formed, lacks something.
+pub fn any_rests(tier: Tier, span: &Range<i64>) -> String {
+    let rests = columns(tier, true).split(", ").filter(|name| name.ends_with("rest"));
+    let counts = rests.map(|name| format!("count({name})")).collect::<Vec<_>>().join(" + ");
+    format!("SELECT {counts} > 0 FROM {} WHERE {}", table_of(tier), within(span))
+}
+
+fn table_of(tier: Tier) -> &'static str {
     match tier {
-        Tier::Raw => "utc, tag, value, quality, epoch",
-        Tier::Minute | Tier::Hour => "utc, tag, min, max, mean, first, last, gain, good_ms, n",
+        Tier::Raw => "sample",
+        Tier::Minute => FORMED[0],
+        Tier::Hour => FORMED[1],
     }
 }
 
@@ -248,7 +282,8 @@ pub const FORMED: [&str; 2] = ["m1_formed", "h1_formed"];
 /// how long the values were good, `n` how many samples were stored.
 pub fn form_tables() -> String {
     let columns = "utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, min DOUBLE NOT NULL, max DOUBLE NOT NULL, mean DOUBLE NOT NULL,
-        first DOUBLE NOT NULL, last DOUBLE NOT NULL, gain DOUBLE NOT NULL, good_ms UINTEGER NOT NULL, n UINTEGER NOT NULL";
+        first DOUBLE NOT NULL, last DOUBLE NOT NULL, gain DOUBLE NOT NULL, good_ms UINTEGER NOT NULL, n UINTEGER NOT NULL,
+        min_rest DOUBLE, max_rest DOUBLE, first_rest DOUBLE, last_rest DOUBLE, gain_rest DOUBLE";
     FORMED.map(|table| format!("CREATE OR REPLACE TEMP TABLE {table} ({columns});")).concat()
 }
 
@@ -257,29 +292,25 @@ fn within(span: &Range<i64>) -> String {
 }
 
 /// The samples of a span as they are archived: in whole milliseconds.
-pub fn samples_of(span: &Range<i64>) -> String {
-    format!(
-        "SELECT date_trunc('millisecond', utc) AS utc, tag, value, quality, epoch FROM sample WHERE {}",
-        within(span)
-    )
+pub fn samples_of(span: &Range<i64>, rests: bool) -> String {
+    let columns = columns(Tier::Raw, rests).replacen("utc", "date_trunc('millisecond', utc) AS utc", 1);
+    format!("SELECT {columns} FROM sample WHERE {}", within(span))
 }
 
 /// What was formed of a span.
-pub fn formed(tier: Tier, span: &Range<i64>) -> String {
-    let [minutes, hours] = FORMED;
-    let table = if tier == Tier::Hour { hours } else { minutes };
-    format!("SELECT {} FROM {table} WHERE {}", columns(tier), within(span))
+pub fn formed(tier: Tier, span: &Range<i64>, rests: bool) -> String {
+    format!("SELECT {} FROM {} WHERE {}", columns(tier, rests), table_of(tier), within(span))
 }
 
 /// The rows of a file with those of a span replaced by what was formed of it.
-pub fn others(tier: Tier, file: &str, span: &Range<i64>) -> String {
-    let (columns, formed) = (columns(tier), formed(tier, span));
+pub fn others(tier: Tier, file: &str, span: &Range<i64>, rests: bool) -> String {
+    let (columns, formed) = (columns(tier, rests), formed(tier, span, rests));
     format!("SELECT * FROM (SELECT {columns} FROM {file} WHERE NOT ({}) UNION ALL {formed})", within(span))
 }
 
 /// The rows of a file, and what was formed of a span that it does not have.
-pub fn added(tier: Tier, file: &str, span: &Range<i64>) -> String {
-    let (columns, formed) = (columns(tier), formed(tier, span));
+pub fn added(tier: Tier, file: &str, span: &Range<i64>, rests: bool) -> String {
+    let (columns, formed) = (columns(tier, rests), formed(tier, span, rests));
     format!(
         "SELECT * FROM (SELECT {columns} FROM {file} UNION ALL {formed}
             AND (tag, utc) NOT IN (SELECT (tag, utc) FROM {file} WHERE {}))",
@@ -288,8 +319,9 @@ pub fn added(tier: Tier, file: &str, span: &Range<i64>) -> String {
 }
 
 /// An hour of files of samples that overlap.
-pub fn hour_of(files: &str, hour: &Range<i64>) -> String {
-    format!("(SELECT {} FROM {files} WHERE {} ORDER BY tag, utc, epoch)", columns(Tier::Raw), within(hour))
+pub fn hour_of(files: &str, hour: &Range<i64>, rests: bool) -> String {
+    let columns = columns(Tier::Raw, rests);
+    format!("(SELECT {columns} FROM {files} WHERE {} ORDER BY tag, utc, epoch)", within(hour))
 }
 
 /// Rows of files in a span.
@@ -303,6 +335,6 @@ pub fn count_samples(span: &Range<i64>) -> String {
 }
 
 /// Rows of aggregates in a span.
-pub fn aggregates(files: &str, tags: &str) -> String {
-    format!("SELECT {} FROM {files} WHERE utc >= $1 AND utc < $2{tags}", columns(Tier::Minute))
+pub fn aggregates(files: &str, tags: &str, rests: bool) -> String {
+    format!("SELECT {} FROM {files} WHERE utc >= $1 AND utc < $2{tags}", columns(Tier::Minute, rests))
 }

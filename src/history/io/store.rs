@@ -27,6 +27,7 @@ use crate::{
     plant::{
         batch::BatchRecord,
         def::PlantDef,
+        exact::Exact,
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord, Record},
         sample::{Cause, Quality, Sample},
@@ -279,8 +280,8 @@ impl Store {
                 Record::ClockSet => {}
             }
         }
-        self.append_rows("sample", samples, |to, (id, &Sample { at, value, quality })| {
-            to.append_row((utc(in_milliseconds(at)), id, value, quality.code(), epoch))
+        self.append_rows("sample", samples, |to, (id, &Sample { at, value, rest, quality })| {
+            to.append_row((utc(in_milliseconds(at)), id, value, quality.code(), epoch, rest))
         })?;
         self.append_rows("alarm_journal", alarms, |to, alarm| append_alarm(to, alarm, epoch))?;
         self.remove_unsealed(&actions)?;
@@ -298,7 +299,10 @@ fn append_alarm(to: &mut Appender, alarm: &AlarmRecord, epoch: u16) -> duckdb::R
     let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out } = alarm;
     let (at, priority, event, until) = (utc(*at), priority.number(), event.word(), until.map(utc));
     let (began, rank) = first_out.map(|first_out| (utc(first_out.began), first_out.rank)).unzip();
-    to.append_row(params![at, subject, message, priority, event, value, limit, by, reason, until, began, rank, epoch])
+    let (value, rest) = (value.map(Exact::near), value.and_then(Exact::rest));
+    to.append_row(params![
+        at, subject, message, priority, event, value, limit, by, reason, until, began, rank, epoch, rest
+    ])
 }
 
 fn append_action(to: &mut Appender, action: &ActionRecord, epoch: u16) -> duckdb::Result<()> {

@@ -3,21 +3,24 @@
 //!
 //! | view | columns |
 //! |---|---|
-//! | `sample` | `utc`, `tag`, `value`, `unit`, `quality` (`good`, `uncertain: …`, `bad: …`) |
-//! | `m1`, `h1` | `utc` (begin), `tag`, `min`, `max`, `mean` (over good time), `first`, `last`, `gain` (of a counter), `good_ms`, `n` (samples), `unit`: of what is archived |
-//! | `alarm` | `utc`, `subject`, `message`, `priority` (1–4), `event`, `value`, `limit_value`, `by_whom`, `reason` |
+//! | `sample` | `utc`, `tag`, `value`, `unit`, `quality` (`good`, `uncertain: …`, `bad: …`), `exact` |
+//! | `m1`, `h1` | `utc` (begin), `tag`, `min`, `max`, `mean` (over good time), `first`, `last`, `gain` (of a counter), `good_ms`, `n` (samples), `unit`: of what is archived; `min_exact`, `max_exact`, `first_exact`, `last_exact`, `gain_exact` |
+//! | `alarm` | `utc`, `subject`, `message`, `priority` (1–4), `event`, `value`, `limit_value`, `by_whom`, `reason`, `value_exact` |
 //! | `batch` | `utc` (begin), `until` (NULL while it runs), `batch`, `number`, `minutes`, `begin_seen`, `end_seen` |
 //! | `phase` | `utc` (begin of the batch), `batch`, `number`, `phase` (`unknown` as well), `minutes` |
 //! | `run` | control runs: `utc` (begin), `until`, `controller`, `number`, `state`, `cause`, `detail`, `sv_before`, `sv`, `pv`, `unit`, `band`, `settings`, `at_sv_s`, `steady_s`, `rise_s` (NULL not come to, -1 unknown), `overshoot`, `final_offset`, `iae`, `kwh`, `kwh_good`, `good` |
 //! | `report` | automatic reports: `utc` (of `event`, its last one), `period`, `name`, `begin`, `until`, `format`, `file`, `sha256`, `event`, `attempts`, `error` |
 //! | `action` | `utc`, `by_whom`, `from_where`, `action`, `target`, `old_value`, `new_value`, `outcome`, `note` |
+//!
+//! Of a number of more than 15 digits, as of a 64-bit counter, all of them stand in `exact`; where a DOUBLE would round it, the
+//! column that is one is NULL.
 
 use std::{path::Path, sync::Arc, time::Duration};
 
 use duckdb::{Connection, InterruptHandle, params};
 
 use super::{
-    archive::quoted,
+    archive::{any_rests, quoted, table},
     runs::seconds,
     store::{engine, utc},
 };
@@ -28,6 +31,7 @@ use crate::{
         batch::Batch,
         control_run::ControlRun,
         def::{CsvDialect, TagId},
+        exact::Exact,
         record::{ActionRecord, AlarmRecord},
         report::ReportRecord,
         sample::{Quality, Sample},
@@ -69,9 +73,9 @@ impl Tables {
              SET lock_configuration = true;
              CREATE TABLE tags (id USMALLINT, name VARCHAR, unit VARCHAR);
              CREATE TABLE qualities (code UTINYINT, quality VARCHAR);
-             CREATE TABLE unarchived (utc TIMESTAMP, tag VARCHAR, value DOUBLE, quality UTINYINT);
+             CREATE TABLE unarchived (utc TIMESTAMP, tag VARCHAR, value DOUBLE, rest DOUBLE, quality UTINYINT);
              CREATE TABLE alarm (utc TIMESTAMP, subject VARCHAR, message VARCHAR, priority UTINYINT, event VARCHAR,
-                value DOUBLE, limit_value DOUBLE, by_whom VARCHAR, reason VARCHAR);
+                value DOUBLE, limit_value DOUBLE, by_whom VARCHAR, reason VARCHAR, value_exact DECIMAL(38, 6));
              CREATE TABLE action (utc TIMESTAMP, by_whom VARCHAR, from_where VARCHAR, action VARCHAR, target VARCHAR,
                 old_value VARCHAR, new_value VARCHAR, outcome VARCHAR, note VARCHAR);
              CREATE TABLE batch (utc TIMESTAMP, until TIMESTAMP, batch VARCHAR, number UINTEGER, minutes DOUBLE,
@@ -104,8 +108,8 @@ impl Tables {
 
     /// Adds samples that are not archived.
     pub fn add_samples(&self, def: &PlantDef, samples: Vec<(TagId, Sample)>) -> Result<(), HistoryError> {
-        self.fill("unarchived", samples.into_iter(), |to, (tag, Sample { at, value, quality })| {
-            to.append_row(params![utc(at), def.tag(tag).name, value, quality.code()])
+        self.fill("unarchived", samples.into_iter(), |to, (tag, Sample { at, value, rest, quality })| {
+            to.append_row(params![utc(at), def.tag(tag).name, value, rest, quality.code()])
         })
     }
 
@@ -114,7 +118,9 @@ impl Tables {
         self.fill("alarm", events.into_iter(), |to, event| {
             let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, .. } = event;
             let (priority, event) = (priority.number(), event.word());
-            to.append_row(params![utc(at), subject, message, priority, event, value, limit, by, reason])
+            let exact = value.filter(|value| value.rest().is_some()).map(|value| value.to_string());
+            let value = value.and_then(Exact::as_f64);
+            to.append_row(params![utc(at), subject, message, priority, event, value, limit, by, reason, exact])
         })
     }
 
@@ -258,32 +264,62 @@ impl Tables {
 fn views(overview: &Overview) -> String {
     let of = |tier: Tier| overview.files.iter().filter(move |file| file.tier == tier);
     let read = |tier: Tier| {
-        let path = |file: &ArchiveFile| quoted(&overview.folder.join(&file.path));
-        let paths: Vec<String> = of(tier).map(path).collect();
-        (!paths.is_empty()).then(|| format!("read_parquet([{}], hive_partitioning = false)", paths.join(", ")))
+        let files: Vec<ArchiveFile> = of(tier).cloned().collect();
+        let rests = any_rests(&files);
+        (!files.is_empty()).then(|| (table(&overview.folder, &files, rests), rests))
     };
-    let archived = read(Tier::Raw).map(|files| {
-        format!("SELECT f.utc, t.name AS tag, f.value, f.quality FROM {files} f JOIN tags t ON t.id = f.tag UNION ALL ")
+    let archived = read(Tier::Raw).map(|(files, rests)| {
+        let rest = if rests { "f.rest" } else { "NULL" };
+        format!(
+            "SELECT f.utc, t.name AS tag, f.value, {rest} AS rest, f.quality FROM {files} f
+             JOIN tags t ON t.id = f.tag UNION ALL "
+        )
     });
     let units = "(SELECT name, any_value(unit) AS unit FROM tags GROUP BY name)";
     let mut sql = format!(
-        "CREATE VIEW sample AS SELECT s.utc, s.tag, s.value, u.unit, q.quality
-         FROM ({}SELECT utc, tag, value, quality FROM unarchived) s
+        "CREATE VIEW sample AS SELECT s.utc, s.tag, {} AS value, u.unit, q.quality, {} AS exact
+         FROM ({}SELECT utc, tag, value, rest, quality FROM unarchived) s
          JOIN qualities q ON q.code = s.quality JOIN {units} u ON u.name = s.tag;",
+        held("s.value", "s.rest"),
+        exact("s.value", "s.rest"),
         archived.unwrap_or_default()
     );
     for tier in [Tier::Minute, Tier::Hour] {
         let word = tier.word();
-        let columns = "f.utc, t.name AS tag, f.min, f.max, f.mean, f.first, f.last, f.gain, f.good_ms, f.n, t.unit";
         sql += &match read(tier) {
-            Some(files) => {
+            Some((files, rests)) => {
+                let columns = aggregate_columns(rests);
                 format!("CREATE VIEW {word} AS SELECT {columns} FROM {files} f JOIN tags t ON t.id = f.tag;")
             }
             None => format!(
                 "CREATE TABLE {word} (utc TIMESTAMP, tag VARCHAR, min DOUBLE, max DOUBLE, mean DOUBLE, first DOUBLE,
-                    last DOUBLE, gain DOUBLE, good_ms UINTEGER, n UINTEGER, unit VARCHAR);"
+                    last DOUBLE, gain DOUBLE, good_ms UINTEGER, n UINTEGER, unit VARCHAR, min_exact DECIMAL(38, 6),
+                    max_exact DECIMAL(38, 6), first_exact DECIMAL(38, 6), last_exact DECIMAL(38, 6),
+                    gain_exact DECIMAL(38, 6));"
             ),
         };
     }
     sql
+}
+
+/// A number of which a DOUBLE does not print all digits is not given as one: NULL, and all of it stands in `exact`.
+fn held(value: &str, rest: &str) -> String {
+    format!("CASE WHEN {rest} IS NULL OR ({rest} = 0 AND abs({value}) <= 9007199254740992) THEN {value} END")
+}
+
+/// The number whose nearest DOUBLE is `value`, which a cast alone would round; NULL where `value` is all of it.
+fn exact(value: &str, rest: &str) -> String {
+    format!(
+        "CASE WHEN {rest} IS NOT NULL THEN trunc({value})::HUGEINT::DECIMAL(38, 6)
+            + ({value} - trunc({value}) + {rest})::DECIMAL(38, 6) END"
+    )
+}
+
+fn aggregate_columns(rests: bool) -> String {
+    let rest = |name: &str| if rests { format!("f.{name}_rest") } else { "NULL::DOUBLE".to_owned() };
+    let held = |name: &str| format!("{} AS {name}", held(&format!("f.{name}"), &rest(name)));
+    let exact = |name: &str| format!("{} AS {name}_exact", exact(&format!("f.{name}"), &rest(name)));
+    let [min, max, first, last, gain] = ["min", "max", "first", "last", "gain"].map(held);
+    let exacts = ["min", "max", "first", "last", "gain"].map(exact).join(", ");
+    format!("f.utc, t.name AS tag, {min}, {max}, f.mean, {first}, {last}, {gain}, f.good_ms, f.n, t.unit, {exacts}")
 }

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::plant::{
     def::{AlarmDef, AlarmId},
+    exact::Exact,
     record::{AlarmEvent, AlarmRecord},
 };
 
@@ -186,7 +187,7 @@ impl AlarmManager {
         &mut self,
         id: AlarmId,
         event: AlarmEvent,
-        value: Option<f64>,
+        value: Option<Exact>,
         note: &OperatorNote,
     ) -> Result<Vec<AlarmRecord>, AlarmRefusal> {
         let alarm = self.alarm(id)?;
@@ -227,7 +228,7 @@ impl AlarmManager {
         &mut self,
         alarm: &AlarmDef,
         event: AlarmEvent,
-        value: Option<f64>,
+        value: Option<Exact>,
         reason: Option<Arc<str>>,
         note: &OperatorNote,
     ) -> AlarmRecord {

@@ -5,7 +5,7 @@ use std::{collections::VecDeque, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-use crate::plant::{id::TagId, ne107::Signal, number::to_i64, station::StationFault};
+use crate::plant::{exact::Exact, id::TagId, ne107::Signal, station::StationFault};
 
 /// Points that the memory of a rate keeps: finer than any window needs.
 const POINTS_MAX: u32 = 32;
@@ -139,9 +139,9 @@ struct Traits {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Facts {
     /// The good value of the tag, in its unit.
-    pub value: Option<f64>,
+    pub value: Option<Exact>,
     /// The good value of the tag that a deviation is measured from.
-    pub reference: Option<f64>,
+    pub reference: Option<Exact>,
     /// For a device or line: whether it is in the state that the alarm reports.
     pub ill: Option<bool>,
     /// Whether the alarm is enabled by design.
@@ -152,9 +152,9 @@ pub struct Facts {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ConditionMemory {
     /// Earlier values, or earlier changes, oldest first.
-    points: VecDeque<(Duration, f64)>,
+    points: VecDeque<(Duration, Exact)>,
     /// The value that "no change" counts from.
-    from: Option<f64>,
+    from: Option<Exact>,
     /// How long there was no change, or no good value.
     lasted: Duration,
     /// When it was last asked.
@@ -172,7 +172,7 @@ impl ConditionMemory {
     }
 
     /// The rate in units per minute over about this window; `None` until the window is full.
-    fn rate(&mut self, value: f64, now: Duration, over: Duration) -> Option<f64> {
+    fn rate(&mut self, value: Exact, now: Duration, over: Duration) -> Option<f64> {
         while self.points.get(1).is_some_and(|(at, _)| over <= now.saturating_sub(*at)) {
             self.points.pop_front();
         }
@@ -188,12 +188,12 @@ impl ConditionMemory {
             self.points.push_back((now, value));
             return None;
         }
-        (over <= span).then(|| (value - then) / span.as_secs_f64() * 60.0)
+        (over <= span).then(|| (value - then).near() / span.as_secs_f64() * 60.0)
     }
 
     /// How long the value has stayed where it is; time in which it is not known does not count.
-    fn unchanged(&mut self, value: f64, passed: Duration, deadband: f64) -> Duration {
-        if self.from.is_some_and(|from| (value - from).abs() <= deadband) {
+    fn unchanged(&mut self, value: Exact, passed: Duration, deadband: f64) -> Duration {
+        if self.from.is_some_and(|from| (value - from).near().abs() <= deadband) {
             self.lasted += passed;
         } else {
             self.changed |= self.from.is_some();
@@ -203,8 +203,8 @@ impl ConditionMemory {
     }
 
     /// Whether the value has changed `count` times within a time. Keeps no more changes than it needs.
-    fn changes(&mut self, value: f64, now: Duration, count: u32, within: Duration, deadband: f64) -> bool {
-        let changed = self.from.is_some_and(|from| deadband < (value - from).abs());
+    fn changes(&mut self, value: Exact, now: Duration, count: u32, within: Duration, deadband: f64) -> bool {
+        let changed = self.from.is_some_and(|from| deadband < (value - from).near().abs());
         if changed {
             self.points.push_back((now, value));
         }
@@ -233,13 +233,13 @@ pub fn holds(
     let passed = |memory: &mut ConditionMemory| now.saturating_sub(memory.asked.replace(now).unwrap_or(now));
     match condition {
         Condition::Limit { level: Level::High | Level::HighHigh, limit, deadband } => {
-            facts.value.map(|value| limit - back(deadband) < value)
+            facts.value.map(|value| value > Exact::from(limit - back(deadband)))
         }
         Condition::Limit { level: Level::Low | Level::LowLow, limit, deadband } => {
-            facts.value.map(|value| value < limit + back(deadband))
+            facts.value.map(|value| value < Exact::from(limit + back(deadband)))
         }
         Condition::Deviation { from: _, limit, deadband } => {
-            let distance = (facts.value? - facts.reference?).abs();
+            let distance = (facts.value? - facts.reference?).near().abs();
             Some(limit - back(deadband) < distance)
         }
         Condition::State { is } => facts.value.map(|value| value == is),
@@ -281,8 +281,8 @@ pub fn holds(
 }
 
 /// Whether a bit of a word is set. A word with a sign has its highest bit set while it is negative.
-pub fn is_set(value: f64, bit: u8) -> bool {
-    to_i64(value).cast_unsigned().checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1
+pub fn is_set(value: Exact, bit: u8) -> bool {
+    value.bits().checked_shr(u32::from(bit)).unwrap_or(0) & 1 == 1
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use super::{
 };
 use crate::plant::{
     def::{AlarmDef, AlarmId, PlantDef, Subject},
+    exact::Exact,
     record::{AlarmEvent, AlarmRecord, FirstOut},
     station::STATION,
 };
@@ -187,7 +188,7 @@ impl AlarmManager {
     }
 
     /// An alarm that is active when its suppression ends is raised again.
-    pub(super) fn raise_again(&mut self, alarm: &AlarmDef, at: Timestamp, value: Option<f64>) -> Option<AlarmRecord> {
+    pub(super) fn raise_again(&mut self, alarm: &AlarmDef, at: Timestamp, value: Option<Exact>) -> Option<AlarmRecord> {
         let machine = self.machine(alarm.id);
         let due = machine.active && !machine.state().is_suppressed();
         due.then(|| self.event(alarm, AlarmEvent::Raised, at, value))
@@ -219,7 +220,7 @@ impl AlarmManager {
     }
 
     /// An event without operator.
-    fn event(&mut self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {
+    fn event(&mut self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<Exact>) -> AlarmRecord {
         let first_out = (event == AlarmEvent::Raised).then(|| self.next_first_out(at));
         let record = self.record(alarm, event, at, value);
         self.apply_event(alarm.id, AlarmRecord { first_out, ..record })
@@ -253,7 +254,13 @@ impl AlarmManager {
         first_out
     }
 
-    pub(super) fn record(&self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<f64>) -> AlarmRecord {
+    pub(super) fn record(
+        &self,
+        alarm: &AlarmDef,
+        event: AlarmEvent,
+        at: Timestamp,
+        value: Option<Exact>,
+    ) -> AlarmRecord {
         let record =
             AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.message, alarm.priority, event);
         AlarmRecord { value, limit: alarm.condition.limit(), ..record }

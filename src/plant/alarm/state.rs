@@ -6,6 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use crate::plant::{
+    exact::Exact,
     keyword::keyword_enum,
     record::{AlarmEvent, AlarmRecord, FirstOut},
 };
@@ -115,7 +116,7 @@ pub struct AlarmStateMachine {
     /// The steps of the action that were done since it was raised: who, when, and the step as the reason.
     pub steps: Vec<OperatorNote>,
     /// The value that raised it.
-    pub value: Option<f64>,
+    pub value: Option<Exact>,
     /// Its place among the alarms that were raised together.
     pub first_out: Option<FirstOut>,
     /// Activations since the station started.

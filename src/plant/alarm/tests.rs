@@ -21,7 +21,7 @@ fn at(second: i64) -> Timestamp {
 }
 
 fn facts(value: f64, answering: bool) -> impl Fn(&AlarmDef) -> Facts {
-    move |_| Facts { value: Some(value), ill: Some(!answering), ..Facts::default() }
+    move |_| Facts { value: Some(value.into()), ill: Some(!answering), ..Facts::default() }
 }
 
 /// What anna says at an instant.
@@ -54,7 +54,7 @@ fn an_alarm_has_value_and_limit_and_survives_a_restart() {
     assert!(manager.evaluate(at(0), facts(80.0, true)).is_empty(), "the on-delay runs");
     let events = manager.evaluate(at(2), facts(81.0, true));
     assert_eq!(events.len(), 1);
-    assert_eq!((&*events[0].subject, events[0].value, events[0].limit), ("TIC-1.PV", Some(81.0), Some(75.0)));
+    assert_eq!((&*events[0].subject, events[0].value, events[0].limit), ("TIC-1.PV", Some(81.0.into()), Some(75.0)));
 
     let mut again = AlarmManager::new(fixture::shared());
     again.restore(&events);
@@ -191,10 +191,10 @@ fn an_alarm_out_of_service_stays_so_until_it_is_put_back() {
     assert_eq!(events(&manager.evaluate(at(100_000), facts(80.0, true))), [AlarmEvent::RaisedSuppressed]);
     assert_eq!(manager.lists().suppressed[0].state, AlarmState::OutOfService);
     let back = manager
-        .reinstate(HIGH, AlarmEvent::InService, Some(80.0), &note(at(100_001), None))
+        .reinstate(HIGH, AlarmEvent::InService, Some(80.0.into()), &note(at(100_001), None))
         .expect("it is out of service");
     assert_eq!(events(&back), [AlarmEvent::InService, AlarmEvent::Raised]);
-    assert_eq!(back[1].value, Some(80.0));
+    assert_eq!(back[1].value, Some(80.0.into()));
 }
 
 #[test]

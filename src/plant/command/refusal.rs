@@ -6,6 +6,7 @@ use crate::{
     plant::{
         alarm::AlarmRefusal,
         event::{ExceptionCode, Fault},
+        exact::Exact,
         parameter_set::Problem,
     },
     t,
@@ -114,10 +115,10 @@ pub enum NotConfirmed {
     NotAnswered(Fault),
     /// No valid answer, and the device holds another value.
     #[error("{}", t!("no response, not applied: the device has {what}", what = .0))]
-    NotApplied(f64),
+    NotApplied(Exact),
     /// Read back, and different.
     #[error("{}", t!("read back {what}", what = .0))]
-    Different(f64),
+    Different(Exact),
     /// Could not be read back.
     #[error("{}", t!("not read back: {what}", what = .0))]
     NotRead(Fault),

@@ -5,7 +5,9 @@ use crate::plant::{
     command::{CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::record::value_text,
     def::TagId,
+    exact::Exact,
     interlock,
+    number::digits,
     process_image::ProcessImage,
     scale,
     tag::Access,
@@ -18,7 +20,7 @@ impl CommandTracker {
         image: &ProcessImage,
         status: &CommandStatus,
         tag: TagId,
-        value: f64,
+        value: Exact,
     ) -> Result<WriteJob, Outcome> {
         let job = self.check_value(image, tag, value)?;
         self.check_expected(image, status, &job)?;
@@ -39,7 +41,7 @@ impl CommandTracker {
         }
     }
 
-    fn check_value(&self, image: &ProcessImage, tag: TagId, value: f64) -> Result<WriteJob, Outcome> {
+    fn check_value(&self, image: &ProcessImage, tag: TagId, value: Exact) -> Result<WriteJob, Outcome> {
         let refuse = |refusal| Err(Outcome::Refused(refusal));
         let def = self.def.tag(tag);
         if !def.writable() {
@@ -62,7 +64,7 @@ impl CommandTracker {
             return refuse(Refusal::Interlock(lock.message.clone()));
         }
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
-        let (min, max) = def.limits(|tag| image.sample(tag).good_value()).map_err(unknown)?;
+        let (min, max) = def.limits(|tag| image.sample(tag).good_exact()).map_err(unknown)?;
         let Some(decimals) = decimals else {
             return refuse(Refusal::Unknown("number of decimals".into()));
         };
@@ -71,15 +73,15 @@ impl CommandTracker {
             scale::is_inside(min, max, value) && rounded.is_none_or(|rounded| scale::is_inside(min, max, rounded));
         let raw = scale::to_raw(def, value, decimals).filter(|_| inside);
         let Some(raw) = raw else {
-            let shown = usize::from(image.shown_decimals(def));
-            let text = |bound: Option<f64>, none: &str| bound.map_or(none.into(), |bound| format!("{bound:.shown$}"));
+            let shown = Some(image.shown_decimals(def));
+            let text = |bound: Option<Exact>, none: &str| bound.map_or(none.into(), |bound| digits(bound, shown));
             return refuse(Refusal::OutOfRange { min: text(min, "−∞"), max: text(max, "∞") });
         };
         // What was read before the write under way says nothing about the time after it.
         if !is_busy && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
             return Err(Outcome::Unchanged);
         }
-        let raw_of = |unlock_tag, value| scale::to_raw(self.def.tag(unlock_tag), value, 0).unwrap_or(value);
+        let raw_of = |unlock_tag, value: f64| scale::to_raw(self.def.tag(unlock_tag), value, 0).unwrap_or(value.into());
         let unlock = def.write_unlock.map(|(unlock_tag, value)| (unlock_tag, raw_of(unlock_tag, value)));
         // An unlock register that has its value keeps it, unless a write is just changing it.
         let unlock = unlock.filter(|(unlock_tag, unlock_value)| {

@@ -4,6 +4,7 @@ use crate::plant::{
     alarm::{AlarmCommand, manager::subject_name},
     command::{CommandKind, CommandStatus},
     def::{AlarmId, PlantDef},
+    exact::Exact,
     number::digits,
     procedure,
     process_image::ProcessImage,
@@ -93,7 +94,8 @@ pub fn alarm_action(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static s
 }
 
 /// A value as text with label or unit.
-pub(super) fn value_text(image: &ProcessImage, tag: &TagDef, value: f64) -> String {
+pub(super) fn value_text(image: &ProcessImage, tag: &TagDef, value: impl Into<Exact>) -> String {
+    let value = value.into();
     match tag.label_of(value) {
         Some(label) => label.to_owned(),
         None => {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 
 use super::{BAND, ControlRun, Figure, GAP_MAX, RunDef, View};
-use crate::plant::{energy::Measures, time::elapsed};
+use crate::plant::{energy::Measures, exact::Exact, time::elapsed};
 
 /// Rise time is measured between these shares of the way from PV to SV.
 const RISE: [f64; 2] = [0.1, 0.9];
@@ -154,8 +154,8 @@ impl Meter {
 }
 
 fn default_band(error: f64, def: &RunDef, view: &View) -> f64 {
-    let limits = view.plant.tag(def.pv).limits(|tag| view.good(tag)).ok();
-    let range = limits.and_then(|(min, max)| Some(max? - min?));
+    let limits = view.plant.tag(def.pv).limits(|tag| view.good(tag).map(Exact::from)).ok();
+    let range = limits.and_then(|(min, max)| Some((max? - min?).near()));
     (error.abs() * BAND.0).max(range.unwrap_or_default() * BAND.1)
 }
 

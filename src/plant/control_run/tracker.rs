@@ -8,6 +8,7 @@ use super::{ControlRun, Figure, LEAST, RunCause, RunDef, RunState, figures::Figu
 use crate::plant::{
     def::{DeviceDef, PlantDef, ProgramDef},
     id::TagId,
+    number::digits,
     program::ProgramPosition,
     sample::Sample,
     time::elapsed,
@@ -272,10 +273,10 @@ fn has_changed(before: &[Option<f64>], now: impl Iterator<Item = Option<f64>>) -
 /// `P 5.0, I 240, D 60, PID`.
 fn settings(device: &DeviceDef, view: &View) -> String {
     let word = |tag: TagId| {
-        let (value, def) = (view.good(tag)?, view.plant.tag(tag));
+        let (value, def) = ((view.sample)(tag).good_exact()?, view.plant.tag(tag));
         Some(match def.label_of(value) {
             Some(label) => label.to_owned(),
-            None => format!("{} {value:.*}", def.short, usize::from((view.decimals)(tag))),
+            None => format!("{} {}", def.short, digits(value, Some((view.decimals)(tag)))),
         })
     };
     parameter_tags(device).filter_map(word).collect::<Vec<_>>().join(", ")

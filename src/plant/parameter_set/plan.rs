@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{ParameterSet, Trusted, compare, same};
 use crate::plant::{
     def::{DeviceId, PlantDef, TagId},
+    exact::Exact,
     sample::{Cause, Sample},
     scale,
     tag::{Decimals, TagDef},
@@ -21,9 +22,9 @@ pub struct PlannedChange {
     /// What.
     pub tag: TagId,
     /// In the device when the plan was made.
-    pub old: f64,
+    pub old: Exact,
     /// From the set.
-    pub new: f64,
+    pub new: Exact,
 }
 
 /// Why a set cannot be written to a device. Nothing is written while there is one.
@@ -46,10 +47,10 @@ pub enum Problem {
     Ground(String),
     /// Outside the limits that the device would then have.
     #[error("{}", t!("{tag} {value} is outside {min} … {max}", tag = .tag, value = .value, min = .min, max = .max))]
-    OutOfRange { tag: String, value: f64, min: String, max: String },
+    OutOfRange { tag: String, value: Exact, min: String, max: String },
     /// Not one of the values of an enumeration.
     #[error("{}", t!("{tag} has no value {value}", tag = .tag, value = .value))]
-    NotAChoice { tag: String, value: f64 },
+    NotAChoice { tag: String, value: Exact },
     /// The station would refuse it now.
     #[error("{}", t!("{tag}: interlock: {text}", tag = .tag, text = .text))]
     Interlock { tag: String, text: String },
@@ -84,7 +85,7 @@ pub fn plan(
             (Some(tag), Some(old)) => changes.push(PlannedChange { tag: tag.id, old, new }),
         }
     }
-    let after: BTreeMap<TagId, f64> = changes.iter().map(|change| (change.tag, change.new)).collect();
+    let after: BTreeMap<TagId, Exact> = changes.iter().map(|change| (change.tag, change.new)).collect();
     let then = |tag: TagId| after.get(&tag).copied().or_else(|| trusted(tag));
     problems.extend(changes.iter().filter_map(|change| unfit(def, change, &then, trusted)));
     if !problems.is_empty() {
@@ -96,7 +97,7 @@ pub fn plan(
 
 /// What the set rests on and the device has otherwise.
 fn other_ground(def: &PlantDef, device: DeviceId, set: &ParameterSet, trusted: Trusted) -> Vec<Problem> {
-    let words = |tag: &TagDef, value: f64| tag.label_of(value).map_or_else(|| value.to_string(), str::to_owned);
+    let words = |tag: &TagDef, value: Exact| tag.label_of(value).map_or_else(|| value.to_string(), str::to_owned);
     let wrong = set.given.iter().filter_map(|given| {
         let Some(tag) = def.tags_of(device).find(|tag| tag.short == given.tag) else {
             return Some(Problem::NoSetting(given.tag.clone()));
@@ -145,7 +146,7 @@ fn carries(def: &PlantDef, device: DeviceId, tag: TagId) -> bool {
 fn unfit(
     def: &PlantDef,
     change: &PlannedChange,
-    then: &dyn Fn(TagId) -> Option<f64>,
+    then: &dyn Fn(TagId) -> Option<Exact>,
     trusted: Trusted,
 ) -> Option<Problem> {
     let tag = def.tag(change.tag);
@@ -167,13 +168,13 @@ fn unfit(
     if scale::is_inside(min, max, change.new) && scale::to_raw(tag, change.new, decimals).is_some() {
         return None;
     }
-    let text = |bound: Option<f64>, none: &str| bound.map_or(none.to_owned(), |bound| bound.to_string());
+    let text = |bound: Option<Exact>, none: &str| bound.map_or(none.to_owned(), |bound| bound.to_string());
     let (min, max) = (text(min, "−∞"), text(max, "∞"));
     Some(Problem::OutOfRange { tag: tag.short.clone(), value: change.new, min, max })
 }
 
 /// An interlock needs a good value; its age does not matter.
-fn as_sample(trusted: Option<f64>) -> Sample {
+fn as_sample(trusted: Option<Exact>) -> Sample {
     let at = Timestamp::UNIX_EPOCH;
     trusted.map_or(Sample::bad(Cause::NotRead, at), |value| Sample::good(value, at))
 }
@@ -186,7 +187,7 @@ fn in_order(
     mut left: Vec<PlannedChange>,
     trusted: Trusted,
 ) -> Result<Vec<PlannedChange>, Vec<PlannedChange>> {
-    let mut now: BTreeMap<TagId, f64> = BTreeMap::new();
+    let mut now: BTreeMap<TagId, Exact> = BTreeMap::new();
     let mut sorted = Vec::with_capacity(left.len());
     while !left.is_empty() {
         let value = |tag: TagId| now.get(&tag).copied().or_else(|| trusted(tag));
@@ -209,6 +210,6 @@ fn in_order(
 }
 
 /// Is the value within the limits as these tags stand? Limits that are not known forbid it.
-fn inside(tag: &TagDef, held: f64, value: &dyn Fn(TagId) -> Option<f64>) -> bool {
+fn inside(tag: &TagDef, held: Exact, value: &dyn Fn(TagId) -> Option<Exact>) -> bool {
     tag.limits(value).is_ok_and(|(min, max)| scale::is_inside(min, max, held))
 }

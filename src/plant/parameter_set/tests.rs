@@ -32,8 +32,8 @@ fn def() -> PlantDef {
     let unit = Some((UNIT, vec![(0, "°C".to_owned()), (1, "°F".to_owned())]));
     let (low, high) = (Some(Bound::From(LOW)), Some(Bound::From(HIGH)));
     let tags = vec![
-        TagDef { min: Some(Bound::Fixed(0.0)), max: high, unit_from: unit.clone(), ..tag(LOW, "SV-L") },
-        TagDef { min: low, max: Some(Bound::Fixed(500.0)), ..tag(HIGH, "SV-H") },
+        TagDef { min: Some(Bound::Fixed(0.0.into())), max: high, unit_from: unit.clone(), ..tag(LOW, "SV-L") },
+        TagDef { min: low, max: Some(Bound::Fixed(500.0.into())), ..tag(HIGH, "SV-H") },
         TagDef { min: low, max: high, ..tag(SV, "SV") },
         TagDef { enum_labels: vec![(0, "PID".into()), (1, "FUZZY".into())], ..tag(MODE, "CTRL") },
         TagDef {
@@ -48,8 +48,9 @@ fn def() -> PlantDef {
 }
 
 /// SV-L, SV-H, SV, CTRL of a device in °C that runs.
-fn device(values: [f64; 4]) -> impl Fn(TagId) -> Option<f64> {
-    move |tag| values.get(tag.index()).copied().or((tag == UNIT || tag == RUN).then_some(0.0))
+fn device(values: [f64; 4]) -> impl Fn(TagId) -> Option<Exact> {
+    let known = move |tag: TagId| values.get(tag.index()).copied().or((tag == UNIT || tag == RUN).then_some(0.0));
+    move |tag| known(tag).map(Exact::from)
 }
 
 fn set(values: [f64; 4]) -> ParameterSet {
@@ -58,7 +59,7 @@ fn set(values: [f64; 4]) -> ParameterSet {
 
 fn planned(from: [f64; 4], to: &ParameterSet) -> Result<Vec<(TagId, f64)>, Vec<String>> {
     let plan = plan(&def(), TIC, to, &device(from));
-    plan.map(|changes| changes.iter().map(|change| (change.tag, change.new)).collect())
+    plan.map(|changes| changes.iter().map(|change| (change.tag, change.new.near())).collect())
         .map_err(|problems| problems.iter().map(Problem::to_string).collect())
 }
 
@@ -79,10 +80,10 @@ fn what_cannot_be_written_is_reported_before_anything_is() {
         assert_eq!(planned([0., 100., 50., 0.], set), Err(expect));
     };
     let good = set([0., 100., 60., 0.]);
-    let with = |tag: &str, value| {
+    let with = |tag: &str, value: f64| {
         let mut set = good.clone();
         set.values.retain(|held| held.tag != tag);
-        set.values.push(SetValue { tag: tag.to_owned(), value });
+        set.values.push(SetValue { tag: tag.to_owned(), value: value.into() });
         set
     };
     check(&with("SV", 101.), &["SV 101 is outside 0 … 100"]);
@@ -90,7 +91,7 @@ fn what_cannot_be_written_is_reported_before_anything_is() {
     check(&with("CTRL", 7.), &["CTRL has no value 7"]);
     check(&with("RUN", 1.), &["RUN is not a setting of this device"]);
     check(&with("NOPE", 1.), &["NOPE is not a setting of this device"]);
-    let fahrenheit = ParameterSet { given: vec![SetValue { tag: "P-F".into(), value: 1.0 }], ..good.clone() };
+    let fahrenheit = ParameterSet { given: vec![SetValue { tag: "P-F".into(), value: 1.0.into() }], ..good.clone() };
     check(&fahrenheit, &["P-F is °C in the device, °F in the set: the values mean something else"]);
     let foreign = ParameterSet { profile: "other".into(), ..good.clone() };
     check(&foreign, &["the set is for other, this device is fixture"]);
@@ -208,7 +209,7 @@ proptest! {
         for change in &plan {
             prop_assert_eq!(now[change.tag.index()], change.old);
             prop_assert_ne!(change.old, change.new);
-            now[change.tag.index()] = change.new;
+            now[change.tag.index()] = change.new.near();
             prop_assert!(now[0] <= now[2] && now[2] <= now[1], "{:?} after {:?}", now, change);
         }
         prop_assert_eq!(now, to);

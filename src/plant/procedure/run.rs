@@ -8,6 +8,7 @@ use super::{ProcedureDef, ProcedureEnd, ProcedureRun, ProcedureState, ProcedureS
 use crate::plant::{
     command::{CommandId, Outcome},
     event::Fault,
+    exact::Exact,
     id::{DeviceId, TagId},
     time::elapsed,
 };
@@ -15,7 +16,7 @@ use crate::plant::{
 /// What a procedure looks at.
 pub(in crate::plant) struct View<'a> {
     /// The good value of a tag.
-    pub value: &'a dyn Fn(TagId) -> Option<f64>,
+    pub value: &'a dyn Fn(TagId) -> Option<Exact>,
     /// The outcome of a write; `None` once it is forgotten.
     pub outcome: &'a dyn Fn(CommandId) -> Option<Outcome>,
     /// Does this value of a tag switch something off, so that it is sent whatever is under way?

@@ -45,7 +45,7 @@ fn a_text_is_trusted_and_doubted_like_a_number_and_never_stored() {
     let mut image = ProcessImage::new(Arc::new(def), at(0));
     assert_eq!(image.texts[PV.index()], None);
     image.read_texts(&[(PV, "PXR4".into())], at(1));
-    assert_eq!(image.sample(PV), Sample { value: None, quality: Quality::Good, at: at(1) });
+    assert_eq!(image.sample(PV), Sample::new(None, Quality::Good, at(1)));
     image.failed(&[PV], Fault::Timeout, at(2));
     assert_eq!(image.sample(PV).quality, Quality::Uncertain(Cause::Timeout));
     assert_eq!(image.texts[PV.index()].as_deref(), Some("PXR4"), "doubtful, not gone");
@@ -180,7 +180,7 @@ fn changes_are_stored_and_unchanged_values_once_a_minute() {
     }
     image.failed(&[PV], Fault::Timeout, at(122));
     let records = image.records(at(122));
-    let doubted = Sample { value: Some(72.5), quality: Quality::Uncertain(Cause::Timeout), at: at(122) };
+    let doubted = Sample::new(Some(72.5.into()), Quality::Uncertain(Cause::Timeout), at(122));
     assert!(records.contains(&Record::Sample(PV, doubted)), "the doubt begins at 122 s: {records:?}");
     assert_eq!(count(&mut image, 123), 0);
 }

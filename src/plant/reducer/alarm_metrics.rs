@@ -63,7 +63,7 @@ mod tests {
 
     /// The temperature at a second; above 75 is too hot after two seconds.
     fn read(plant: &mut Plant, second: i64, value: f64) -> Vec<AlarmRecord> {
-        let values = vec![(DP, 0.0), (FAULT, 0.0), (PV, value)];
+        let values = fixture::raw([(DP, 0.0), (FAULT, 0.0), (PV, value)]);
         let (device, texts, response_time) = (TIC, Vec::new(), Duration::from_millis(12));
         let event = Event::Read { at: at(second), device, values, texts, response_time, exchange: None };
         alarm_events(plant.on_event(event))

@@ -7,6 +7,7 @@ use crate::plant::{
     def::{AlarmDef, AlarmId, Condition, DeviceId, PlantDef, Subject},
     device_time::DeviceTime,
     event::LineState,
+    exact::Exact,
     ne107::{Reason, Signal},
     process_image::ProcessImage,
     record::{AlarmEvent, AlarmRecord, Record},
@@ -152,7 +153,7 @@ fn explain(event: &mut AlarmRecord, faults: &StationFaults) {
 
 /// What is known for an alarm. Only good values count: an uncertain one neither raises nor clears.
 fn facts(image: &ProcessImage, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
-    let trusted = |tag| image.sample(tag).good_value();
+    let trusted = |tag| image.sample(tag).good_exact();
     let value = match alarm.subject {
         Subject::Tag(tag) => trusted(tag),
         Subject::Device(_) | Subject::Line(_) | Subject::Station => None,
@@ -163,7 +164,7 @@ fn facts(image: &ProcessImage, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
 }
 
 /// The present value for an alarm that comes back.
-fn value_of(def: &crate::plant::PlantDef, image: &ProcessImage, alarm: AlarmId) -> Option<f64> {
+fn value_of(def: &crate::plant::PlantDef, image: &ProcessImage, alarm: AlarmId) -> Option<Exact> {
     facts(image, None, def.alarms.get(alarm.index())?).value
 }
 

@@ -28,8 +28,8 @@ impl Plant {
         let mut asked = Vec::new();
         for device in &self.def.devices {
             let pv = device.faceplate.as_ref().map(|plate| self.def.tag(plate.pv));
-            let limits = pv.and_then(|pv| pv.limits(|tag| sample(tag).good_value()).ok());
-            let span = limits.and_then(|(min, max)| Some(max? - min?));
+            let limits = pv.and_then(|pv| pv.limits(|tag| sample(tag).good_exact()).ok());
+            let span = limits.and_then(|(min, max)| Some((max? - min?).near()));
             if self.tunings[device.id.index()].observe(device, &sample, span, at) == Noticed::Ended {
                 asked.push((device.line, BusRequest::Refresh { device: device.id, command: None }));
             }
@@ -68,7 +68,7 @@ impl Plant {
                 Outcome::Verified | Outcome::Sent | Outcome::NotConfirmed(_) | Outcome::Failed(_),
             ) => {
                 let age = elapsed(status.at, self.at);
-                actions.iter().any(|action| action.tag == *tag && action.value == *value && age < action.settle)
+                actions.iter().any(|action| action.tag == *tag && *value == action.value && age < action.settle)
             }
             _ => false,
         })
@@ -111,7 +111,7 @@ mod tests {
         }];
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(Event::Line { at: at(0), line: LineId(0), state: LineState::Connected });
-        let values = vec![(PV, 700.0), (DP, 1.0)];
+        let values = fixture::raw([(PV, 700.0), (DP, 1.0)]);
         let response_time = Duration::from_millis(12);
         plant.on_event(Event::Read {
             at: at(0),
@@ -123,9 +123,9 @@ mod tests {
         });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, None);
         let id = CommandId { terminal: 1, number: 1 };
-        let command = Command::new(1, id, CommandKind::Write { tag: SV, value: 1.0 });
+        let command = Command::new(1, id, CommandKind::Write { tag: SV, value: 1.0.into() });
         plant.on_command(CommandStatus::new(command, "anna", at(1)), at(1));
-        plant.on_event(Event::Wrote { at: at(1), id: WriteId(1), result: WriteResult::ReadBack(10.0) });
+        plant.on_event(Event::Wrote { at: at(1), id: WriteId(1), result: WriteResult::ReadBack(10.0.into()) });
         assert_eq!(plant.snapshot().device(TIC).diagnosis, Some(Reason::Settling));
         assert_eq!(plant.snapshot().device(PLC).diagnosis, None);
         plant.on_tick(at(7));

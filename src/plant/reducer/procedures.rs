@@ -12,6 +12,7 @@ use crate::plant::{
     command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
     control_run::RunState,
     def::{DeviceId, ProcedureId, TagId},
+    exact::Exact,
     interlock,
     number::to_u16,
     procedure::{self, Instruction, ProcedureEnd, ProcedureRun, View},
@@ -74,9 +75,9 @@ impl Plant {
         loop {
             let (image, commands) = (&self.image, &self.commands);
             let view = View {
-                value: &|tag| image.sample(tag).good_value(),
+                value: &|tag| image.sample(tag).good_exact(),
                 outcome: &|id| commands.outcome_of(id).cloned(),
-                is_stop: &|tag, value| interlock::is_stop(&def, tag, value),
+                is_stop: &|tag, value| interlock::is_stop(&def, tag, value.into()),
                 at,
             };
             let todo = run.next(def.procedure(id), &view);
@@ -181,9 +182,10 @@ impl Plant {
     ) -> CommandId {
         self.last_number = self.last_number.wrapping_add(1);
         let command = CommandId { terminal: PLANT, number: self.last_number };
+        let value = Exact::from(value);
         let kind = CommandKind::Write { tag, value };
         // It was confirmed with the procedure, whatever the value is that it replaces.
-        let expected_value = self.image.sample(tag).value;
+        let expected_value = self.image.sample(tag).exact();
         let note = Some(format!("procedure {}", self.def.procedure(id).name).into());
         let request = Command { expected_value, note, ..Command::new(self.run, command, kind) };
         let status = CommandStatus { from: run.from.clone(), ..CommandStatus::new(request, run.actor().clone(), at) };

@@ -11,6 +11,7 @@ use super::{Effects, Plant};
 use crate::plant::{
     command::{BusRequest, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
     def::{DeviceId, LineId, TagId},
+    exact::Exact,
     parameter_set::{self, StoredSet},
     process_image::ProcessImage,
     record::Record,
@@ -229,13 +230,13 @@ impl Plant {
 }
 
 /// The good values by tag.
-fn trusted(image: &ProcessImage) -> impl Fn(TagId) -> Option<f64> + '_ {
-    |tag| image.sample(tag).good_value()
+fn trusted(image: &ProcessImage) -> impl Fn(TagId) -> Option<Exact> + '_ {
+    |tag| image.sample(tag).good_exact()
 }
 
 /// Why a step would overwrite another value than the confirmed one.
 fn overtaken(step: &Step, image: &ProcessImage) -> Option<Refusal> {
-    match image.sample(step.change.tag).good_value() {
+    match image.sample(step.change.tag).good_exact() {
         None => Some(Refusal::NotKnownNow),
         Some(now) if now != step.change.old => Some(Refusal::ChangedSince),
         Some(_) => None,

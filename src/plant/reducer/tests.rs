@@ -1,6 +1,7 @@
 //! The reducer of facts: what an operator would notice.
 
 mod alarms;
+mod exact;
 mod writes;
 
 use std::time::Duration;
@@ -28,7 +29,7 @@ fn read(second: i64, values: &[(TagId, f64)]) -> Event {
     Event::Read {
         at: at(second),
         device: TIC,
-        values: values.to_vec(),
+        values: fixture::raw(values.iter().copied()),
         texts: Vec::new(),
         response_time: Duration::from_millis(12),
         exchange: None,
@@ -69,7 +70,7 @@ pub(super) fn alarm_events(effects: Effects) -> Vec<AlarmRecord> {
 
 /// A write by an operator who sees the plant's present values.
 fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> CommandStatus {
-    let kind = CommandKind::Write { tag, value };
+    let kind = CommandKind::Write { tag, value: value.into() };
     let command = Command::on(&plant.snapshot(), CommandId { terminal: 1, number }, kind);
     CommandStatus::new(command, "anna", at(0))
 }
@@ -85,15 +86,20 @@ fn write(plant: &mut Plant, value: f64, result: WriteResult) -> (Outcome, Option
         assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending);
         plant.on_event(Event::Wrote { at: at(2), id, result });
     }
-    (plant.snapshot().commands[0].outcome.clone(), sent.map(|(_, raw)| raw))
+    (plant.snapshot().commands[0].outcome.clone(), sent.map(|(_, raw)| raw.near()))
 }
 
 #[test]
 fn a_write_is_verified_only_by_its_own_read_back() {
     let refused = |refusal| Outcome::Refused(refusal);
     for (value, result, outcome, sent) in [
-        (72.5, WriteResult::ReadBack(725.0), Outcome::Verified, Some(725.0)),
-        (72.5, WriteResult::ReadBack(700.0), Outcome::NotConfirmed(NotConfirmed::Different(70.0)), Some(725.0)),
+        (72.5, WriteResult::ReadBack(725.0.into()), Outcome::Verified, Some(725.0)),
+        (
+            72.5,
+            WriteResult::ReadBack(700.0.into()),
+            Outcome::NotConfirmed(NotConfirmed::Different(70.0.into())),
+            Some(725.0),
+        ),
         (
             72.5,
             WriteResult::NotRead(Fault::Timeout),
@@ -107,11 +113,11 @@ fn a_write_is_verified_only_by_its_own_read_back() {
             Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
             Some(725.0),
         ),
-        (72.5, WriteResult::ReadBackAfterNoResponse(725.0), Outcome::Verified, Some(725.0)),
+        (72.5, WriteResult::ReadBackAfterNoResponse(725.0.into()), Outcome::Verified, Some(725.0)),
         (
             72.5,
-            WriteResult::ReadBackAfterNoResponse(700.0),
-            Outcome::NotConfirmed(NotConfirmed::NotApplied(70.0)),
+            WriteResult::ReadBackAfterNoResponse(700.0.into()),
+            Outcome::NotConfirmed(NotConfirmed::NotApplied(70.0.into())),
             Some(725.0),
         ),
         (70.0, WriteResult::Accepted, Outcome::Unchanged, None),
@@ -134,7 +140,7 @@ fn after_an_uncertain_write_the_old_value_is_not_good() {
         write(&mut plant, 72.5, result);
         assert_eq!(plant.snapshot().sample(SV).quality, Quality::Uncertain(Cause::Timeout));
         // The correction is really written, not taken for unchanged.
-        assert_eq!(write(&mut plant, 70.0, WriteResult::ReadBack(700.0)), (Outcome::Verified, Some(700.0)));
+        assert_eq!(write(&mut plant, 70.0, WriteResult::ReadBack(700.0.into())), (Outcome::Verified, Some(700.0)));
     }
 }
 
@@ -238,7 +244,7 @@ fn the_record_of_a_write_has_old_new_and_outcome() {
     let mut plant = running();
     let effects = plant.on_command(shown(&plant, 1, SV, 72.5), at(1));
     let BusRequest::Write(WriteJob { id, .. }) = effects.bus[0].1 else { panic!("a write was requested") };
-    let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(725.0) });
+    let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(725.0.into()) });
     let Some(Record::Action(action)) = effects.records.last() else { panic!("no action on record") };
     assert_eq!(
         (&*action.by, &*action.action, &*action.target, action.old.as_deref(), action.new.as_deref(), &*action.outcome),

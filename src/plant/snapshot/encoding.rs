@@ -35,21 +35,31 @@ impl<T: Clone> Dictionary<T> {
 /// Samples: quality and time are those of an answer.
 pub mod samples {
     use jiff::Timestamp;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+    use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
     use super::Dictionary;
     use crate::plant::sample::{Quality, Sample};
 
+    /// Times and qualities, values, and what few of these lack, with their places.
+    type Encoded = (Dictionary<(Timestamp, Quality)>, Vec<Option<f64>>, Vec<(u32, f64)>);
+
     pub fn serialize<S: Serializer>(samples: &[Sample], to: S) -> Result<S::Ok, S::Error> {
         let readings = samples.iter().map(|sample| (sample.at, sample.quality)).map(|reading| (reading, reading));
         let values: Vec<Option<f64>> = samples.iter().map(|sample| sample.value).collect();
-        (Dictionary::new(readings), values).serialize(to)
+        let rests = (0u32..).zip(samples).filter_map(|(place, sample)| Some((place, sample.rest?)));
+        (Dictionary::new(readings), values, rests.collect::<Vec<_>>()).serialize(to)
     }
 
     pub fn deserialize<'a, D: Deserializer<'a>>(from: D) -> Result<Vec<Sample>, D::Error> {
-        let (readings, values): (Dictionary<(Timestamp, Quality)>, Vec<Option<f64>>) = Deserialize::deserialize(from)?;
+        let (readings, values, rests): Encoded = Deserialize::deserialize(from)?;
         let samples = readings.list::<D::Error>()?.into_iter().zip(values);
-        Ok(samples.map(|((at, quality), value)| Sample { value, quality, at }).collect())
+        let sample = |((at, quality), value)| Sample { value, rest: None, quality, at };
+        let mut samples: Vec<Sample> = samples.map(sample).collect();
+        for (place, rest) in rests {
+            let sample = samples.get_mut(place as usize).ok_or_else(|| D::Error::custom("a rest without value"))?;
+            sample.rest = Some(rest);
+        }
+        Ok(samples)
     }
 }
 

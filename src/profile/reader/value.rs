@@ -5,7 +5,10 @@ use std::time::Duration;
 use jiff::{SignedDuration, civil::Time};
 
 use super::{At, Node, Raw, Value};
-use crate::profile::diagnostic::{Problems, Span};
+use crate::{
+    plant::exact::Exact,
+    profile::diagnostic::{Problems, Span},
+};
 
 impl Value for Raw {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
@@ -36,8 +39,21 @@ impl Value for bool {
 
 impl Value for f64 {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let number = Exact::read(value, at, problems)?;
+        let is_rounded = number.is_rounded();
+        if is_rounded {
+            let problem = problems.add(at, format!("{number} has more digits than are kept here"));
+            problem.label(format!("the nearest that can be kept is {:.0}", number.near()));
+        }
+        Some(number.near()).filter(|_| !is_rounded)
+    }
+}
+
+/// With all its digits.
+impl Value for Exact {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
         let number = match value {
-            Node::Whole(number) => *number as f64,
+            Node::Whole(number) => Exact::whole(*number),
             Node::Number(number) => *number,
             Node::Text(_) | Node::Flag(_) | Node::Time(_) | Node::Array(_) | Node::Table(_) => {
                 return wrong_type(value, at, "a number", problems);
@@ -66,7 +82,7 @@ macro_rules! whole {
         }
     )* };
 }
-whole!(u8, u16, u32, u64, i64);
+whole!(u8, u16, u32, u64, i64, i128);
 
 impl Value for Duration {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
@@ -118,14 +134,14 @@ impl<T: Value + Copy> Value for [T; 2] {
 
 /// A table with numbers for keys: `{ 0 = "STOP", 1 = "RUN" }`.
 #[derive(Debug, Clone)]
-pub(crate) struct Numbered(pub Vec<(At<i64>, String)>);
+pub(crate) struct Numbered(pub Vec<(At<i128>, String)>);
 
 impl Value for Numbered {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
         let raw = Raw::read(value, at, problems)?;
         let mut rows = Vec::new();
         for (word, (at, text)) in &raw.table {
-            let hex = word.strip_prefix("0x").and_then(|digits| i64::from_str_radix(digits, 16).ok());
+            let hex = word.strip_prefix("0x").and_then(|digits| i128::from_str_radix(digits, 16).ok());
             match hex.or_else(|| word.parse().ok()) {
                 Some(value) => {
                     let text = String::read(&text.value, text.at, problems);
@@ -158,7 +174,7 @@ impl Value for Texts {
 /// A number, or what stands for one: a word (`value = "RUN"`), or `true` and `false` for 1 and 0 of two states.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
-    Number(f64),
+    Number(Exact),
     Flag(bool),
     Word(String),
 }
@@ -168,7 +184,7 @@ impl Value for Choice {
         match value {
             Node::Text(word) => Some(Choice::Word(word.clone())),
             Node::Flag(flag) => Some(Choice::Flag(*flag)),
-            Node::Whole(_) | Node::Number(_) => f64::read(value, at, problems).map(Choice::Number),
+            Node::Whole(_) | Node::Number(_) => Exact::read(value, at, problems).map(Choice::Number),
             Node::Time(_) | Node::Array(_) | Node::Table(_) => wrong_type(value, at, "a number or a word", problems),
         }
     }

@@ -5,6 +5,7 @@ use std::time::Duration;
 use crate::{
     plant::{
         def::{Reauthentication, Role},
+        exact::Exact,
         keyword::keyword_enum,
         output::Output,
         tag::{Access, ByteOrder, Confidence, DataType, PollClass, StorePolicy, Table},
@@ -97,8 +98,8 @@ toml_tables! {
         opt "decimals_from" decimals_from: String,
         opt "unit" unit: String,
         opt "unit_from" unit_from: String,
-        opt "min" min: f64,
-        opt "max" max: f64,
+        opt "min" min: Exact,
+        opt "max" max: Exact,
         opt "min_from" min_from: String,
         opt "max_from" max_from: String,
         /// Where the value usually lies.
@@ -112,7 +113,7 @@ toml_tables! {
         opt "role" role: WriteRole,
         opt "enum" enum_labels: Numbered,
         opt "bits" bits: Numbered,
-        list "bad_if" bad_if: i64,
+        list "bad_if" bad_if: i128,
         opt "quality_from" quality_from: String,
         opt "quality_mask" quality_mask: u64,
         opt "write_fc" write_fc: u8,

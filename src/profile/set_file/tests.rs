@@ -16,10 +16,10 @@ fn winter(def: &PlantDef) -> ParameterSet {
     let device = def.devices.iter().find(|device| device.profile == "fuji_pxr").expect("the tank has a PXR");
     let value = |tag: crate::plant::def::TagId| match def.tag(tag).short.as_str() {
         "P" => None,
-        "SV" => Some(70.5),
-        "CTRL" => Some(1.0),
-        "P-F" | "P-DP" | "PTN" => Some(0.0),
-        _ => Some(12.0),
+        "SV" => Some(70.5.into()),
+        "CTRL" => Some(1.0.into()),
+        "P-F" | "P-DP" | "PTN" => Some(0.0.into()),
+        _ => Some(12.0.into()),
     };
     parameter_set::capture(def, device.id, "winter", "anna \"boss\" \\".into(), Timestamp::UNIX_EPOCH, &value)
 }
@@ -58,7 +58,7 @@ fn two_devices_of_a_profile_may_have_tags_of_their_own() {
     let id = crate::plant::def::TagId(def.tags.len() as u16);
     let name = "PLC-2.RECIPE".to_owned();
     def.tags.push(TagDef { id, device: second, name, short: "RECIPE".into(), in_sets: true, unit: "l".into(), ..base });
-    let all = |_| Some(3.0);
+    let all = |_| Some(3.0.into());
     let set = parameter_set::capture(&def, second, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &all);
     assert_eq!(set.values.len(), 1);
     let text = text_of_set(&set, &def);
@@ -131,9 +131,24 @@ proptest! {
         let def = tank();
         let mut set = winter(&def);
         set.values.retain(|held| held.tag == "SV");
-        set.values[0].value = value;
+        set.values[0].value = value.into();
         set.units.retain(|short, _| short == "SV");
         let text = text_of_set(&set, &def);
         prop_assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set));
+    }
+
+    #[test]
+    fn every_number_of_64_bits_comes_back(number in any::<i64>(), decimals in 0_u32..4) {
+        let def = tank();
+        let mut set = winter(&def);
+        set.values.retain(|held| held.tag == "SV");
+        set.units.retain(|short, _| short == "SV");
+        let scaled = format!("{number}e-{decimals}").parse::<crate::plant::exact::Exact>();
+        let unsigned = crate::plant::exact::Exact::whole(i128::from(number) + (1 << 63));
+        for value in [unsigned, scaled.expect("a number")] {
+            set.values[0].value = value;
+            let text = text_of_set(&set, &def);
+            prop_assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set.clone()), "{}", text);
+        }
     }
 }

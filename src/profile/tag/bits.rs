@@ -16,7 +16,9 @@ use crate::{
 /// `"5-4"` or `3`: lowest bit and number of bits.
 pub(super) fn bit_field(field: &At<Choice>, kind: DataType, table: Table, problems: &mut Problems) -> Option<(u8, u8)> {
     let bounds = match &field.value {
-        Choice::Number(bit) if bit.fract() == 0.0 && (0.0..64.0).contains(bit) => Some((to_u8(*bit), to_u8(*bit))),
+        Choice::Number(bit) if bit.as_whole().is_some_and(|bit| (0..64).contains(&bit)) => {
+            Some((to_u8(bit.near()), to_u8(bit.near())))
+        }
         Choice::Number(_) | Choice::Flag(_) => None,
         Choice::Word(word) => match word.split_once('-') {
             Some((high, low)) => high.trim().parse().ok().zip(low.trim().parse().ok()),
@@ -33,11 +35,11 @@ pub(super) fn bit_field(field: &At<Choice>, kind: DataType, table: Table, proble
     valid.map(|(high, low)| (low, high - low + 1))
 }
 
-pub(super) fn enum_labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i64, String)> {
+pub(super) fn enum_labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i128, String)> {
     let Some(Numbered(rows)) = row.enum_labels.as_ref().map(|labels| &labels.value) else { return Vec::new() };
     let range = kind.and_then(raw_range);
     for (number, text) in rows {
-        let outside = range.filter(|(low, high)| (number.value as f64) < *low || (number.value as f64) > *high);
+        let outside = range.filter(|(low, high)| !(low..=high).contains(&&number.value));
         if let Some((low, high)) = outside {
             let problem =
                 problems.add(number.at, format!("enum value {} ({text}) does not fit the type", number.value));
@@ -54,7 +56,7 @@ pub(super) fn bit_labels(
 ) -> Vec<(u8, String)> {
     named_bits(
         bits.as_ref(),
-        kind.map_or(64, |(kind, field)| field.map_or(i64::from(kind.registers()) * 16, i64::from)),
+        kind.map_or(64, |(kind, field)| field.map_or(i128::from(kind.registers()) * 16, i128::from)),
         problems,
     )
 }
@@ -62,7 +64,7 @@ pub(super) fn bit_labels(
 /// The names of bits of a word of so many.
 pub(in crate::profile) fn named_bits(
     bits: Option<&At<Numbered>>,
-    size: i64,
+    size: i128,
     problems: &mut Problems,
 ) -> Vec<(u8, String)> {
     let Some(Numbered(rows)) = bits.map(|bits| &bits.value) else { return Vec::new() };

@@ -8,7 +8,11 @@ use super::{
     },
     Raws,
 };
-use crate::plant::tag::{Decimals, TagDef};
+use crate::plant::{
+    exact::Exact,
+    scale::scaled,
+    tag::{Decimals, TagDef},
+};
 
 /// Checks scale and bounds against each other and against what the raw type can hold.
 pub(super) fn check_scaling(row: &TagTable, kind: Option<Raws>, decimals: Decimals, problems: &mut Problems) {
@@ -46,18 +50,18 @@ fn check_normal(row: &TagTable, problems: &mut Problems) {
         problems.add(at, format!("the normal band ends at {high} and begins at {low}")).label("expected [low, high]");
         return;
     }
-    if let Some(min) = row.min.filter(|min| low < min.value) {
+    if let Some(min) = row.min.filter(|min| min.value > Exact::from(low)) {
         let problem = problems.add(at, format!("the normal band begins below min {}", min.value));
         problem.label("expected it between min and max").also(min.at, "min");
     }
-    if let Some(max) = row.max.filter(|max| max.value < high) {
+    if let Some(max) = row.max.filter(|max| max.value < Exact::from(high)) {
         let problem = problems.add(at, format!("the normal band ends above max {}", max.value));
         problem.label("expected it between min and max").also(max.at, "max");
     }
 }
 
 /// What a tag can hold at all, in its unit; `None` if its decimals come from the device or it is a float.
-pub(in crate::profile) fn range_of(tag: &TagDef) -> Option<(f64, f64)> {
+pub(in crate::profile) fn range_of(tag: &TagDef) -> Option<(Exact, Exact)> {
     let kind = (tag.point.kind, tag.point.field.map(|(_, bits)| bits));
     match tag.decimals {
         Decimals::Fixed(_) => value_range(kind, tag.scale, tag.offset),
@@ -65,16 +69,19 @@ pub(in crate::profile) fn range_of(tag: &TagDef) -> Option<(f64, f64)> {
     }
 }
 
-fn value_range(kind: Raws, scale: f64, offset: f64) -> Option<(f64, f64)> {
+fn value_range(kind: Raws, scale: f64, offset: f64) -> Option<(Exact, Exact)> {
     let (low, high) = raw_range(kind)?;
-    let round = |value: f64| (value * 1e6).round() / 1e6;
-    let (a, b) = (round(low * scale + offset), round(high * scale + offset));
-    Some((a.min(b), a.max(b)))
+    let held = |raw: i128| {
+        let value = scaled(Exact::whole(raw), scale, offset, 0);
+        value.rest().map_or_else(|| ((value.near() * 1e6).round() / 1e6).into(), |_| value)
+    };
+    let (a, b) = (held(low), held(high));
+    Some(if a < b { (a, b) } else { (b, a) })
 }
 
-pub(super) fn raw_range((kind, field): Raws) -> Option<(f64, f64)> {
+pub(super) fn raw_range((kind, field): Raws) -> Option<(i128, i128)> {
     if let Some(bits) = field {
-        return Some((0.0, 2f64.powi(i32::from(bits)) - 1.0));
+        return Some((0, (1 << bits) - 1));
     }
     kind.whole_range()
 }

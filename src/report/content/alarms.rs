@@ -17,7 +17,7 @@ pub(super) fn alarm_counts(report: &ShiftReport) -> Table {
     Table::new(columns).with(Priority::ALL.into_iter().map(|priority| {
         let suppressed = report.suppressed.iter().filter(|alarm| alarm.priority == priority);
         let suppressed: u64 = suppressed.map(|alarm| alarm.raised).sum();
-        let suppressed = Cell::Number(suppressed as f64, Some(0));
+        let suppressed = Cell::number(Some(suppressed as f64), 0);
         vec![Cell::text(translate(priority.word())), Cell::count(raised(&report.alarms, priority)), suppressed]
     }))
 }
@@ -35,7 +35,7 @@ pub(super) fn suppressed(alarms: &[SuppressedSummary]) -> Table {
             Cell::text(translate(alarm.priority.word())),
             Cell::text(&alarm.subject),
             Cell::text(&alarm.message),
-            Cell::Number(alarm.raised as f64, Some(0)),
+            Cell::number(Some(alarm.raised as f64), 0),
             minutes(alarm.active),
         ]
     }))
@@ -63,7 +63,7 @@ pub(super) fn metrics(rows: &[Row]) -> Table {
 pub(super) fn bad_actors(alarms: &[BadActor]) -> Table {
     let columns = [Column::text("kind"), Column::text("subject"), Column::text("alarm"), Column::number("raised")];
     Table::new(columns).with(alarms.iter().map(|alarm| {
-        let raised = alarm.raised.map_or(Cell::Empty, |raised| Cell::Number(raised as f64, Some(0)));
+        let raised = Cell::number(alarm.raised.map(|raised| raised as f64), 0);
         vec![Cell::text(translate(alarm.kind)), Cell::text(&alarm.subject), Cell::text(&alarm.alarm), raised]
     }))
 }

@@ -4,6 +4,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use crate::{
     plant::{
+        exact::Exact,
         keyword::Keyword,
         sample::{Cause, Quality, Sample},
     },
@@ -170,13 +171,11 @@ fn cell(at: Timestamp, value: &str, quality: &str, dialect: Dialect) -> Cell {
         (Quality::Good, value) => {
             let plain = if dialect.decimal == ',' { value.replace(',', ".") } else { value.to_owned() };
             let found = || t!("found `{found}`, expected a number", found = short(value.as_bytes()));
-            let number = plain.parse::<f64>().ok().filter(|number| number.is_finite()).ok_or_else(found)?;
+            let number = plain.parse::<Exact>().ok().filter(|number| number.is_finite()).ok_or_else(found)?;
             let decimals = plain.split_once('.').map_or(0, |(_, digits)| digits.len().min(6));
             Ok((Sample::good(number, at), u8::try_from(decimals).unwrap_or(0)))
         }
-        (quality, "") => {
-            Ok((Sample { value: None, quality: Quality::Bad(quality.cause().unwrap_or(Cause::NotRead)), at }, 0))
-        }
+        (quality, "") => Ok((Sample::bad(quality.cause().unwrap_or(Cause::NotRead), at), 0)),
         (quality, value) => {
             let found = short(value.as_bytes());
             Err(t!("found `{found}` with the quality `{quality}`, expected no value", found, quality = quality.word()))

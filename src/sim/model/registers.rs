@@ -107,7 +107,7 @@ impl Model {
     pub fn value(&self, tag: TagId) -> Option<f64> {
         let tag = self.chart.tag(tag)?;
         let raw = codec::decode(tag.point, &self.words(tag)?)?;
-        Some(scale::to_value(tag, raw, self.decimals(tag)))
+        Some(scale::to_value(tag, raw, self.decimals(tag)).near())
     }
 
     /// Puts a value into the registers; `false` if they cannot hold it.
@@ -141,7 +141,7 @@ impl Model {
 
     fn bound(&self, bound: Option<Bound>) -> Option<f64> {
         match bound? {
-            Bound::Fixed(value) => Some(value),
+            Bound::Fixed(value) => Some(value.near()),
             Bound::From(tag) => self.value(tag),
         }
     }
@@ -184,7 +184,7 @@ impl Model {
 /// 0, or what is nearest to it of the values that the tag may have.
 fn at_rest(tag: &TagDef) -> f64 {
     let fixed = |bound: Option<Bound>| match bound {
-        Some(Bound::Fixed(value)) => Some(value),
+        Some(Bound::Fixed(value)) => Some(value.near()),
         Some(Bound::From(_)) | None => None,
     };
     match tag.enum_labels.first() {

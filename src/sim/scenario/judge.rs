@@ -10,6 +10,7 @@ use crate::plant::{
     alarm::manager::subject_name,
     command::CommandStatus,
     def::{AlarmId, PlantDef, TagId},
+    exact::Exact,
     record::{AlarmEvent, AlarmRecord, Record},
 };
 
@@ -143,7 +144,7 @@ impl Judge {
                 Expectation::NoAlarm(alarm)
                     if inside && event.event == AlarmEvent::Raised && is(&self.def, alarm, event) =>
                 {
-                    mark.broken.get_or_insert((at, event.value));
+                    mark.broken.get_or_insert((at, event.value.map(Exact::near)));
                 }
                 Expectation::Alarm(..)
                 | Expectation::NoAlarm(_)
@@ -161,7 +162,7 @@ impl Judge {
         let done = status.outcome.is_success();
         for (expect, mark) in self.scenario.expect.iter().zip(&mut self.marks) {
             let Expectation::Written(wanted, number) = expect.expectation else { continue };
-            if done && wanted == tag && number == value && expect.from <= at && at <= expect.until {
+            if done && wanted == tag && value == number && expect.from <= at && at <= expect.until {
                 mark.met.get_or_insert(at);
             }
         }

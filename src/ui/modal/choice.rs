@@ -6,7 +6,10 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Confirm, Modal, Next, confirm::wire_text, window};
 use crate::{
-    plant::def::{DeviceId, TagId},
+    plant::{
+        def::{DeviceId, TagId},
+        exact::Exact,
+    },
     ui::{
         ViewContext, keys,
         widgets::{
@@ -41,15 +44,15 @@ impl Choice {
     pub fn values(cx: &ViewContext, tag: TagId) -> Choice {
         let def = cx.def().tag(tag);
         // A state that the device only reports is no choice.
-        let range = cx.snapshot.range(tag);
-        let may = |number: f64| range.is_none_or(|(min, max)| (min..=max).contains(&number));
-        let choices = || def.enum_labels.iter().filter(|(number, _)| may(*number as f64));
+        let range = cx.snapshot.bounds(tag);
+        let may = |number: Exact| range.is_none_or(|(min, max)| (min..=max).contains(&number));
+        let choices = || def.enum_labels.iter().filter(|(number, _)| may(Exact::whole(*number)));
         let rows = choices().map(|(number, label)| {
-            let next = Confirm::write(cx, tag, *number as f64);
+            let next = Confirm::write(cx, tag, Exact::whole(*number));
             Row { text: format!("{number}  {label}"), tag, next }
         });
-        let now = cx.snapshot.sample(tag).value;
-        let selected = choices().position(|(number, _)| Some(*number as f64) == now).unwrap_or(0);
+        let now = cx.snapshot.sample(tag).exact();
+        let selected = choices().position(|(number, _)| Some(Exact::whole(*number)) == now).unwrap_or(0);
         Choice { title: t!("write {name} {label}", name = def.name, label = def.label), rows: rows.collect(), selected }
     }
 

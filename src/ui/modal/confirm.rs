@@ -18,6 +18,7 @@ use crate::{
         command::{Command, CommandKind},
         def::TagId,
         diagnostics::Diagnostic,
+        exact::Exact,
         number::to_u16,
         role::Reauthentication,
         tag::{Access, Confidence, TagDef},
@@ -92,7 +93,8 @@ impl Confirm {
 
     /// Write this value, as the device will hold it? Old and new value are drawn from the action, so they cannot differ from
     /// what is sent.
-    pub fn write(cx: &ViewContext, tag: TagId, value: f64) -> Confirm {
+    pub fn write(cx: &ViewContext, tag: TagId, value: impl Into<Exact>) -> Confirm {
+        let value = value.into();
         let def = cx.def().tag(tag);
         let rounded = rounded_text(cx, tag, value);
         let value = if rounded.is_some() { cx.snapshot.rounded_to_device(tag, value) } else { value };
@@ -357,7 +359,7 @@ fn credentials(form: &Form) -> Credentials {
 }
 
 /// `old 60.0 °C → new 70.0 °C`; an unknown old value is said to be unknown.
-pub(super) fn old_and_new(cx: &ViewContext, tag: TagId, new: f64) -> String {
+pub(super) fn old_and_new(cx: &ViewContext, tag: TagId, new: Exact) -> String {
     let new = format!("{} {}", cx.snapshot.format(tag, new), cx.snapshot.unit(tag));
     match cx.def().tag(tag).access {
         Access::Write => t!("writes {trim_end}", trim_end = new.trim_end()),

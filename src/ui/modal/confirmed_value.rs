@@ -2,7 +2,7 @@
 
 use crate::t;
 use crate::{
-    plant::{command::Outcome, def::TagId},
+    plant::{command::Outcome, def::TagId, exact::Exact},
     ui::{ViewContext, widgets::text::clock},
 };
 
@@ -13,21 +13,21 @@ const ASKED_MAX: u8 = 2;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConfirmedValue {
     tag: TagId,
-    value: Option<f64>,
+    value: Option<Exact>,
     /// What stood there before the last change that was noticed, and how often one was.
-    before: Option<f64>,
+    before: Option<Exact>,
     asked: u8,
 }
 
 impl ConfirmedValue {
     /// The tag as it stands.
     pub fn new(cx: &ViewContext, tag: TagId) -> ConfirmedValue {
-        ConfirmedValue { tag, value: cx.snapshot.sample(tag).value, before: None, asked: 0 }
+        ConfirmedValue { tag, value: cx.snapshot.sample(tag).exact(), before: None, asked: 0 }
     }
 
     /// Is it another value than was seen? Then that is what was seen from now on, and its author should be asked again.
     pub fn changed(&mut self, cx: &ViewContext) -> bool {
-        let now = cx.snapshot.sample(self.tag).good_value();
+        let now = cx.snapshot.sample(self.tag).good_exact();
         // What has become unknown is not another value: the window shows it, and the station writes over it.
         if now.is_none() || now == self.value || self.asked >= ASKED_MAX {
             return false;
@@ -39,14 +39,14 @@ impl ConfirmedValue {
 
     /// The value that a write confirmed now is meant to replace: the one that was shown, also where it is in doubt or gone
     /// by now; the present one where it moves by itself.
-    pub fn shown(&self, cx: &ViewContext) -> Option<f64> {
-        let now = cx.snapshot.sample(self.tag).value;
+    pub fn shown(&self, cx: &ViewContext) -> Option<Exact> {
+        let now = cx.snapshot.sample(self.tag).exact();
         if self.asked < ASKED_MAX { self.value.or(now) } else { now.or(self.value) }
     }
 
     /// The note about a change since the window opened; `None` while the value is unchanged.
     pub fn news(&self, cx: &ViewContext) -> Option<String> {
-        let now = cx.snapshot.sample(self.tag).good_value();
+        let now = cx.snapshot.sample(self.tag).good_exact();
         let other = now.is_some() && now != self.value && self.asked < ASKED_MAX;
         match (other, self.asked) {
             (true, _) => Some(t!("{words}; ⏎ asks again", words = self.words(cx, self.value, now))),
@@ -56,9 +56,9 @@ impl ConfirmedValue {
     }
 
     /// `changed to 65.0 °C by anna 14:02:31 (was 70.0)`.
-    fn words(&self, cx: &ViewContext, before: Option<f64>, now: Option<f64>) -> String {
+    fn words(&self, cx: &ViewContext, before: Option<Exact>, now: Option<Exact>) -> String {
         let text =
-            |value: Option<f64>| value.map_or(t!("unknown").to_owned(), |value| cx.snapshot.format(self.tag, value));
+            |value: Option<Exact>| value.map_or(t!("unknown").to_owned(), |value| cx.snapshot.format(self.tag, value));
         let unit = cx.snapshot.unit(self.tag);
         let by = cx.snapshot.commands.iter().find(|status| {
             status.outcome == Outcome::Verified

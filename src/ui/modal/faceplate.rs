@@ -59,7 +59,7 @@ impl Faceplate {
             _ if cx.is_past() => {}
             (Some((tag, value)), _) => {
                 let words = format!("{} {}", cx.snapshot.format(tag, value), cx.def().tag(self.tag()).short);
-                let role = right::needs(cx.def(), &CommandKind::Write { tag, value });
+                let role = right::needs(cx.def(), &CommandKind::Write { tag, value: value.into() });
                 hints.insert(0, Hint::in_window("t", &words).needs(role));
             }
             (None, Some(tag)) if tag != self.tag() => {
@@ -109,7 +109,7 @@ impl Faceplate {
             return Some(Modal::Notice(notice));
         }
         let Some((command, value)) = self.toggle(cx) else { return Modal::write(cx, actuator.command) };
-        let refused = interlock::is_refused(cx, command, value);
+        let refused = interlock::is_refused(cx, command, value.into());
         let missing = interlock::unmet(cx, actuator).filter(|(need, _)| {
             // An unknown state is no reason to write.
             cx.def().tag(*need).writable() && cx.snapshot.sample(*need).good_value().is_some() && !refused

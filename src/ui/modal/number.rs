@@ -6,6 +6,8 @@ use crate::{
     plant::{
         command::CommandKind,
         def::{Condition, Level, Subject, TagId},
+        exact::Exact,
+        number::digits,
         scale,
     },
     text::translate,
@@ -21,7 +23,7 @@ pub fn is_numeric(c: char) -> bool {
 }
 
 /// The number that is meant if it can be written; else what is wrong with it. Courtesy: the station checks again.
-pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
+pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<Exact, String> {
     let text = text.trim();
     if text.is_empty() {
         return Err(t!("enter a number").to_owned());
@@ -42,7 +44,7 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
             stepped(cx, tag, by).ok_or(t!("the current value is unknown: enter the new value without a sign"))?
         }
     };
-    let Some((min, max)) = cx.snapshot.range(tag) else { return Ok(value) };
+    let Some((min, max)) = cx.snapshot.bounds(tag) else { return Ok(value) };
     let inside = |value| scale::is_inside(Some(min), Some(max), value);
     let rounded = cx.snapshot.rounded_to_device(tag, value);
     match (inside(value), inside(rounded)) {
@@ -60,7 +62,7 @@ pub fn check(cx: &ViewContext, tag: TagId, text: &str) -> Result<f64, String> {
 pub fn relative_text(cx: &ViewContext, tag: TagId, text: &str) -> Option<String> {
     let (Number::Step(by), _) = parse(text.trim())? else { return None };
     let text = |value| cx.snapshot.format(tag, value);
-    Some(format!("{} → {}", text(cx.snapshot.sample(tag).good_value()?), text(stepped(cx, tag, by)?)))
+    Some(format!("{} → {}", text(cx.snapshot.sample(tag).good_exact()?), text(stepped(cx, tag, by)?)))
 }
 
 /// How to type a change.
@@ -72,7 +74,7 @@ pub fn help(cx: &ViewContext, tag: TagId) -> String {
 }
 
 /// Is a number for this tag asked again in a window of its own? A tag with reauthentication is.
-pub fn needs_confirmation(cx: &ViewContext, tag: TagId, value: f64) -> bool {
+pub fn needs_confirmation(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
     cx.def().tag(tag).confirm.is_some()
         || reauthentication::required(cx.def(), &CommandKind::Write { tag, value }).is_some()
         || rounded_text(cx, tag, value).is_some()
@@ -80,11 +82,12 @@ pub fn needs_confirmation(cx: &ViewContext, tag: TagId, value: f64) -> bool {
 }
 
 /// `72.3 → the resolution of the device is 0.5: 72.5`; `None` where it holds what was typed.
-pub fn rounded_text(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> {
+pub fn rounded_text(cx: &ViewContext, tag: TagId, value: Exact) -> Option<String> {
     let rounded = cx.snapshot.rounded_to_device(tag, value);
     // A single-precision register is as good as exact.
-    let same = (rounded - value).abs() <= 1e-6 * value.abs().max(1.0);
-    let step = plain(cx.snapshot.step(tag));
+    let apart = (rounded - value).near().abs();
+    let same = if value.rest().is_some() { rounded == value } else { apart <= 1e-6 * value.near().abs().max(1.0) };
+    let step = plain(cx.snapshot.step(tag).into());
     (!same).then(|| {
         t!(
             "{format} → the resolution of the device is {step}: {plain}",
@@ -96,11 +99,11 @@ pub fn rounded_text(cx: &ViewContext, tag: TagId, value: f64) -> Option<String> 
 }
 
 /// Why a number that is allowed may still not be what its author meant.
-pub fn warnings(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
+pub fn warnings(cx: &ViewContext, tag: TagId, value: Exact) -> Vec<String> {
     let text =
-        |value: f64| format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)).trim_end().to_owned();
-    let step = cx.snapshot.sample(tag).value.map(|now| (value - now).abs());
-    let share = step.zip(cx.snapshot.range(tag)).map(|(step, (min, max))| (step, step / (max - min)));
+        |value: Exact| format!("{} {}", cx.snapshot.format(tag, value), cx.snapshot.unit(tag)).trim_end().to_owned();
+    let step = cx.snapshot.sample(tag).exact().map(|now| (value - now).abs());
+    let share = step.zip(cx.snapshot.range(tag)).map(|(step, (min, max))| (step, step.near() / (max - min)));
     let large = share.filter(|(_, share)| STEP_MAX < *share);
     let large = large.map(|(step, share)| {
         t!("! a change of {text}, {share} % of the range", text = text(step), share = format!("{:.0}", share * 100.0))
@@ -111,8 +114,8 @@ pub fn warnings(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     let limits = alarms.filter_map(|alarm| {
         let Condition::Limit { level, limit, .. } = alarm.condition else { return None };
         let beyond = match level {
-            Level::High | Level::HighHigh => value - limit,
-            Level::Low | Level::LowLow => limit - value,
+            Level::High | Level::HighHigh => (value - limit.into()).near(),
+            Level::Low | Level::LowLow => (Exact::from(limit) - value).near(),
         };
         let place = if beyond > 0.0 { t!("beyond") } else { t!("at") };
         (beyond >= 0.0).then(|| {
@@ -121,7 +124,7 @@ pub fn warnings(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
                 place,
                 subject = subject(cx, alarm.id),
                 message = translate(&alarm.message),
-                text = text(limit)
+                text = text(limit.into())
             )
         })
     });
@@ -134,7 +137,7 @@ pub fn range_text(cx: &ViewContext, tag: TagId) -> String {
     if !labels.is_empty() {
         return t!("range one of {count}", count = labels.len());
     }
-    match cx.snapshot.range(tag) {
+    match cx.snapshot.bounds(tag) {
         Some((min, max)) => {
             let unit = cx.snapshot.unit(tag);
             t!(
@@ -151,24 +154,24 @@ pub fn range_text(cx: &ViewContext, tag: TagId) -> String {
 }
 
 /// The present value and a step from it.
-fn stepped(cx: &ViewContext, tag: TagId, by: f64) -> Option<f64> {
-    let now = cx.snapshot.sample(tag).good_value()?;
+fn stepped(cx: &ViewContext, tag: TagId, by: Exact) -> Option<Exact> {
+    let now = cx.snapshot.sample(tag).good_exact()?;
     // As many decimals as are shown: 0.1 + 0.2 is 0.3.
-    format!("{:.*}", usize::from(cx.snapshot.decimals[tag.index()]), now + by).parse().ok()
+    digits(now + by, Some(cx.snapshot.decimals[tag.index()])).parse().ok()
 }
 
 /// With as many decimals as it has.
-fn plain(value: f64) -> String {
-    format!("{}", (value * 1e9).round() / 1e9)
+fn plain(value: Exact) -> String {
+    value.rest().map_or_else(|| format!("{}", (value.near() * 1e9).round() / 1e9), |_| value.to_string())
 }
 
 /// What was typed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Number {
     /// A new value.
-    Absolute(f64),
+    Absolute(Exact),
     /// A change of the present one.
-    Step(f64),
+    Step(Exact),
 }
 
 /// A number and its decimals: digits and one decimal mark, a point or a comma. A sign before it makes it a step; `=` makes
@@ -200,7 +203,7 @@ mod tests {
     };
 
     fn checked(fixture: &Fixture, text: &str) -> Result<f64, String> {
-        with_cx(&fixture.snapshot(), |cx| check(cx, fixture.tag("TIC-1.SV"), text))
+        with_cx(&fixture.snapshot(), |cx| check(cx, fixture.tag("TIC-1.SV"), text)).map(Exact::near)
     }
 
     #[test]
@@ -250,7 +253,7 @@ mod tests {
         let mut fixture = Fixture::normal();
         let sv = fixture.tag("TIC-1.SV");
         let def = &mut fixture.def.tags[sv.index()];
-        (def.scale, def.max) = (0.5, Some(Bound::Fixed(99.8)));
+        (def.scale, def.max) = (0.5, Some(Bound::Fixed(99.8.into())));
         let why = "the device would store 100, outside range 0.0 … 99.8 °C";
         assert_eq!(checked(&fixture, "99.8"), Err(why.to_owned()));
         assert_eq!(checked(&fixture, "99.7"), Ok(99.7));
@@ -261,6 +264,7 @@ mod tests {
         let fixture = Fixture::normal();
         let sv = fixture.tag("TIC-1.SV");
         let asked = |value: f64| {
+            let value = value.into();
             with_cx(&fixture.snapshot(), |cx| (needs_confirmation(cx, sv, value), warnings(cx, sv, value)))
         };
         assert_eq!(asked(65.0), (false, Vec::new()));

@@ -75,7 +75,9 @@ impl TabView for Mimic {
         let commands = commands.map(|command| {
             Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label)).needs(
                 match command.value {
-                    Some(value) => right::needs(cx.def(), &CommandKind::Write { tag: command.tag, value }),
+                    Some(value) => {
+                        right::needs(cx.def(), &CommandKind::Write { tag: command.tag, value: value.into() })
+                    }
                     None => rights::to_write(cx, [command.tag]),
                 },
             )

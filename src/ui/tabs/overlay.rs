@@ -213,7 +213,7 @@ impl Overlay {
         }
         let lasted = format!("{:.1}", laid.until(cx.now).duration_since(laid.from).as_secs_f64() / 60.0);
         let series = curve.value.iter().flatten().next();
-        let value = |value: Option<f64>| value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
+        let value = |value: Option<Exact>| value.map_or("–".to_owned(), |value| cx.snapshot.format(tag, value));
         let summary = series.and_then(|series| series.summary);
         let good = series.map_or("–".to_owned(), |series| format!("{:.1} %", (series.good * 1_000.0).floor() / 10.0));
         let [min, mean, max] = match summary {

@@ -21,7 +21,8 @@ pub(super) use crate::{
     plant::{
         command::CommandKind,
         def::{DeviceDef, DeviceId, LineDef, LineId, ProcedureId, TagId},
-        number::to_u16,
+        exact::Exact,
+        number::{digits, to_u16},
         role::Role,
         snapshot::{DeviceState, Snapshot},
         time::elapsed,

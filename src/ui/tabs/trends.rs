@@ -142,7 +142,7 @@ enum Asking {
     Overlay,
 }
 
-type Figures = (Option<(f64, f64, f64)>, f64);
+type Figures = (Option<(Exact, Exact, Exact)>, f64);
 
 impl TabView for Trends {
     fn new(_snapshot: &Snapshot) -> Trends {

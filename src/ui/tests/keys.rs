@@ -109,7 +109,7 @@ fn a_toggle_is_asked_and_does_what_it_said() {
     assert_eq!(type_keys(&mut model, "⏎"), []);
     assert!(screen(&mut model, 80, 24).contains("changed to STOP (was RUN)"));
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0.into() }));
 }
 
 #[test]
@@ -189,7 +189,7 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
         message: "temperature high".into(),
         priority: Priority::High,
         event: step,
-        value: Some(72.1),
+        value: Some(72.1.into()),
         limit: Some(72.0),
         by: by.map(Arc::from),
         reason: None,
@@ -252,7 +252,7 @@ fn the_outcome_of_a_command_stays_until_dismissed() {
         };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         snapshot.commands = vec![CommandStatus {
-            old: Some(70.0),
+            old: Some(70.0.into()),
             outcome,
             ..CommandStatus::new(Command::new(0, id, kind), "tech1", snapshot.at)
         }];
@@ -268,7 +268,7 @@ fn the_outcome_of_a_command_stays_until_dismissed() {
     check(Outcome::Verified, "TIC-1.SV 70.0 → 60.0 °C  verified 14:02:31");
     check(Outcome::Unchanged, "unchanged, nothing written");
     check(Outcome::Refused(Refusal::ReadOnly), "REFUSED: read only");
-    check(Outcome::NotConfirmed(NotConfirmed::Different(65.0)), "NOT CONFIRMED: read back 65");
+    check(Outcome::NotConfirmed(NotConfirmed::Different(65.0.into())), "NOT CONFIRMED: read back 65");
     check(Outcome::NotConfirmed(NotConfirmed::NoReadBack), "accepted (cannot be read back)");
     check(Outcome::Failed(Fault::Timeout), "FAILED, may have taken effect");
 }
@@ -308,7 +308,7 @@ fn a_good_outcome_goes_after_a_minute_and_a_bad_one_stays() {
         };
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
         let status = CommandStatus {
-            old: Some(70.0),
+            old: Some(70.0.into()),
             outcome,
             ..CommandStatus::new(Command::new(0, id, kind), "tech1", snapshot.at)
         };

@@ -27,9 +27,16 @@ fn climbing(model: &Model, query: &Query) -> Vec<Series> {
             let share = n as f64 / *buckets as f64;
             last * (1.0 - 0.6 * (-6.0 * share).exp()) + 0.02 * last * (12.0 * share).sin()
         };
-        let bucket = |n| Bucket { min: value(n), max: value(n), mean: value(n), last: value(n) };
+        let bucket = |n| Bucket { min: value(n), max: value(n), mean: value(n), last: value(n).into() };
         let buckets = (0..*buckets).map(|n| Some(bucket(n))).collect();
-        Some(Series { tag, from: *from, step, buckets, summary: Some((0.4 * last, 0.9 * last, last)), good: 1.0 })
+        Some(Series {
+            tag,
+            from: *from,
+            step,
+            buckets,
+            summary: Some(((0.4 * last).into(), (0.9 * last).into(), last.into())),
+            good: 1.0,
+        })
     };
     tags.iter().filter_map(|tag| curve(*tag)).collect()
 }

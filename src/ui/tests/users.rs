@@ -157,7 +157,7 @@ fn work_waits_while_the_terminal_is_locked() {
     assert_eq!(model.tabs.shown, Tab::Mimic);
     shows(&mut model, "new 65");
     let effects = type_keys(&mut model, ".5⏎");
-    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5.into() }));
 }
 
 #[test]
@@ -218,7 +218,7 @@ fn a_tag_with_reauthentication_gets_credentials() {
     assert_eq!(sent(Reauthentication::Password, "s65⏎⏎"), None, "without the password");
     let (command, sign) = sent(Reauthentication::Password, "s65⏎yes n q⏎").expect("a command");
     let sign = sign.expect("a credentials");
-    assert_eq!((sign.user, sign.password, command.expected_value), (None, "yes n q".into(), Some(70.0)));
+    assert_eq!((sign.user, sign.password, command.expected_value), (None, "yes n q".into(), Some(70.0.into())));
     let sign =
         sent(Reauthentication::SecondUser, "s65⏎boris⏎horse⏎").and_then(|(_, sign)| sign).expect("a credentials");
     assert_eq!((sign.user.as_deref(), sign.password), (Some("boris"), "horse".into()));
@@ -237,13 +237,13 @@ fn a_value_that_changes_under_a_window_is_confirmed_again() {
     later.set("TIC-1.SV", 65.0);
     let mut snapshot = later.snapshot();
     Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
-        old: Some(70.0),
+        old: Some(70.0.into()),
         outcome: Outcome::Verified,
         ..CommandStatus::new(
             Command::new(
                 0,
                 CommandId { terminal: 2, number: 1 },
-                CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0 },
+                CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0.into() },
             ),
             "anna",
             fixture::now(),
@@ -255,7 +255,7 @@ fn a_value_that_changes_under_a_window_is_confirmed_again() {
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), None);
     let effects = type_keys(&mut model, "⏎");
     let Some(Effect::Command(command, _)) = effects.first() else { panic!("no command: {effects:?}") };
-    assert_eq!(command.expected_value, Some(65.0), "what was seen when it was confirmed");
+    assert_eq!(command.expected_value, Some(65.0.into()), "what was seen when it was confirmed");
 }
 
 fn supervisor() -> SessionStatus {

@@ -68,7 +68,7 @@ mod tests {
     const GAP: f64 = f64::NAN;
 
     fn check(values: &[f64], cells: usize, expect: &str, expect_ascii: &str) {
-        let bucket = |v: &f64| v.is_finite().then_some(Bucket { min: *v, max: *v, mean: *v, last: *v });
+        let bucket = |v: &f64| v.is_finite().then_some(Bucket { min: *v, max: *v, mean: *v, last: (*v).into() });
         let series = Series {
             tag: TagId(0),
             from: Timestamp::UNIX_EPOCH,

@@ -8,7 +8,7 @@ use super::text;
 use crate::{
     plant::{
         def::TagId,
-        number::to_u64,
+        exact::Exact,
         sample::{Cause, Quality},
         tag::Access,
     },
@@ -72,11 +72,12 @@ fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
     if def.is_text() {
         return cx.snapshot.text(tag);
     }
-    cx.snapshot.sample(tag).value.map(|value| number(cx, tag, value))
+    cx.snapshot.sample(tag).exact().map(|value| number(cx, tag, value))
 }
 
 /// A number of a tag in words: a state by its name, a status word as the names of its set bits.
-pub fn number(cx: &ViewContext, tag: TagId, value: f64) -> String {
+pub fn number(cx: &ViewContext, tag: TagId, value: impl Into<Exact>) -> String {
+    let value = value.into();
     let def = cx.def().tag(tag);
     if def.bit_labels.is_empty() {
         return cx.snapshot.format(tag, value);
@@ -84,7 +85,7 @@ pub fn number(cx: &ViewContext, tag: TagId, value: f64) -> String {
     let set: Vec<&str> = def
         .bit_labels
         .iter()
-        .filter(|(bit, _)| to_u64(value) >> (*bit).min(63) & 1 == 1)
+        .filter(|(bit, _)| value.bits() >> (*bit).min(63) & 1 == 1)
         .map(|(_, name)| name.as_str())
         .collect();
     if set.is_empty() { t!("none").to_owned() } else { set.join(", ") }

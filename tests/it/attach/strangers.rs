@@ -56,7 +56,7 @@ async fn a_command_of_another_terminal_or_unknown_tag_is_rejected() {
     };
     for (bytes, expected) in [
         (command(own + 1, CommandKind::Alarm(AlarmCommand::Silence)), "this is terminal"),
-        (command(own, CommandKind::Write { tag: TagId(u16::MAX), value: 1.0 }), "tag number 65535"),
+        (command(own, CommandKind::Write { tag: TagId(u16::MAX), value: 1.0.into() }), "tag number 65535"),
     ] {
         stream.write_all(&bytes).await.unwrap();
         let why = loop {

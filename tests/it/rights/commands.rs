@@ -83,9 +83,9 @@ pub fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
     };
     let (from, changes, table) = ("none".into(), Vec::new(), Table::Holding);
     let tag = |name: &str| def.tag_named(name).unwrap_or_else(|| panic!("no tag {name}"));
-    let settings = SET_UP.map(|name| CommandKind::Write { tag: tag(&format!("TIC-1.{name}")), value: 1.0 });
-    let operated = OPERATED[1..].iter().map(|name| CommandKind::Write { tag: tag(name), value: 0.0 });
-    let mut commands = vec![CommandKind::Write { tag: tag(OPERATED[0]), value: 60.0 + person as f64 }];
+    let settings = SET_UP.map(|name| CommandKind::Write { tag: tag(&format!("TIC-1.{name}")), value: 1.0.into() });
+    let operated = OPERATED[1..].iter().map(|name| CommandKind::Write { tag: tag(name), value: 0.0.into() });
+    let mut commands = vec![CommandKind::Write { tag: tag(OPERATED[0]), value: (60.0 + person as f64).into() }];
     commands.extend(operated.chain(settings));
     commands.extend([
         CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, annunciated_at: at }),

@@ -63,7 +63,7 @@ fn a_stop_is_never_one_request_too_many() {
         bench.send_command(1, RUN, None);
     }
     assert!(bench.send_command(1, RUN, None).is_none());
-    let off = CommandKind::Write { tag: fixture::RUN, value: 0.0 };
+    let off = CommandKind::Write { tag: fixture::RUN, value: 0.0.into() };
     assert_eq!(bench.send_command(1, off, None).unwrap().1, None);
 }
 

@@ -14,7 +14,7 @@ use crate::{
         late_reply::Proof,
         plan::Block,
     },
-    plant::{event::Fault, number::to_u16, tag::TagDef},
+    plant::{event::Fault, exact::Exact, number::to_u16, tag::TagDef},
 };
 
 /// What came in between may have shown that the unit sends what it was not asked for.
@@ -134,10 +134,10 @@ pub(super) fn text_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Optio
     }
 }
 
-pub(super) fn value_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Option<f64> {
+pub(super) fn value_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Option<Exact> {
     let start = usize::from(tag.point.address.checked_sub(block.address)?);
     match values {
-        ReadValues::Bits(bits) => bits.get(start).map(|bit| f64::from(u8::from(*bit))),
+        ReadValues::Bits(bits) => bits.get(start).map(|bit| f64::from(u8::from(*bit)).into()),
         ReadValues::Registers(words) => {
             codec::decode(tag.point, words.get(start..start + usize::from(tag.point.len()))?)
         }

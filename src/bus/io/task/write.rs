@@ -16,6 +16,7 @@ use crate::{
         command::{BusRequest, WriteJob},
         def::{ActionDef, DeviceDef},
         event::{Event, Fault, WriteResult},
+        exact::Exact,
         number::to_u16,
         scale,
         tag::{Table, TagDef},
@@ -134,7 +135,7 @@ impl Task<'_> {
         link: &mut Link,
         schedule: &mut Schedule,
         unlock_tag: &TagDef,
-        raw: f64,
+        raw: Exact,
         job: &WriteJob,
     ) -> Result<Unlocked, LinkExit> {
         // An unlock register of another device would be written to an address of this one.
@@ -168,7 +169,7 @@ impl Task<'_> {
         link: &mut Link,
         schedule: &mut Schedule,
         tag: &TagDef,
-        raw: f64,
+        raw: Exact,
         urgent: bool,
     ) -> Result<WriteResult, String> {
         let def = self.def.clone();
@@ -300,7 +301,7 @@ fn is_clear(link: &Link, device: &DeviceDef) -> bool {
 
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for
 /// a field of bits, 23 where the profile wants the new value in the response.
-fn write_request(tag: &TagDef, raw: f64) -> Option<Request<'static>> {
+fn write_request(tag: &TagDef, raw: Exact) -> Option<Request<'static>> {
     let address = tag.point.address;
     match tag.point.table {
         // A discrete input is written only where the profile names the function for it.
@@ -339,7 +340,7 @@ mod tests {
     /// The bytes of the request after the function code, as tokio-modbus would send them, by its own encoder.
     fn request(kind: DataType, field: Option<(u8, u8)>, write_fc: Option<u8>, raw: f64) -> Option<Request<'static>> {
         let point = Point { table: Table::Holding, address: 100, kind, order: ByteOrder::Abcd, field };
-        write_request(&TagDef { write_fc, ..TagDef::new(TagId(0), DeviceId(0), "D.T", point) }, raw)
+        write_request(&TagDef { write_fc, ..TagDef::new(TagId(0), DeviceId(0), "D.T", point) }, raw.into())
     }
 
     #[test]
@@ -361,12 +362,15 @@ mod tests {
     fn coils_are_written_one_by_one_by_default() {
         let point = Point { table: Table::Coil, address: 5, kind: DataType::Bool, order: ByteOrder::Abcd, field: None };
         let coil = TagDef::new(TagId(0), DeviceId(0), "D.C", point);
-        assert_eq!(write_request(&coil, 1.0), Some(Request::WriteSingleCoil(5, true)));
+        assert_eq!(write_request(&coil, Exact::plain(1.0)), Some(Request::WriteSingleCoil(5, true)));
         let fifteen = TagDef { write_fc: Some(15), ..coil };
-        assert_eq!(write_request(&fifteen, 0.0), Some(Request::WriteMultipleCoils(5, Cow::Owned(vec![false]))));
+        assert_eq!(
+            write_request(&fifteen, Exact::plain(0.0)),
+            Some(Request::WriteMultipleCoils(5, Cow::Owned(vec![false])))
+        );
         let input = TagDef { point: Point { table: Table::Discrete, ..point }, write_fc: None, ..fifteen };
-        assert_eq!(write_request(&input, 1.0), None);
+        assert_eq!(write_request(&input, Exact::plain(1.0)), None);
         let five = TagDef { write_fc: Some(5), ..input };
-        assert_eq!(write_request(&five, 1.0), Some(Request::WriteSingleCoil(5, true)));
+        assert_eq!(write_request(&five, Exact::plain(1.0)), Some(Request::WriteSingleCoil(5, true)));
     }
 }

@@ -109,7 +109,7 @@ async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, Diagn
     let stop = BusRequest::Write(WriteJob {
         id: WriteId(1),
         tag: TagId(0),
-        raw: 10.0,
+        raw: 10.0.into(),
         unlock: None,
         verify: true,
         urgent: true,
@@ -132,7 +132,7 @@ async fn a_stop_cuts_a_scan_short_and_goes_out_at_once() {
     for serials in [Vec::new(), vec![other]] {
         let words = format!("{serials:?}");
         let (after, result, state) = stop_during_scan(serials).await;
-        assert_eq!(result, WriteResult::ReadBack(10.0), "{words}");
+        assert_eq!(result, WriteResult::ReadBack(10.0.into()), "{words}");
         assert!(after < 200 * MS, "{words}: after {after:?}");
         assert_eq!(state, DiagnosticState::Failed("cancelled by an urgent stop".into()), "{words}");
     }
@@ -172,7 +172,7 @@ async fn a_usual_write_waits_for_the_step_of_a_test() {
     let write = BusRequest::Write(WriteJob {
         id: WriteId(1),
         tag: TagId(0),
-        raw: 10.0,
+        raw: 10.0.into(),
         unlock: None,
         verify: true,
         urgent: false,
@@ -187,6 +187,6 @@ async fn a_usual_write_waits_for_the_step_of_a_test() {
         Event::Wrote { result, .. } => Some(result.clone()),
         _ => None,
     };
-    assert_eq!(line.until(&def, ended).await, WriteResult::ReadBack(10.0));
+    assert_eq!(line.until(&def, ended).await, WriteResult::ReadBack(10.0.into()));
     assert_eq!(done, Some(DiagnosticState::Done));
 }

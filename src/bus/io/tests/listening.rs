@@ -104,7 +104,7 @@ async fn what_is_heard_is_a_value_and_nothing_is_ever_sent() {
             BusRequest::Write(WriteJob {
                 id: WriteId(1),
                 tag: FIRST,
-                raw: 1.0,
+                raw: 1.0.into(),
                 unlock: None,
                 verify: true,
                 urgent: true,

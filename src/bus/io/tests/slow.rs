@@ -184,7 +184,7 @@ fn take(came: &mut Seen, event: &Event, born: Duration) {
             let sent = exchange.at.duration_since(Timestamp::UNIX_EPOCH)
                 + SignedDuration::try_from(born).expect("a time of the test");
             for (_, raw) in values {
-                let held = SignedDuration::from_millis(*raw as i64 * STEP.as_millis() as i64);
+                let held = SignedDuration::from_millis(raw.near() as i64 * STEP.as_millis() as i64);
                 if let Ok(older) = Duration::try_from(sent - held)
                     && TOLERANCE < older
                 {

@@ -21,7 +21,7 @@ use crate::plant::{
 const FIRST_OF: [TagId; 2] = [TagId(0), TagId(10)];
 
 fn write(id: u64, tag: TagId, urgent: bool) -> BusRequest {
-    BusRequest::Write(WriteJob { id: WriteId(id), tag, raw: 10.0, unlock: None, verify: true, urgent })
+    BusRequest::Write(WriteJob { id: WriteId(id), tag, raw: 10.0.into(), unlock: None, verify: true, urgent })
 }
 
 async fn end_of(line: &mut Line, def: &crate::plant::PlantDef, id: u64) -> WriteResult {
@@ -56,7 +56,8 @@ async fn a_stop_is_sent_to_a_device_that_is_given_up() {
             line.requests.send(write(1, FIRST_OF[0], false)).await.expect("the line runs");
             assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::NotSent(Fault::BackedOff), "{mode:?}");
             line.requests.send(write(2, FIRST_OF[0], true)).await.expect("the line runs");
-            let expect = if hears { WriteResult::ReadBack(10.0) } else { WriteResult::NoValidResponse(Fault::Timeout) };
+            let expect =
+                if hears { WriteResult::ReadBack(10.0.into()) } else { WriteResult::NoValidResponse(Fault::Timeout) };
             assert_eq!(end_of(&mut line, &def, 2).await, expect, "{mode:?}");
             assert_eq!(*writes.lock().expect("no panic"), 1, "{mode:?}: sent once");
         }
@@ -92,7 +93,7 @@ async fn a_stop_is_not_held_by_a_poll_that_is_not_answered() {
         // Nor by what was asked for before.
         line.requests.send(BusRequest::StopTest).await.expect("the line runs");
         line.requests.send(write(1, FIRST_OF[1], true)).await.expect("the line runs");
-        assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::ReadBack(10.0), "{mode:?}");
+        assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::ReadBack(10.0.into()), "{mode:?}");
         let waited = stops.lock().expect("no panic")[0] - sent_at;
         assert!(waited < 600 * MS, "{mode:?}: {waited:?}");
         // What was cut short is read later, and nothing of it lands elsewhere: every value is checked.
@@ -115,11 +116,11 @@ async fn a_stop_is_not_held_by_a_write_that_is_not_answered() {
         until_silent(&mut line, &def).await;
         let sent_at = Instant::now();
         line.requests.send(write(2, FIRST_OF[1], true)).await.expect("the line runs");
-        assert_eq!(end_of(&mut line, &def, 2).await, WriteResult::ReadBack(10.0), "{mode:?}");
+        assert_eq!(end_of(&mut line, &def, 2).await, WriteResult::ReadBack(10.0.into()), "{mode:?}");
         let waited = stops.lock().expect("no panic")[0] - sent_at;
         assert!(waited < 600 * MS, "{mode:?}: {waited:?}");
         silent.store(false, Ordering::Relaxed);
-        assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::ReadBackAfterNoResponse(10.0), "{mode:?}");
+        assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::ReadBackAfterNoResponse(10.0.into()), "{mode:?}");
     }
 }
 
@@ -147,6 +148,6 @@ async fn a_start_is_not_compared_with_what_a_stop_has_left() {
         line.until(&def, is_lost).await;
         line.requests.send(write(2, FIRST_OF[0], true)).await.expect("the line runs");
         assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::NoValidResponse(Fault::Timeout), "{mode:?}");
-        assert_eq!(end_of(&mut line, &def, 2).await, WriteResult::ReadBack(10.0), "{mode:?}");
+        assert_eq!(end_of(&mut line, &def, 2).await, WriteResult::ReadBack(10.0.into()), "{mode:?}");
     }
 }

@@ -82,15 +82,21 @@ async fn no_value_that_was_read_before_a_write_is_reported_after_it() {
     line.until(&def, |event| matches!(event, Event::Read { at, .. } if seconds < *at).then_some(())).await;
     for number in 0..20 {
         let id = WriteId(number);
-        let request =
-            BusRequest::Write(WriteJob { id, tag: TagId(10), raw: 10.0, unlock: None, verify: true, urgent: false });
+        let request = BusRequest::Write(WriteJob {
+            id,
+            tag: TagId(10),
+            raw: 10.0.into(),
+            unlock: None,
+            verify: true,
+            urgent: false,
+        });
         line.requests.send(request).await.expect("the line runs");
         let wrote = |event: &Event| match event {
             Event::Wrote { at, id: done, result } if *done == id => Some((*at, result.clone())),
             _ => None,
         };
         let (wrote_at, result) = line.until(&def, wrote).await;
-        assert_eq!(result, WriteResult::ReadBack(10.0));
+        assert_eq!(result, WriteResult::ReadBack(10.0.into()));
         for _ in 0..6 {
             let Event::Read { device: DeviceId(1), exchange: Some(exchange), .. } = line.next(&def).await else {
                 continue;
@@ -121,7 +127,7 @@ async fn a_stop_does_not_wait_for_the_answers_of_other_units() {
     let request = BusRequest::Write(WriteJob {
         id: WriteId(1),
         tag: TagId(10),
-        raw: 10.0,
+        raw: 10.0.into(),
         unlock: None,
         verify: false,
         urgent: true,
@@ -148,7 +154,7 @@ async fn the_gap_of_a_unit_after_a_write_does_not_hold_the_others() {
         let request = BusRequest::Write(WriteJob {
             id: WriteId(1),
             tag: TagId(0),
-            raw: 10.0,
+            raw: 10.0.into(),
             unlock: None,
             verify: false,
             urgent: false,

@@ -19,7 +19,7 @@ async fn write(action: SlaveAction, read_back: SlaveAction) -> (WriteResult, usi
     let request = BusRequest::Write(WriteJob {
         id: WriteId(7),
         tag: TagId(0),
-        raw: 10.0,
+        raw: 10.0.into(),
         unlock: None,
         verify: true,
         urgent: false,
@@ -40,15 +40,15 @@ async fn write(action: SlaveAction, read_back: SlaveAction) -> (WriteResult, usi
 #[tokio::test(start_paused = true)]
 async fn a_write_is_sent_once_whatever_happens() {
     for (action, read_back, expect) in [
-        (SlaveAction::Answer, SlaveAction::Answer, WriteResult::ReadBack(10.0)),
+        (SlaveAction::Answer, SlaveAction::Answer, WriteResult::ReadBack(10.0.into())),
         (SlaveAction::Exception(3), SlaveAction::Answer, WriteResult::Refused(ExceptionCode(3))),
-        (SlaveAction::Silent, SlaveAction::Answer, WriteResult::ReadBackAfterNoResponse(10.0)),
+        (SlaveAction::Silent, SlaveAction::Answer, WriteResult::ReadBackAfterNoResponse(10.0.into())),
         (SlaveAction::Silent, SlaveAction::Silent, WriteResult::NoValidResponse(Fault::Timeout)),
         (SlaveAction::Answer, SlaveAction::Silent, WriteResult::NotRead(Fault::Timeout)),
         (
             SlaveAction::Instead(vec![1, 6, 0, 10, 0, 11]),
             SlaveAction::Answer,
-            WriteResult::ReadBackAfterNoResponse(10.0),
+            WriteResult::ReadBackAfterNoResponse(10.0.into()),
         ),
     ] {
         assert_eq!(write(action.clone(), read_back).await, (expect, 1), "{action:?}");
@@ -92,7 +92,7 @@ async fn a_broadcast_is_sent_once_and_never_called_verified() {
             });
             line.read(&def).await;
             let job =
-                WriteJob { id: WriteId(1), tag: TagId(0), raw: 1.0, unlock: None, verify: false, urgent: false };
+                WriteJob { id: WriteId(1), tag: TagId(0), raw: 1.0.into(), unlock: None, verify: false, urgent: false };
             line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
             let result = line
                 .until(&def, |event| match event {
@@ -125,7 +125,7 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
         let request = BusRequest::Write(WriteJob {
             id: WriteId(id),
             tag: TagId(tag),
-            raw: 10.0,
+            raw: 10.0.into(),
             unlock: None,
             verify: true,
             urgent: false,
@@ -134,7 +134,10 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
     }
     for (id, expect) in
         // Read once the unit is in sync: what the device holds, not what an answer to another write says.
-        [(1, WriteResult::ReadBackAfterNoResponse(10.0)), (2, WriteResult::ReadBackAfterNoResponse(11.0))]
+        [
+            (1, WriteResult::ReadBackAfterNoResponse(10.0.into())),
+            (2, WriteResult::ReadBackAfterNoResponse(11.0.into())),
+        ]
     {
         let result = line
             .until(&def, |event| match event {
@@ -164,11 +167,11 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
         BusRequest::Write(WriteJob { id: WriteId(id), tag: TagId(tag), raw, unlock: None, verify: true, urgent })
     };
     for tag in 0..4u16 {
-        line.requests.send(write(u64::from(tag), tag, 1.0, false)).await.expect("the line runs");
+        line.requests.send(write(u64::from(tag), tag, 1.0.into(), false)).await.expect("the line runs");
     }
     line.until(&def, |event| matches!(event, Event::Wrote { id: WriteId(3), .. }).then_some(())).await;
-    line.requests.send(write(4, 4, 1.0, false)).await.expect("the line runs");
-    line.requests.send(write(5, 4, 0.0, true)).await.expect("the line runs");
+    line.requests.send(write(4, 4, 1.0.into(), false)).await.expect("the line runs");
+    line.requests.send(write(5, 4, 0.0.into(), true)).await.expect("the line runs");
     let before = heard.lock().expect("no panic").len();
     let mut results = Vec::new();
     while results.len() < 2 {
@@ -178,7 +181,7 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
         };
         results.push(line.until(&def, ended).await);
     }
-    assert_eq!(results, [(4, WriteResult::Superseded), (5, WriteResult::ReadBack(20.0))]);
+    assert_eq!(results, [(4, WriteResult::Superseded), (5, WriteResult::ReadBack(20.0.into()))]);
     let heard = heard.lock().expect("no panic").clone();
     let stop = heard.iter().position(|message| *message == [1, 6, 0, 20, 0, 0]).expect("sent");
     assert!(stop <= before + 1, "{} requests went before the stop: {:?}", stop - before, &heard[before..]);
@@ -201,8 +204,8 @@ async fn an_unlock_is_reported_and_read_again_after_a_refusal() {
         _ => None,
     };
     line.until(&def, holds).await;
-    let (id, unlock) = (WriteId(1), Some((unlock_tag, 1.0)));
-    let request = BusRequest::Write(WriteJob { id, tag: value, raw: 7.0, unlock, verify: true, urgent: false });
+    let (id, unlock) = (WriteId(1), Some((unlock_tag, 1.0.into())));
+    let request = BusRequest::Write(WriteJob { id, tag: value, raw: 7.0.into(), unlock, verify: true, urgent: false });
     line.requests.send(request).await.expect("the line runs");
     let is_result = |event: &Event| match event {
         Event::Unlocked { unlock_tag, result, .. } => Some((Some(*unlock_tag), result.clone())),
@@ -228,7 +231,7 @@ async fn a_write_that_loses_the_port_counts_no_other_exchange() {
     });
     line.read(&def).await;
     let (id, tag) = (WriteId(1), TagId(10));
-    let request = BusRequest::Write(WriteJob { id, tag, raw: 10.0, unlock: None, verify: true, urgent: false });
+    let request = BusRequest::Write(WriteJob { id, tag, raw: 10.0.into(), unlock: None, verify: true, urgent: false });
     line.requests.send(request).await.expect("the line runs");
     let mut lost = false;
     loop {

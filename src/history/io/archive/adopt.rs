@@ -101,7 +101,7 @@ impl Store {
             let until = first(tier).map(|file| file.from).or_else(|| end(wider)).filter(|until| begin.from < *until);
             let Some(until) = until else { continue };
             if self.deleted_until(tier)?.is_none() {
-                let first = format!("SELECT min(utc) FROM {}", self.parquet(std::slice::from_ref(begin)));
+                let first = format!("SELECT min(utc) FROM {}", self.parquet(std::slice::from_ref(begin), false));
                 // One that cannot be read tells nothing of what was deleted.
                 let first: Option<i64> = self.db.query_row(&first, [], |row| row.get(0)).unwrap_or_default();
                 if first.is_some_and(|first| first < until) {
@@ -131,7 +131,7 @@ impl Store {
         let others = self.files(Some((tier, span.clone())))?;
         let superfluous = match (tier, others.as_slice()) {
             (Tier::Raw, []) => hot >= rows,
-            (Tier::Raw, others) => hot + count(&sql::count_rows_of(&self.parquet(others), &span))? >= rows,
+            (Tier::Raw, others) => hot + count(&sql::count_rows_of(&self.parquet(others, false), &span))? >= rows,
             // Formed again with the samples, or another file has the time.
             (Tier::Minute | Tier::Hour, others) => hot > 0 || !others.is_empty(),
         };
@@ -142,7 +142,8 @@ impl Store {
         tracing::warn!(path, rows, "a file of the archive that the database did not know is taken up");
         let (bytes, sha256) = sync_and_hash(&file).map_err(|error| wrong(&file, &error))?;
         let within = [span.start, span.end].map(|at| instant(at).map(utc));
-        let new = ArchiveFile { tier, path, from: span.start, to: span.end, rows, bytes, sha256 };
+        let rests = self.db.query_row(&sql::has_rests(&quoted(&file)), [], |row| row.get(0)).map_err(engine)?;
+        let new = ArchiveFile { tier, path, from: span.start, to: span.end, rows, bytes, sha256, rests };
         self.transaction(|| {
             self.enter_file(&new)?;
             if tier == Tier::Raw {

@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, ops::Range};
 
-use duckdb::params;
+use duckdb::{ToSql, params};
 
 use super::{NewFile, overlapping};
 use crate::{
@@ -14,7 +14,7 @@ use crate::{
         },
         tiers::{Aggregate, HOUR, Hours, Minutes, Tier},
     },
-    plant::sample::Sample,
+    plant::{exact::Exact, sample::Sample},
 };
 
 /// The aggregates of one tag under way.
@@ -32,8 +32,9 @@ impl Store {
         let deleted = self.deleted_until(Tier::Raw)?.is_some_and(|until| hour < until.as_microsecond());
         let replace = if deleted { sql::added } else { sql::others };
         let late = !deleted && !self.files(Some((Tier::Raw, span.clone())))?.is_empty();
-        let samples = sql::samples_of(&span);
-        let raw = self.write_file(Tier::Raw, span.clone(), &samples, "ORDER BY tag, utc, rowid")?;
+        let rests = self.any_rests(Tier::Raw, &span)?;
+        let samples = sql::samples_of(&span, rests);
+        let raw = self.write_file((Tier::Raw, rests), span.clone(), &samples, "ORDER BY tag, utc, rowid")?;
         let rows = raw.as_ref().map_or(0, |raw| raw.file.rows);
         // The first minutes of the next hour begin with values of this one.
         let formed = if late { hour..hour + 2 * HOUR } else { span.clone() };
@@ -69,9 +70,12 @@ impl Store {
         let mut append = |to: &mut duckdb::Appender, tag: u16, row: Aggregate| {
             let Aggregate { at, stats, first, gain, samples } = row;
             let (at, good_ms) = (instant(at).map(utc), (stats.seconds * 1_000.0).round());
-            let appended = to.append_row(params![
-                at, tag, stats.min, stats.max, stats.mean, first, stats.last, gain, good_ms, samples
-            ]);
+            let [min, max, first, last, gain] = [stats.min, stats.max, first, stats.last, gain];
+            let [least, most, began, ended, gained] = [min, max, first, last, gain].map(Exact::near);
+            let row = params![at, tag, least, most, stats.mean, began, ended, gained, good_ms, samples];
+            let rests = [min, max, first, last, gain].map(Exact::rest);
+            let rests: Vec<&dyn ToSql> = rests.iter().map(|rest| rest as &dyn ToSql).collect();
+            let appended = to.append_row(&*[row, &rests].concat());
             failed = failed.take().or(appended.err());
         };
         let mut tags: HashMap<u16, Forming> = HashMap::new();
@@ -107,19 +111,26 @@ impl Store {
         tier: Tier,
         formed: &Range<i64>,
         replaced: &[ArchiveFile],
-        replace: fn(Tier, &str, &Range<i64>) -> String,
+        replace: fn(Tier, &str, &Range<i64>, bool) -> String,
     ) -> Result<Vec<NewFile>, HistoryError> {
         let mut written = Vec::new();
         for file in replaced {
             let within = formed.start.max(file.from)..formed.end.min(file.to);
-            let others = replace(tier, &self.parquet(std::slice::from_ref(file)), &within);
-            let others = self.sorted(tier, &others)?;
-            written.extend(self.write_file(tier, file.from..file.to, &others, "")?);
+            let rests = file.rests || self.any_rests(tier, &within)?;
+            let others = replace(tier, &self.parquet(std::slice::from_ref(file), rests), &within, rests);
+            let others = self.sorted((tier, rests), &others)?;
+            written.extend(self.write_file((tier, rests), file.from..file.to, &others, "")?);
         }
         let hour = formed.start..formed.start + HOUR;
         if overlapping(replaced, &hour).is_empty() {
-            written.extend(self.write_file(tier, hour.clone(), &sql::formed(tier, &hour), "ORDER BY tag, utc")?);
+            let rests = self.any_rests(tier, &hour)?;
+            let rows = sql::formed(tier, &hour, rests);
+            written.extend(self.write_file((tier, rests), hour, &rows, "ORDER BY tag, utc")?);
         }
         Ok(written)
+    }
+
+    fn any_rests(&self, tier: Tier, span: &Range<i64>) -> Result<bool, HistoryError> {
+        self.db.query_row(&sql::any_rests(tier, span), [], |row| row.get(0)).map_err(engine)
     }
 }

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::NewFile;
+use super::{NewFile, any_rests, table};
 use crate::history::{
     ArchiveFile, HistoryError,
     io::{
@@ -24,38 +24,39 @@ impl Store {
     pub(super) fn merge_files(&self, tier: Tier, span: Range<i64>) -> Result<(), HistoryError> {
         let mut old = self.files(Some((tier, span.clone())))?;
         old.retain(|file| span.start <= file.from && file.to <= span.end);
+        let rests = any_rests(&old);
         let apart = old.windows(2).all(|pair| pair[0].to <= pair[1].from);
         let rows = match tier {
-            Tier::Minute | Tier::Hour => self.sorted(tier, &self.one_after_the_other(tier, &old))?,
-            Tier::Raw if apart => self.one_after_the_other(tier, &old),
-            Tier::Raw => self.hour_by_hour(&old, &span),
+            Tier::Minute | Tier::Hour => self.sorted((tier, rests), &self.one_after_the_other((tier, rests), &old))?,
+            Tier::Raw if apart => self.one_after_the_other((tier, rests), &old),
+            Tier::Raw => self.hour_by_hour(&old, &span, rests),
         };
-        let new = self.write_file(tier, span, &rows, "")?;
+        let new = self.write_file((tier, rests), span, &rows, "")?;
         let new: Vec<ArchiveFile> = new.map(NewFile::rename).transpose()?.into_iter().collect();
         self.enter(&new, &old, || Ok(()))?;
         self.remove_files(&old);
         Ok(())
     }
 
-    fn one_after_the_other(&self, tier: Tier, files: &[ArchiveFile]) -> String {
-        format!("SELECT {} FROM {}", sql::columns(tier), self.parquet(files))
+    fn one_after_the_other(&self, (tier, rests): (Tier, bool), files: &[ArchiveFile]) -> String {
+        format!("SELECT {} FROM {}", sql::columns(tier, rests), self.parquet(files, rests))
     }
 
-    fn hour_by_hour(&self, files: &[ArchiveFile], span: &Range<i64>) -> String {
+    fn hour_by_hour(&self, files: &[ArchiveFile], span: &Range<i64>, rests: bool) -> String {
         let first = files.iter().map(|file| file.from).min().map_or(span.start, |from| floor(from, HOUR));
         let hours =
             (first..span.end).step_by(usize::try_from(HOUR).unwrap_or(usize::MAX)).map(|hour| hour..hour + HOUR);
         let of = |hour: Range<i64>| {
             let files: Vec<ArchiveFile> =
                 files.iter().filter(|file| file.from < hour.end && hour.start < file.to).cloned().collect();
-            (!files.is_empty()).then(|| sql::hour_of(&self.parquet(&files), &hour))
+            (!files.is_empty()).then(|| sql::hour_of(&self.parquet(&files, rests), &hour, rests))
         };
         hours.filter_map(of).collect::<Vec<_>>().join(" UNION ALL ")
     }
 
     /// Rows of aggregates by tag and time, as a query: sorted part by part, because the engine has not the memory for all.
-    pub(super) fn sorted(&self, tier: Tier, rows: &str) -> Result<String, HistoryError> {
-        let columns = sql::columns(tier);
+    pub(super) fn sorted(&self, (tier, rests): (Tier, bool), rows: &str) -> Result<String, HistoryError> {
+        let columns = sql::columns(tier, rests);
         let count = format!("SELECT count(*), min(tag), max(tag) FROM ({rows})");
         let row = |row: &duckdb::Row| {
             Ok((row.get::<_, u64>(0)?, row.get::<_, Option<u64>>(1)?, row.get::<_, Option<u64>>(2)?))
@@ -78,10 +79,8 @@ impl Store {
         Ok(format!("SELECT {columns} FROM sorted"))
     }
 
-    /// Files as a table in SQL.
-    pub(in crate::history::io) fn parquet(&self, files: &[ArchiveFile]) -> String {
-        let folder = self.archive_folder();
-        let paths: Vec<String> = files.iter().map(|file| super::quoted(&folder.join(&file.path))).collect();
-        format!("read_parquet([{}])", paths.join(", "))
+    /// Files as a table in SQL, see [`table`].
+    pub(in crate::history::io) fn parquet(&self, files: &[ArchiveFile], rests: bool) -> String {
+        table(&self.archive_folder(), files, rests)
     }
 }

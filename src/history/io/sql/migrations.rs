@@ -10,6 +10,9 @@
 /// `last_commit` has one row: who the file is, how many commits it has, the first and last instant stored; each commit
 /// changes it. So a start need not scan the file, and sees what is missing, see `last`.
 ///
+/// `rest` is what the DOUBLE in `value` lacks of a number of more than 15 digits, NULL for all others: together they are
+/// what a 64-bit register holds. Of a file of the archive, `rests` says whether it has such columns.
+///
 /// `epoch` counts how often the clock was set while this history was written: rows of one epoch are in the order of their
 /// times, rows of two need not be.
 ///
@@ -26,7 +29,7 @@
 ///
 /// `archive` is the manifest of the files in the archive, see there; `watched` are windows of ten minutes, by their number
 /// since 1970, in which archived samples lie; `deleted` are the files that the rules of the plant have deleted.
-pub const MIGRATIONS: [&str; 14] = [
+pub const MIGRATIONS: [&str; 15] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -114,5 +117,10 @@ CREATE TABLE control_run (
     decimals UTINYINT NOT NULL, band DOUBLE NOT NULL, settings VARCHAR NOT NULL, settings_changed BOOLEAN NOT NULL,
     at_sv DOUBLE, steady DOUBLE, rise DOUBLE, overshoot DOUBLE, final_offset DOUBLE, iae DOUBLE NOT NULL, kwh DOUBLE,
     kwh_good DOUBLE, good DOUBLE NOT NULL, epoch USMALLINT NOT NULL);
+",
+    "
+ALTER TABLE sample ADD COLUMN rest DOUBLE;
+ALTER TABLE alarm_journal ADD COLUMN value_rest DOUBLE;
+ALTER TABLE archive ADD COLUMN rests BOOLEAN DEFAULT false;
 ",
 ];

@@ -111,7 +111,7 @@ pub(super) fn assert_same(archived: &Store, plain: &Store, hours: i64, what: &st
         for (got, expect) in got.tags.iter().zip(&expect.tags) {
             assert_eq!((got.min, got.max, got.last), (expect.min, expect.max, expect.last), "{what}: {from} to {to}");
             assert!(
-                near(got.mean.unwrap(), expect.mean.unwrap()) && near(got.good, expect.good),
+                near(got.mean.unwrap().near(), expect.mean.unwrap().near()) && near(got.good, expect.good),
                 "{what}: {from} to {to}"
             );
         }
@@ -150,7 +150,7 @@ pub(super) fn content(store: &Store) -> Vec<(u16, Sample)> {
 fn aggregates(store: &Store) -> [(u64, f64, f64); 2] {
     [Tier::Minute, Tier::Hour].map(|tier| {
         let files: Vec<_> = store.files(None).unwrap().into_iter().filter(|file| file.tier == tier).collect();
-        let sql = format!("SELECT count(*), sum(good_ms)::DOUBLE, sum(mean) FROM {}", store.parquet(&files));
+        let sql = format!("SELECT count(*), sum(good_ms)::DOUBLE, sum(mean) FROM {}", store.parquet(&files, false));
         let row = |row: &duckdb::Row| Ok((row.get::<_, u64>(0)?, row.get::<_, f64>(1)?, row.get::<_, f64>(2)?));
         let (count, good, mean) = store.db.query_row(&sql, [], row).unwrap();
         (count, good, (mean * 1e6).round())

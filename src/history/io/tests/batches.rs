@@ -51,11 +51,13 @@ fn station(db: &Path, def: &Arc<PlantDef>, seconds: std::ops::Range<i64>, silent
             response_time: Duration::from_millis(9),
             exchange: None,
         };
-        let mut records = plant.on_event(read(TIC, vec![(DP, 0.0), (FAULT, 0.0), (PV, (second % 17) as f64)])).records;
+        let mut records = plant
+            .on_event(read(TIC, vec![(DP, 0.0.into()), (FAULT, 0.0.into()), (PV, ((second % 17) as f64).into())]))
+            .records;
         let on = f64::from(u8::from(second % 60 < 40));
         let plc = match silent.contains(&second) {
             true => Event::Failed { at, device: PLC, tags: vec![RUN], fault: Fault::NotConnected, exchange: None },
-            false => read(PLC, vec![(RUN, on)]),
+            false => read(PLC, vec![(RUN, on.into())]),
         };
         records.extend(plant.on_event(plc).records);
         store.append(&records).unwrap();

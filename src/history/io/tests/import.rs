@@ -71,7 +71,7 @@ fn an_imported_day_is_as_if_it_had_been_recorded() {
     }
     // The mark is in the files of the archive, for whoever reads them; and the clock was not set.
     let files = store.files(Some((crate::history::tiers::Tier::Raw, 0..26 * HOUR_S * 1_000_000))).unwrap();
-    let sql = format!("SELECT count(*) FROM {} WHERE epoch = {}", store.parquet(&files), sql::IMPORTED);
+    let sql = format!("SELECT count(*) FROM {} WHERE epoch = {}", store.parquet(&files, false), sql::IMPORTED);
     let marked: u64 = store.db.query_row(&sql, [], |row| row.get(0)).unwrap();
     assert_eq!((marked, store.epoch()), (import.rows, 0));
 }

@@ -70,16 +70,19 @@ fn a_shift_report_has_figures_alarms_and_actions() {
     assert_eq!((report.period, report.until), (period, sec(100)));
     let [pv, sv, mv] = report.tags.as_slice() else { panic!("three tags") };
     assert_eq!((pv.tag.as_str(), pv.unit.as_str(), pv.decimals), ("TIC-1.PV", "°C", 1));
-    assert_eq!((pv.min, pv.mean, pv.max, pv.last, pv.good), (Some(22.0), Some(25.5), Some(29.0), Some(29.0), 1.0));
+    assert_eq!(
+        (pv.min, pv.mean, pv.max, pv.last, pv.good),
+        (Some(22.0.into()), Some(25.5.into()), Some(29.0.into()), Some(29.0.into()), 1.0)
+    );
     // 20–30 s from before the period, and 50 s to the end.
     assert_eq!(pv.in_alarm.as_secs(), 60);
-    assert_eq!((sv.mean, sv.good), (Some(70.0), 1.0));
+    assert_eq!((sv.mean, sv.good), (Some(70.0.into()), 1.0));
     assert_eq!((mv.mean, mv.good), (None, 0.0));
     assert_eq!(report.alarms, [step(30, "high", ReturnedToNormal), step(50, "low", Raised)]);
     assert_eq!(report.actions, [action(25)]);
     assert_eq!(report.record_of, Some(("TIC-1".into(), "°C".into())));
     assert_eq!(report.record.len(), 8);
-    assert_eq!((report.record[0].at, report.record[0].er), (sec(20), Some(48.0)));
+    assert_eq!((report.record[0].at, report.record[0].er), (sec(20), Some(48.0.into())));
     let future = Query::Report { period: Period::free(sec(300), sec(400)) };
     assert_eq!(store.answer(&future, sec(100)), Err(HistoryError::EmptyPeriod));
 }
@@ -95,7 +98,7 @@ fn the_record_has_the_setpoint_that_is_in_use() {
     store.append(&[good(PV, 0, 40.0), good(SV, 0, 70.0), good(USED, 0, 45.0)]).unwrap();
     let query = Query::Report { period: Period::free(sec(10), sec(60)) };
     let Answer::Report(report) = store.answer(&query, sec(50)).unwrap() else { panic!("not a report") };
-    assert_eq!(report.record.first().map(|row| (row.sv, row.er)), Some((Some(45.0), Some(5.0))));
+    assert_eq!(report.record.first().map(|row| (row.sv, row.er)), Some((Some(45.0.into()), Some(5.0.into()))));
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod batches;
 mod compact;
 mod damage;
 mod epochs;
+mod exact;
 mod lists;
 mod migrations;
 mod past;
@@ -77,7 +78,7 @@ fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
         message: text.into(),
         priority: Priority::High,
         event: step,
-        value: Some(85.5),
+        value: Some(85.5.into()),
         limit: Some(85.0),
         by: (step == AlarmEvent::Acknowledged).then(|| "somchai".into()),
         reason: None,
@@ -308,7 +309,7 @@ fn a_stop_ends_every_curve_and_a_run_answers_queries() {
     let period = Period::free(sec(0), sec(10));
     handle.queries.blocking_send((1, QueryRequest { query: Query::Report { period }, reply })).unwrap();
     let Ok(Ok(Answer::Report(report))) = answer.blocking_recv() else { panic!("no report") };
-    assert_eq!(report.tags[0].last, Some(27.0));
+    assert_eq!(report.tags[0].last, Some(27.0.into()));
     assert_eq!(handle.status.borrow().lost, 0);
     handle.stop();
     let store = open(&db, 100);

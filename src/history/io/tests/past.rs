@@ -68,6 +68,7 @@ fn live(def: &Arc<PlantDef>, mut each: impl FnMut(i64, Vec<Record>, Snapshot)) {
                 continue;
             }
             let tags = values.iter().map(|(tag, _)| *tag).collect();
+            let values = fixture::raw(values);
             let event = match second < fails_until[place] {
                 true => Event::Failed { at, device, tags, fault: Fault::Timeout, exchange: None },
                 false => {

@@ -299,7 +299,7 @@ fn the_longest_lists_fit_in_the_engines_memory() {
         "INSERT INTO alarm_journal
             SELECT make_timestamp(i * 100000), 'UNIT-' || i % 1000 || '.PV', 'temperature high for long, heater off',
                 1 + i % 4, ['raised', 'acknowledged', 'RTN'][1 + i % 3], i / 7, 70, 'anna', 'seen, waits for spare part',
-                NULL, NULL, NULL, 0
+                NULL, NULL, NULL, 0, NULL
             FROM range({ROWS_MAX}) t(i);
         INSERT INTO operator_action
             SELECT make_timestamp(i * 100000), 'anna', 'write', 'UNIT-' || i % 1000 || '.SV', '70.0 °C', '75.0 °C',

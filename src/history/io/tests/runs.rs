@@ -46,7 +46,7 @@ fn station(db: &Path, def: &Arc<PlantDef>, seconds: std::ops::Range<i64>, stops:
         let (cycle, into) = (second / 1_000, second % 1_000);
         let sv = [20.0, 60.0][(cycle % 2) as usize];
         let pv = if into < 20 { 80.0 - sv } else { sv };
-        let values = vec![(DP, 0.0), (FAULT, 0.0), (SV, sv), (PV, pv)];
+        let values = fixture::raw([(DP, 0.0), (FAULT, 0.0), (SV, sv), (PV, pv)]);
         let response_time = Duration::from_millis(9);
         let read =
             Event::Read { at: sec(second), device: TIC, values, texts: Vec::new(), response_time, exchange: None };
@@ -154,7 +154,7 @@ fn day_of_the_tank(db: &Path, def: &Arc<PlantDef>) {
         }
         let pv = (rig.state().pv_c * 10.0).round();
         let (at, device) = (sec(second), TIC);
-        let values = vec![(DP, 1.0), (FAULT, 0.0), (SV, sv), (PV, pv)];
+        let values = fixture::raw([(DP, 1.0), (FAULT, 0.0), (SV, sv), (PV, pv)]);
         let (texts, response_time) = (Vec::new(), Duration::from_millis(9));
         let event = match silent.iter().any(|silent| silent.contains(&second)) {
             true => {

@@ -92,8 +92,8 @@ fn state(store: &Store) -> State {
     assert_eq!(gaps.unwrap(), []);
     samples.sort_by_key(|(tag, sample): &(u16, Sample)| (*tag, sample.at));
     let mut hasher = DefaultHasher::new();
-    for (tag, Sample { value, quality, at }) in &samples {
-        (tag, value.map(f64::to_bits), quality.code(), at).hash(&mut hasher);
+    for (tag, Sample { value, rest, quality, at }) in &samples {
+        (tag, [value, rest].map(|part| part.map(f64::to_bits)), quality.code(), at).hash(&mut hasher);
     }
     let mut files = store.files(None).unwrap();
     files.sort_by(|one, other| one.path.cmp(&other.path));
@@ -102,8 +102,11 @@ fn state(store: &Store) -> State {
         if of_tier.is_empty() {
             return (0, None);
         }
-        let sql =
-            format!("SELECT count(*), sum(hash({}))::VARCHAR FROM {}", sql::columns(tier), store.parquet(&of_tier));
+        let sql = format!(
+            "SELECT count(*), sum(hash({}))::VARCHAR FROM {}",
+            sql::columns(tier, false),
+            store.parquet(&of_tier, false)
+        );
         store.db.query_row(&sql, [], |row| Ok((row.get(0)?, row.get(1)?))).unwrap()
     });
     State {

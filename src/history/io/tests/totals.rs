@@ -32,7 +32,8 @@ fn station(db: &Path, minutes: std::ops::Range<i64>, restores: bool) -> Sample {
     let opened = Store::open_at_start(db, &def, sec(minutes.start * 60)).unwrap();
     let mut plant = Plant::new(def, sec(minutes.start * 60), 1.0);
     for minute in minutes {
-        let (at, values, texts, response_time) = (sec(minute * 60), vec![(RUN, 1.0)], Vec::new(), Duration::ZERO);
+        let (at, values, texts, response_time) =
+            (sec(minute * 60), vec![(RUN, 1.0.into())], Vec::new(), Duration::ZERO);
         opened
             .store
             .append(

@@ -10,7 +10,7 @@ fn sec(seconds: u64) -> Duration {
 fn over_time(condition: Condition, values: &[(u64, Option<f64>)]) -> Vec<Option<bool>> {
     let (mut memory, mut active) = (ConditionMemory::default(), false);
     let verdict = |(second, value): &(u64, Option<f64>)| {
-        let facts = Facts { value: *value, ..Facts::default() };
+        let facts = Facts { value: value.map(Exact::from), ..Facts::default() };
         let holds = holds(condition, facts, active, &mut memory, sec(*second));
         active = holds.unwrap_or(active);
         holds
@@ -42,7 +42,7 @@ fn a_condition_holds_beyond_its_limit_and_clears_by_deadband() {
         (Condition::Bit { bit: 15 }, Some(-32_768.0), false, Some(true)),
         (Condition::Bit { bit: 2 }, None, true, None),
     ] {
-        let facts = Facts { value, reference: Some(70.0), ..Facts::default() };
+        let facts = Facts { value: value.map(Exact::from), reference: Some(70.0.into()), ..Facts::default() };
         let holds = holds(condition, facts, active, &mut ConditionMemory::default(), Duration::ZERO);
         assert_eq!(holds, expect, "{condition:?} at {value:?}, active {active}");
     }
@@ -50,7 +50,7 @@ fn a_condition_holds_beyond_its_limit_and_clears_by_deadband() {
 
 #[test]
 fn a_deviation_from_an_unknown_set_value_is_unknown() {
-    let facts = Facts { value: Some(99.0), ..Facts::default() };
+    let facts = Facts { value: Some(99.0.into()), ..Facts::default() };
     let deviation = Condition::Deviation { from: TagId(1), limit: 5.0, deadband: 0.0 };
     assert_eq!(holds(deviation, facts, false, &mut ConditionMemory::default(), Duration::ZERO), None);
 }
@@ -110,7 +110,7 @@ fn a_restored_alarm_clears_only_by_what_was_measured_since() {
     let check = |condition, values: &[(u64, f64, Option<bool>)]| {
         let mut memory = ConditionMemory::default();
         for (second, value, expect) in values {
-            let facts = Facts { value: Some(*value), ..Facts::default() };
+            let facts = Facts { value: Some((*value).into()), ..Facts::default() };
             assert_eq!(holds(condition, facts, true, &mut memory, sec(*second)), *expect, "at {second} s");
         }
     };
@@ -125,7 +125,7 @@ fn a_restored_alarm_clears_only_by_what_was_measured_since() {
 #[test]
 fn what_has_been_is_forgotten_when_an_alarm_is_enabled_again() {
     let stuck = Condition::NoChange { lasts: sec(60), deadband: 0.2 };
-    let (mut memory, facts) = (ConditionMemory::default(), Facts { value: Some(20.0), ..Facts::default() });
+    let (mut memory, facts) = (ConditionMemory::default(), Facts { value: Some(20.0.into()), ..Facts::default() });
     assert_eq!(holds(stuck, facts, false, &mut memory, sec(0)), Some(false));
     memory.clear();
     assert_eq!(holds(stuck, facts, false, &mut memory, sec(60)), Some(false));

@@ -120,9 +120,9 @@ proptest! {
                 TestEvent::Shelve(seconds) => {
                     journal.extend(manager.shelve(HIGH, Duration::from_secs(seconds), &note(at(now), Some(&why()))));
                 }
-                TestEvent::Unshelve => journal.extend(manager.reinstate(HIGH, AlarmEvent::Unshelved, value, &note(at(now), None)).into_iter().flatten()),
+                TestEvent::Unshelve => journal.extend(manager.reinstate(HIGH, AlarmEvent::Unshelved, value.map(Into::into), &note(at(now), None)).into_iter().flatten()),
                 TestEvent::OutOfService => journal.extend(manager.out_of_service(HIGH, &note(at(now), Some(&why())))),
-                TestEvent::InService => journal.extend(manager.reinstate(HIGH, AlarmEvent::InService, value, &note(at(now), None)).into_iter().flatten()),
+                TestEvent::InService => journal.extend(manager.reinstate(HIGH, AlarmEvent::InService, value.map(Into::into), &note(at(now), None)).into_iter().flatten()),
                 TestEvent::Restart => {
                     let mut again = AlarmManager::new(def.clone());
                     again.restore(&remembered(&journal));
@@ -132,7 +132,7 @@ proptest! {
                 }
             }
             let found = manager.evaluate(at(now), |alarm| Facts {
-                value,
+                value: value.map(Into::into),
                 ill: Some(false),
                 enabled: enabled.filter(|_| alarm.enabled_when.is_some()),
                 ..Facts::default()

@@ -4,7 +4,7 @@ use super::*;
 
 /// A value, and whether it enables the alarm.
 fn enabled_with(value: f64, enabled: bool) -> impl Fn(&AlarmDef) -> Facts {
-    move |_| Facts { value: Some(value), enabled: Some(enabled), ..Facts::default() }
+    move |_| Facts { value: Some(value.into()), enabled: Some(enabled), ..Facts::default() }
 }
 
 #[test]
@@ -162,7 +162,8 @@ fn an_annunciated_alarm_stays_until_acknowledged() {
 fn a_value_that_stood_still_before_the_heating_is_not_stuck() {
     let stuck = Condition::NoChange { lasts: Duration::from_secs(60), deadband: 0.1 };
     let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.condition = stuck));
-    let when = |enabled| move |_: &AlarmDef| Facts { value: Some(20.0), enabled: Some(enabled), ..Facts::default() };
+    let when =
+        |enabled| move |_: &AlarmDef| Facts { value: Some(20.0.into()), enabled: Some(enabled), ..Facts::default() };
     for (second, enabled, expect) in [
         (0, false, vec![AlarmEvent::SuppressedByDesign]),
         (600, false, vec![]),

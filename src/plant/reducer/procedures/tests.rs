@@ -67,7 +67,8 @@ fn read(plant: &mut Plant, second: i64, values: &[(TagId, f64)]) -> Effects {
     let response_time = Duration::from_millis(12);
     let mut effects = Effects::default();
     for device in [TIC, PLC] {
-        let values = values.iter().copied().filter(|(tag, _)| plant.def.tag(*tag).device == device).collect();
+        let values = values.iter().copied().filter(|(tag, _)| plant.def.tag(*tag).device == device);
+        let values = fixture::raw(values);
         let event = Event::Read { at: at(second), device, values, texts: Vec::new(), response_time, exchange: None };
         let more = plant.on_event(event);
         effects.bus.extend(more.bus);
@@ -92,14 +93,14 @@ fn run(plant: &Plant) -> ProcedureRun {
 /// The tags and raw numbers that go to the bus.
 fn written(effects: &Effects) -> Vec<(TagId, f64)> {
     let write = |(_, request): &(_, BusRequest)| match request {
-        BusRequest::Write(job) => Some((job.tag, job.raw)),
+        BusRequest::Write(job) => Some((job.tag, job.raw.near())),
         _ => None,
     };
     effects.bus.iter().filter_map(write).collect()
 }
 
 /// The bus ends the first write of `effects`; as there, the value read back comes before the result.
-fn end(plant: &mut Plant, effects: &Effects, second: i64, result: fn(f64) -> WriteResult) -> Effects {
+fn end(plant: &mut Plant, effects: &Effects, second: i64, result: fn(Exact) -> WriteResult) -> Effects {
     let job = effects.bus.iter().find_map(|(_, request)| match request {
         BusRequest::Write(job) => Some(*job),
         _ => None,
@@ -107,7 +108,7 @@ fn end(plant: &mut Plant, effects: &Effects, second: i64, result: fn(f64) -> Wri
     let job = job.expect("a write is under way");
     let mut effects = Effects::default();
     if let WriteResult::ReadBack(back) = result(job.raw) {
-        effects = read(plant, second, &[(job.tag, back)]);
+        effects = read(plant, second, &[(job.tag, back.near())]);
     }
     let more = plant.on_event(Event::Wrote { at: at(second), id: job.id, result: result(job.raw) });
     effects.bus.extend(more.bus);
@@ -156,7 +157,7 @@ fn step_follows_step_and_the_run_is_measured() {
 #[test]
 fn a_write_that_is_not_verified_ends_in_the_safe_state() {
     for (result, why) in [
-        ((|_| WriteResult::ReadBack(300.0)) as fn(f64) -> WriteResult, "not confirmed: read back 30"),
+        ((|_| WriteResult::ReadBack(300.0.into())) as fn(Exact) -> WriteResult, "not confirmed: read back 30"),
         (|_| WriteResult::NoValidResponse(Fault::Timeout), "not confirmed: no response"),
     ] {
         let mut plant = plant();

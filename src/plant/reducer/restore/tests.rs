@@ -23,7 +23,7 @@ fn def() -> PlantDef {
     def.tags.push(TagDef {
         access: Access::ReadWrite,
         in_sets: true,
-        max: Some(Bound::Fixed(500.0)),
+        max: Some(Bound::Fixed(500.0.into())),
         ..TagDef::new(HIGH, TIC, "TIC-1.SV-H", point)
     });
     let sv = &mut def.tags[SV.index()];
@@ -44,7 +44,8 @@ fn read(plant: &mut Plant, second: i64, sv: f64, high: f64) -> Effects {
 
 fn read_values(plant: &mut Plant, second: i64, values: Vec<(TagId, f64)>) -> Effects {
     let (device, response_time) = (TIC, std::time::Duration::from_millis(12));
-    plant.on_event(Event::Read { at: at(second), device, values, texts: Vec::new(), response_time, exchange: None })
+    let (values, texts) = (fixture::raw(values), Vec::new());
+    plant.on_event(Event::Read { at: at(second), device, values, texts, response_time, exchange: None })
 }
 
 /// The read of the device that a restore begins with.
@@ -60,7 +61,7 @@ fn begin(plant: &mut Plant, number: u32, request: RestoreRequest) -> Effects {
 }
 
 fn set(sv: f64, high: f64) -> Arc<ParameterSet> {
-    let value = |tag: &str, value| SetValue { tag: tag.to_owned(), value };
+    let value = |tag: &str, value: f64| SetValue { tag: tag.to_owned(), value: value.into() };
     Arc::new(ParameterSet {
         name: "winter".into(),
         device: "TIC-1".into(),
@@ -90,14 +91,14 @@ fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {
 /// The tags and raw numbers that went to the bus.
 fn written(effects: &Effects) -> Vec<(TagId, f64)> {
     let write = |(_, request): &(_, BusRequest)| match request {
-        BusRequest::Write(job) => Some((job.tag, job.raw)),
+        BusRequest::Write(job) => Some((job.tag, job.raw.near())),
         _ => None,
     };
     effects.bus.iter().filter_map(write).collect()
 }
 
 /// Ends the write under way and returns the effects. As on the bus, the value read back comes before the result.
-fn end(plant: &mut Plant, effects: &Effects, result: fn(f64) -> WriteResult) -> Effects {
+fn end(plant: &mut Plant, effects: &Effects, result: fn(Exact) -> WriteResult) -> Effects {
     let (id, tag, raw) = effects
         .bus
         .iter()
@@ -243,7 +244,7 @@ fn limits_are_checked_in_the_station_whatever_a_terminal_sends() {
     let why = "SV 600 is outside −∞ … 100";
     let refused = |why: &str| Some(format!("{}: {why}", Outcome::Refused(Refusal::Stopped).label()));
     let min = plant.def.tag(SV).min;
-    assert_eq!(min, Some(Bound::Fixed(0.0)));
+    assert_eq!(min, Some(Bound::Fixed(0.0.into())));
     let outcome_words = outcome(&plant, 1).map(|outcome| outcome.to_string());
     assert_eq!((written(&effects), outcome_words), (vec![], refused(&why.replace("−∞", "0"))));
     command(&mut plant, 2, CommandKind::Restore(Box::new(request)));

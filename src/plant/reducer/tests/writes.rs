@@ -20,7 +20,7 @@ fn a_stop_is_sent_though_a_start_is_under_way() {
     let mut check = |number, value, expect: Option<(f64, bool)>| {
         let effects = plant.on_command(shown(&plant, number, RUN, value), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => (job.raw, job.urgent),
+            BusRequest::Write(job) => (job.raw.near(), job.urgent),
             other => panic!("not a write: {other:?}"),
         });
         assert_eq!(sent, expect, "command {number}: {:?}", plant.snapshot().commands[0].outcome);
@@ -47,7 +47,7 @@ fn an_unlock_is_sent_once_and_has_its_own_audit_entry() {
     };
     plant.on_event(read(0, &[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
     let (id, unlock) = unlocked(&mut plant, 1, 71.0);
-    assert_eq!(unlock, Some((FAULT, 1.0)));
+    assert_eq!(unlock, Some((FAULT, 1.0.into())));
     let effects = plant.on_event(Event::Unlocked { at: at(2), id, unlock_tag: FAULT, result: WriteResult::Accepted });
     let Some(Record::Action(action)) = effects.records.last() else { panic!("no entry for it") };
     assert_eq!((&*action.by, &*action.target, action.new.as_deref()), ("anna", "TIC-1.FAULT", Some("1 °C")));
@@ -56,8 +56,8 @@ fn an_unlock_is_sent_once_and_has_its_own_audit_entry() {
     plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::Refused(ExceptionCode(3)) });
     // Not read again yet: unknown, so it is sent again.
     let (id, unlock) = unlocked(&mut plant, 2, 71.0);
-    assert_eq!(unlock, Some((FAULT, 1.0)));
-    plant.on_event(Event::Wrote { at: at(3), id, result: WriteResult::ReadBack(710.0) });
+    assert_eq!(unlock, Some((FAULT, 1.0.into())));
+    plant.on_event(Event::Wrote { at: at(3), id, result: WriteResult::ReadBack(710.0.into()) });
     plant.on_event(read(4, &[(FAULT, 1.0)]));
     assert_eq!(unlocked(&mut plant, 3, 72.0).1, None, "it has its value already");
 }
@@ -94,7 +94,7 @@ fn a_lost_refresh_of_the_plant_fails_no_command() {
 fn in_steps(max: f64) -> Plant {
     let mut def = fixture::plant();
     let sv = &mut def.tags[SV.index()];
-    (sv.scale, sv.max) = (5.0, Some(crate::plant::tag::Bound::Fixed(max)));
+    (sv.scale, sv.max) = (5.0, Some(crate::plant::tag::Bound::Fixed(max.into())));
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
     plant.on_event(read(0, &[(PV, 700.0), (SV, 140.0), (DP, 1.0), (FAULT, 0.0)]));
@@ -118,7 +118,7 @@ fn a_write_is_recorded_with_the_value_that_the_device_holds() {
     assert_eq!(raw, 145.0, "72.5 °C goes out");
     assert_eq!(
         plant.snapshot().commands[0].command.kind,
-        CommandKind::Write { tag: SV, value: 72.5 },
+        CommandKind::Write { tag: SV, value: 72.5.into() },
         "screens show it too"
     );
     let effects = plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(raw) });
@@ -137,7 +137,7 @@ fn rounding_never_leads_beyond_a_limit() {
         let mut plant = in_steps(99.8);
         let effects = plant.on_command(shown(&plant, 1, SV, value), at(1));
         let raw = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => job.raw,
+            BusRequest::Write(job) => job.raw.near(),
             other => panic!("not a write: {other:?}"),
         });
         assert_eq!((raw, plant.snapshot().commands[0].outcome.clone()), (sent, outcome), "{value}");
@@ -149,7 +149,7 @@ fn a_limit_itself_may_be_written_whatever_the_scale() {
     for (scale, max) in [(1.1, 3.3), (0.3, 0.9), (0.7, 4.9)] {
         let mut def = fixture::plant();
         let sv = &mut def.tags[SV.index()];
-        (sv.scale, sv.max) = (scale, Some(crate::plant::tag::Bound::Fixed(max)));
+        (sv.scale, sv.max) = (scale, Some(crate::plant::tag::Bound::Fixed(max.into())));
         let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
         plant.on_event(read(0, &[(SV, 0.0), (DP, 0.0), (FAULT, 0.0)]));
         plant.on_command(shown(&plant, 1, SV, max), at(1));
@@ -183,17 +183,17 @@ fn an_unchanged_double_is_not_refused_as_changed() {
 fn a_write_that_saw_no_value_is_asked_again_and_a_stop_is_not() {
     let mut plant = running();
     let blind = |number, tag, value| command(number, CommandKind::Write { tag, value });
-    let effects = plant.on_command(blind(1, SV, 65.0), at(1));
+    let effects = plant.on_command(blind(1, SV, 65.0.into()), at(1));
     assert_eq!(effects.bus, []);
     assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::NotSeen("70.0 °C".into())));
-    plant.on_command(blind(2, SV, 70.0), at(1));
+    plant.on_command(blind(2, SV, 70.0.into()), at(1));
     assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Unchanged, "there is nothing to overwrite");
     plant.on_event(fail(2, &[SV], Fault::Timeout));
-    plant.on_command(blind(3, SV, 65.0), at(3));
+    plant.on_command(blind(3, SV, 65.0.into()), at(3));
     assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Pending, "the station does not know it either");
     let mut stopped = with_stop();
     stopped.on_event(read(1, &[(RUN, 1.0)]));
-    stopped.on_command(blind(1, RUN, 0.0), at(1));
+    stopped.on_command(blind(1, RUN, 0.0.into()), at(1));
     assert_eq!(stopped.snapshot().commands[0].outcome, Outcome::Pending);
 }
 
@@ -202,7 +202,7 @@ fn a_write_over_a_value_that_has_changed_is_refused() {
     let mut plant = running();
     plant.on_event(fail(1, &[SV], Fault::Timeout));
     let write = shown(&plant, 1, SV, 65.0);
-    assert_eq!(write.command.expected_value, Some(70.0), "a doubted value was shown as well");
+    assert_eq!(write.command.expected_value, Some(70.0.into()), "a doubted value was shown as well");
     plant.on_event(read(2, &[(SV, 800.0)]));
     plant.on_command(write, at(3));
     assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::ChangedTo("80.0 °C".into())));

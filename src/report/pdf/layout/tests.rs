@@ -54,7 +54,7 @@ fn nothing_leaves_the_page_and_every_page_is_numbered() {
 #[test]
 fn a_long_table_repeats_its_head_on_every_page() {
     let mut document = made();
-    let rows = (0..200).map(|n| vec![Cell::Text(format!("TAG-{n}")), Cell::Number(f64::from(n), Some(1))]);
+    let rows = (0..200).map(|n| vec![Cell::Text(format!("TAG-{n}")), Cell::Number(f64::from(n).into(), Some(1))]);
     let table = Table::new([Column::text("tag"), Column::number("value")]).with(rows);
     document.sections.truncate(1);
     document.sections[0].content = Content::Table(table);

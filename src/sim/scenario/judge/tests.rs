@@ -6,7 +6,7 @@ use super::*;
 use crate::{
     plant::{
         Plant,
-        command::{Command, CommandId, CommandKind, Refusal},
+        command::{Command, CommandId, CommandKind, Outcome, Refusal},
         def::Priority,
         fixture::{self, HIGH, PV, SV},
         sample::{Cause, Sample},
@@ -83,7 +83,7 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
                 message: text.into(),
                 priority: Priority::High,
                 event: *step,
-                value: Some(76.0),
+                value: Some(76.0.into()),
                 limit: None,
                 by: None,
                 reason: None,
@@ -114,7 +114,11 @@ fn only_a_verified_write_of_the_right_value_counts() {
         let command = CommandStatus {
             outcome,
             ..CommandStatus::new(
-                Command::new(0, CommandId { terminal: 1, number: 1 }, CommandKind::Write { tag: SV, value }),
+                Command::new(
+                    0,
+                    CommandId { terminal: 1, number: 1 },
+                    CommandKind::Write { tag: SV, value: value.into() },
+                ),
                 "tech1",
                 at(second),
             )

@@ -46,13 +46,10 @@ fn calculation_rows(cx: &ViewContext, calculation: &Calculation) -> Vec<Row> {
     let mut rows = vec![Row::new(t!("expression"), calculation.text.clone(), cx.theme.normal())];
     for (n, input) in calculation.inputs().into_iter().enumerate() {
         let (def, sample) = (cx.def().tag(input), cx.snapshot.sample(input));
-        let decimals = usize::from(cx.snapshot.decimals[input.index()]);
-        let value = match sample.value {
+        let value = match sample.exact() {
             None => String::new(),
-            Some(value) => match def.label_of(value) {
-                Some(label) => format!("{label}, "),
-                None => format!("{value:.decimals$} {}, ", def.unit_now(|tag| cx.snapshot.sample(tag))),
-            },
+            Some(value) if def.label_of(value).is_some() => format!("{}, ", cx.snapshot.format(input, value)),
+            Some(value) => format!("{} {}, ", cx.snapshot.format(input, value), cx.snapshot.unit(input)),
         };
         let style = if sample.quality.is_good() { cx.theme.normal() } else { cx.theme.trouble() };
         let label = if n == 0 { t!("inputs") } else { "" };

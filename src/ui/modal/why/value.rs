@@ -76,7 +76,7 @@ fn because(
         Cause::NotConnected => line_words(cx, &cx.snapshot.line(line).state),
         Cause::SensorFault => {
             let raw = found.and_then(|found| found.raw);
-            if let Some(raw) = raw.filter(|raw| def.bad_if.iter().any(|bad| *bad as f64 == *raw)) {
+            if let Some(raw) = raw.filter(|raw| def.is_bad(*raw)) {
                 return Some(t!("raw {raw} means \"no value\" for this device", raw));
             }
             match (exchange.and_then(|exchange| exchange.outcome.err()), def.quality_from) {
@@ -183,7 +183,7 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     };
     let from_answer = found.and_then(|found| found.raw);
     // Without an answer that holds it: the number behind the value that is still shown.
-    let shown = cx.snapshot.sample(def.id).value.and_then(|value| scale::to_raw(def, value, scaling));
+    let shown = cx.snapshot.sample(def.id).exact().and_then(|value| scale::to_raw(def, value, scaling));
     let hex = found.map(|found| found.words.iter().map(|word| format!(" {word:04X}")).collect::<String>());
     let Some(raw) = from_answer.or(shown) else {
         return match hex {

@@ -257,7 +257,7 @@ pub fn journal_of<'a>(cx: &ViewContext<'a>, subject: Subject) -> &'a str {
 /// The limit of an alarm: `> 72.0`; empty where there is none.
 pub fn condition_text(cx: &ViewContext, alarm: AlarmId) -> String {
     let def = cx.def().alarm(alarm);
-    let number = |value| match def.subject {
+    let number = |value: f64| match def.subject {
         Subject::Tag(tag) => cx.snapshot.format(tag, value),
         Subject::Device(_) | Subject::Line(_) | Subject::Station => value.to_string(),
     };

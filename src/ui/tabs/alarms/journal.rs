@@ -203,7 +203,7 @@ impl<'a> InArea<'a> {
 
 fn alarm_text(cx: &ViewContext, row: &AlarmRecord) -> String {
     // A state by its word, a number with its decimals, as everywhere else.
-    let shown = |value: f64| match cx.def().tag_named(&row.subject) {
+    let shown = |value: Exact| match cx.def().tag_named(&row.subject) {
         Some(tag) => format!(" {}", value::number(cx, tag, value)),
         None => format!(" {value}"),
     };

@@ -61,7 +61,7 @@ fn storm() -> Fixture {
         });
         let first_out = Some(FirstOut { began: ago(60), rank: u32::from(n) + 1 });
         let mut alarm = ActiveAlarm::new(id, AlarmState::Unacknowledged, ago(60 - i64::from(n) / 2));
-        (alarm.first_out, alarm.value) = (first_out, Some(3.8));
+        (alarm.first_out, alarm.value) = (first_out, Some(3.8.into()));
         if n == 2 {
             alarm.state = AlarmState::Acknowledged;
             let reason = Some("pump is looked at".into());

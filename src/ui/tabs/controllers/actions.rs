@@ -97,7 +97,8 @@ impl Controllers {
             (Action::Mode, _) => program.and_then(|program| program.mode),
             (Action::Pattern, _) => program.and_then(|program| program.pattern),
             (Action::Actions, _) => {
-                let roles = device.actions.iter().map(|action| role_to_write(cx.def(), action.tag, action.value));
+                let roles =
+                    device.actions.iter().map(|action| role_to_write(cx.def(), action.tag, action.value.into()));
                 return roles.min();
             }
             _ => None,

@@ -161,7 +161,7 @@ fn beside(cx: &ViewContext, faceplate: &Faceplate, tag: TagId) -> Option<String>
 
 /// The ends of a tag's range: `0.0`, `120.0 °C`.
 fn ends(cx: &ViewContext, tag: TagId) -> Option<(String, String)> {
-    let (min, max) = cx.snapshot.range(tag)?;
+    let (min, max) = cx.snapshot.bounds(tag)?;
     let text = |value| cx.snapshot.format(tag, value);
     Some((text(min), format!("{} {}", text(max), cx.snapshot.unit(tag)).trim_end().to_owned()))
 }

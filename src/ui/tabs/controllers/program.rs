@@ -204,7 +204,7 @@ fn way(tag: TagId, segments: &[Segment], total: f64, dots: usize, cx: &ViewConte
     let each = total / dots as f64;
     let bucket = |n: usize| {
         let (a, b) = (at(n as f64 * each)?, at((n + 1) as f64 * each)?);
-        Some(Bucket { min: a.min(b), max: a.max(b), mean: (a + b) / 2.0, last: b })
+        Some(Bucket { min: a.min(b), max: a.max(b), mean: (a + b) / 2.0, last: b.into() })
     };
     let buckets = (0..dots).map(bucket).collect();
     Series { tag, from: cx.now, step: Duration::from_secs_f64(each * 60.0), buckets, summary: None, good: 1.0 }

@@ -146,7 +146,7 @@ fn rule<'a>(cx: &ViewContext<'a>, device: DeviceId) -> Option<&'a RunDef> {
 
 fn row(cx: &ViewContext, run: &ControlRun) -> String {
     let begin = moment(run.from, cx.now, &cx.def().time_zone);
-    let value = |value: f64| format!("{value:.*}", usize::from(run.decimals));
+    let value = |value: f64| digits(value, Some(run.decimals));
     let setpoint = match (&*run.detail, run.sv_before) {
         ("", Some(before)) => format!("{} {} {}", value(before), cx.theme.pick("→", ">"), value(run.sv)),
         ("", None) => value(run.sv),
@@ -165,7 +165,7 @@ pub fn figures(run: &ControlRun) -> [String; 5] {
         Figure::After(time) => control_runs::reached(Some(time)),
         Figure::Unknown => "?".to_owned(),
     };
-    let value = |value: f64| format!("{value:.*}", usize::from(run.decimals));
+    let value = |value: f64| digits(value, Some(run.decimals));
     let bound = if run.is_partial() { ">" } else { "" };
     let over = run.overshoot.map_or("?".to_owned(), |over| format!("{bound}{}", value(over)));
     let offset = run.offset.map_or("?".to_owned(), value);

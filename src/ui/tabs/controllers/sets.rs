@@ -39,8 +39,8 @@ impl Source {
 }
 
 /// What is trusted now.
-pub fn trusted<'a>(cx: &'a ViewContext) -> impl Fn(TagId) -> Option<f64> + 'a {
-    |tag| cx.snapshot.sample(tag).good_value()
+pub fn trusted<'a>(cx: &'a ViewContext) -> impl Fn(TagId) -> Option<Exact> + 'a {
+    |tag| cx.snapshot.sample(tag).good_exact()
 }
 
 /// Every source that can be compared with a device: its sets, files that cannot be used, other devices of its profile.
@@ -168,7 +168,7 @@ pub fn shown_of_set(cx: &ViewContext, row: &Compared) -> String {
 }
 
 /// A value of a comparison, as the device would show it.
-pub fn shown(cx: &ViewContext, row: &Compared, value: Option<f64>) -> String {
+pub fn shown(cx: &ViewContext, row: &Compared, value: Option<Exact>) -> String {
     match (row.tag, value) {
         (_, None) => "–".to_owned(),
         (Some(tag), Some(value)) => {

@@ -44,7 +44,7 @@ fn trouble(count: u16) -> Fixture {
     fixture.set("TIC-1.PV", 72.4);
     let raised_at = fixture::now() - SignedDuration::from_secs(41);
     let alarm = ActiveAlarm::new(AlarmId(0), AlarmState::Unacknowledged, raised_at);
-    fixture.alarms = vec![ActiveAlarm { value: Some(72.1), ..alarm }];
+    fixture.alarms = vec![ActiveAlarm { value: Some(72.1.into()), ..alarm }];
     if let Some(device) = fixture.devices.get_mut(1) {
         (device.state, device.diagnosis) = (DeviceState::Down { since: raised_at }, Some(Reason::Down));
         for tag in fixture.def.tags.iter().filter(|tag| tag.device == DeviceId(1)) {
@@ -153,13 +153,13 @@ fn a_tuning_at_work_is_stopped_by_the_key_that_starts_one() {
     fixture.set("TIC-1.AT", 1.0);
     update(&mut stopped, Msg::Snapshot(fixture.snapshot()));
     let effects = type_keys(&mut stopped, "4T⏎");
-    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.AT"), value: 0.0 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.AT"), value: 0.0.into() }));
 }
 
 /// A restore of two changes whose first is done.
 fn half_done(fixture: &Fixture, state: State) -> Restore {
     let set = fixture.sets[1].set.clone().expect("a good set");
-    let trusted = |tag: crate::plant::def::TagId| fixture.samples[tag.index()].good_value();
+    let trusted = |tag: crate::plant::def::TagId| fixture.samples[tag.index()].good_exact();
     let changes = crate::plant::parameter_set::plan(&fixture.def, DeviceId(0), &set, &trusted).expect("it fits");
     let request = RestoreRequest { device: DeviceId(0), from: "set winter".into(), set, changes };
     let id = CommandId { terminal: 1, number: 9 };
@@ -277,7 +277,11 @@ fn a_cell_of_the_program_is_written_and_the_program_commanded() {
     let check = |keys: &str, tag: &str, value: f64| {
         let mut model = model(&fixture, Theme::FULL);
         let effects = type_keys(&mut model, &format!("4g{keys}"));
-        assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag(tag), value }), "{keys}");
+        assert_eq!(
+            sent_kind(&effects),
+            Some(&CommandKind::Write { tag: fixture.tag(tag), value: value.into() }),
+            "{keys}"
+        );
     };
     check("↓→⏎25⏎", "TIC-1.TM2R", 25.0);
     check("⏎80⏎", "TIC-1.SV-1", 80.0);
@@ -296,13 +300,13 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
     later.set("TIC-1.P", 3.0);
     let mut snapshot = later.snapshot();
     Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
-        old: Some(1.2),
+        old: Some(1.2.into()),
         outcome: Outcome::Verified,
         ..CommandStatus::new(
             Command::new(
                 0,
                 CommandId { terminal: 2, number: 1 },
-                CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 3.0 },
+                CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 3.0.into() },
             ),
             "boris",
             fixture::now(),
@@ -313,7 +317,7 @@ fn a_value_that_another_has_changed_meanwhile_is_asked_again() {
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("changed to 3.0 % by boris 14:02:31 (was 1.2)"), "{shown}");
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 7.5 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.P"), value: 7.5.into() }));
 }
 
 #[test]

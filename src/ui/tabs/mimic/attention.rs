@@ -237,7 +237,7 @@ mod tests {
     fn a_failed_command_is_listed_until_one_goes_well() {
         let fixture = Fixture::normal();
         let mut snapshot = Snapshot::clone(&fixture.snapshot());
-        let kind = CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0 };
+        let kind = CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.0.into() };
         let given = |outcome, ago| {
             let at = now() - SignedDuration::from_mins(ago);
             let command = Command::new(7, CommandId::default(), kind.clone());

@@ -55,7 +55,7 @@ fn made_up(tag: &TagDef, phase: u32) -> f64 {
         return f64::from(turn % 2);
     }
     let bound = |bound: Option<Bound>, usual: f64| match bound {
-        Some(Bound::Fixed(value)) => value,
+        Some(Bound::Fixed(value)) => value.near(),
         Some(Bound::From(_)) | None => usual,
     };
     let (min, max) = (bound(tag.min, 0.0), bound(tag.max, 100.0));
@@ -90,6 +90,7 @@ mod tests {
         let level = plant.tags.iter().find(|tag| tag.name == "PLC-1.LT-1").expect("a level");
         let values: Vec<f64> = (0..240).map(|phase| made_up(level, phase)).collect();
         let (Some(Bound::Fixed(min)), Some(Bound::Fixed(max))) = (level.min, level.max) else { panic!("{level:?}") };
+        let [min, max] = [min, max].map(crate::plant::exact::Exact::near);
         assert!(values.iter().all(|value| (min..=max).contains(value)), "{values:?}");
         assert!(values.windows(2).all(|pair| pair[0] != pair[1]));
     }

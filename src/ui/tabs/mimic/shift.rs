@@ -252,15 +252,15 @@ fn steps(cx: &ViewContext, canvas: &mut Canvas, axis: Axis, lane: Lane, series: 
         series.buckets.get(n).copied().flatten().map(|bucket| bucket.last)
     };
     let now = axis.now();
-    let state = |x: u16| if x == now { cx.snapshot.sample(lane.tag()).good_value() } else { bucket(axis.at(x)?) };
-    let states: Vec<Option<f64>> = (0..=now).map(state).collect();
+    let state = |x: u16| if x == now { cx.snapshot.sample(lane.tag()).good_exact() } else { bucket(axis.at(x)?) };
+    let states: Vec<Option<Exact>> = (0..=now).map(state).collect();
     let mut x = 0;
     for part in states.chunk_by(|a, b| a == b) {
         let length = to_u16(part.len());
         match part[0] {
             None => canvas.run(x, 0, length, theme.pick('╌', '~'), theme.dim()),
             Some(value) => {
-                let (name, active) = lane.state(cx, value);
+                let (name, active) = lane.state(cx, value.near());
                 let style = if active { theme.normal() } else { theme.dim() };
                 let (on, off) = (theme.pick('━', '#'), theme.pick('┈', '.'));
                 canvas.run(x, 0, length, if active { on } else { off }, style);

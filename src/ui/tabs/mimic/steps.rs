@@ -9,7 +9,7 @@ pub fn rows(cx: &ViewContext) -> Vec<Row> {
     let def = cx.def();
     let sequences = def.logic.sequences.iter().flat_map(|sequence| {
         let now = cx.snapshot.sample(sequence.step).good_value();
-        let mark = |(number, name): &(i64, String)| {
+        let mark = |(number, name): &(i128, String)| {
             let is_now = now == Some(*number as f64);
             if is_now { format!("{}{name}", cx.theme.pick("▸", ">")) } else { name.to_lowercase() }
         };

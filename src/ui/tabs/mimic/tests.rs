@@ -46,7 +46,12 @@ fn answer(model: &mut Model, effects: Vec<Effect>) {
                     let bucket = |n| {
                         let value = of(n);
                         // A gap stays a gap.
-                        (n * 10 / buckets != 2).then_some(Bucket { min: value, max: value, mean: value, last: value })
+                        (n * 10 / buckets != 2).then_some(Bucket {
+                            min: value,
+                            max: value,
+                            mean: value,
+                            last: value.into(),
+                        })
                     };
                     Series { tag, from, step, buckets: (0..buckets).map(bucket).collect(), summary: None, good: 1.0 }
                 };

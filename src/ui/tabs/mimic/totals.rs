@@ -1,7 +1,7 @@
 //! What the running shift has counted so far: energy, batches, run hours, starts.
 
 use super::attention::Row;
-use crate::report::{RunFigures, ShiftReport, TagFigures};
+use crate::report::{RunFigures, ShiftReport, TagFigures, text::mean_or_difference};
 use crate::ui::tabs::prelude::*;
 
 /// The counters that have counted and the actuators that have run, as `heater energy +2.31 kWh` and `PLC-1.P-1 1.2 h, 14 starts`.
@@ -11,9 +11,8 @@ pub fn rows(cx: &ViewContext, report: &ShiftReport) -> Vec<Row> {
         if label.is_empty() { tag.to_owned() } else { translate(label).to_owned() }
     };
     let counted = |figures: &TagFigures| {
-        let (difference, decimals) =
-            (figures.difference.filter(|counted| 0.0 < *counted)?, usize::from(figures.decimals));
-        Some(format!("{} {difference:+.decimals$} {}", name(&figures.tag), figures.unit).trim_end().to_owned())
+        figures.difference.filter(|counted| *counted > Exact::default())?;
+        Some(format!("{} {} {}", name(&figures.tag), mean_or_difference(figures), figures.unit).trim_end().to_owned())
     };
     let ran = |figures: &RunFigures| {
         let (on, starts) = (figures.on.filter(|on| !on.is_zero())?, figures.starts.unwrap_or_default());
@@ -45,7 +44,7 @@ mod tests {
         report.runs[0].on = Some(Duration::from_secs(200));
         assert_eq!(said(&report)[1], "PLC-1.P-1 3 min, 3 starts");
         report.runs[0].on = None;
-        report.tags.iter_mut().for_each(|tag| tag.difference = tag.difference.map(|_| 0.0));
+        report.tags.iter_mut().for_each(|tag| tag.difference = tag.difference.map(|_| Exact::default()));
         assert_eq!(said(&report), [""; 0]);
     }
 }

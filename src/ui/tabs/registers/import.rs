@@ -97,7 +97,8 @@ struct Label {
 
 fn mtui(text: &str) -> List {
     let mut list = List::default();
-    let read: Mtui = match serde_json::from_str(text) {
+    // By way of a value: what is flattened meets numbers of any precision there as numbers.
+    let read: Mtui = match serde_json::from_str::<serde_json::Value>(text).and_then(serde_json::from_value) {
         Ok(read) => read,
         Err(error) => {
             list.problems
@@ -172,7 +173,7 @@ impl Rule {
         }
         let suffix = self.suffix.trim();
         let unit = unit_of(suffix).map_or(suffix.to_owned(), str::to_owned);
-        let enum_labels = self.labels.into_iter().map(|Label { value, text }| (value, text)).collect();
+        let enum_labels = self.labels.into_iter().map(|Label { value, text }| (value.into(), text)).collect();
         let decimals = self.decimals.unwrap_or_else(|| list::decimals_of(scale, kind));
         Ok(Named { scale, offset, decimals, unit, enum_labels, ..Named::new(table, address, kind, order, name) })
     }

@@ -4,6 +4,7 @@ use super::cells::Cells;
 use crate::{
     bus::interpret::{float_orders, number},
     plant::{
+        exact::Exact,
         number::to_f32,
         tag::{ByteOrder, DataType, Table},
     },
@@ -44,7 +45,7 @@ fn likely(pairs: &[[u16; 2]]) -> Option<(DataType, ByteOrder)> {
 /// Floats of a usual size throughout that change little, though their words change as halves of one value do.
 fn is_float(order: ByteOrder, pairs: &[[u16; 2]]) -> bool {
     let usual = pairs.iter().all(|pair| float_orders(pair).any(|other| other == order));
-    let value = |pair: &[u16; 2]| number(DataType::F32, order, pair).unwrap_or(f64::NAN);
+    let value = |pair: &[u16; 2]| number(DataType::F32, order, pair).map_or(f64::NAN, Exact::near);
     let steady = pairs.windows(2).all(|two| {
         let (old, new) = (value(&two[0]), value(&two[1]));
         (new - old).abs() <= STEP_MAX * old.abs().max(new.abs())

@@ -5,7 +5,12 @@ use std::collections::BTreeMap;
 
 use crate::{
     bus::interpret,
-    plant::tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
+    plant::{
+        exact::Exact,
+        number::digits,
+        scale,
+        tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
+    },
     t,
 };
 
@@ -31,7 +36,7 @@ pub struct Named {
     /// `SV`.
     pub name: String,
     /// Names of the numbers of an enumeration, before scaling; empty for a quantity.
-    pub enum_labels: Vec<(i64, String)>,
+    pub enum_labels: Vec<(i128, String)>,
 }
 
 impl Named {
@@ -57,9 +62,11 @@ impl Named {
         let point = tag.point;
         let plain = Named::new(point.table, point.address, point.kind, point.order, &tag.short);
         let Some((decimals, unit)) = scaling else { return Named { unit: t!("raw").to_owned(), ..plain } };
-        let point = if let Decimals::From(_) = tag.decimals { 0.1f64.powi(i32::from(decimals)) } else { 1.0 };
+        let scaling = if let Decimals::From(_) = tag.decimals { decimals } else { 0 };
+        // As a person would write the product.
+        let scale = format!("{}e-{scaling}", tag.scale).parse().unwrap_or(tag.scale);
         let enum_labels = tag.enum_labels.clone();
-        Named { scale: tag.scale * point, offset: tag.offset, decimals, unit, enum_labels, ..plain }
+        Named { scale, offset: tag.offset, decimals, unit, enum_labels, ..plain }
     }
 
     /// Registers or bits that it takes.
@@ -68,8 +75,8 @@ impl Named {
     }
 
     /// Its value, of the words from its address on; `None` where there are too few or they hold no number.
-    pub fn value(&self, words: &[u16]) -> Option<f64> {
-        Some(self.raw(words)? * self.scale + self.offset)
+    pub fn value(&self, words: &[u16]) -> Option<Exact> {
+        Some(scale::scaled(self.raw(words)?, self.scale, self.offset, 0))
     }
 
     /// `70.0 °C`, `RUN`; `None` as for [`Named::value`].
@@ -78,10 +85,10 @@ impl Named {
             return words.get(..usize::from(self.len())).map(interpret::text);
         }
         let raw = self.raw(words)?;
-        if let Some((_, label)) = self.enum_labels.iter().find(|(number, _)| *number as f64 == raw) {
+        if let Some((_, label)) = self.enum_labels.iter().find(|(number, _)| Exact::whole(*number) == raw) {
             return Some(label.clone());
         }
-        let value = format!("{:.*}", usize::from(self.decimals), raw * self.scale + self.offset);
+        let value = digits(scale::scaled(raw, self.scale, self.offset, 0), Some(self.decimals));
         Some(if self.unit.is_empty() { value } else { format!("{value} {}", self.unit) })
     }
 
@@ -90,8 +97,9 @@ impl Named {
         Point { table: self.table, address: self.address, kind: self.kind, order: self.order, field: None }
     }
 
-    fn raw(&self, words: &[u16]) -> Option<f64> {
-        let bit = || words.first().map(|word| f64::from(*word));
+    /// The number before scaling; `None` as for [`Named::value`].
+    pub fn raw(&self, words: &[u16]) -> Option<Exact> {
+        let bit = || words.first().map(|word| f64::from(*word).into());
         if self.table.is_bits() { bit() } else { interpret::number(self.kind, self.order, words) }
     }
 }

@@ -43,7 +43,7 @@ pub fn rows(tab: &Registers, height: u16) -> usize {
 /// What words may mean as numbers, in this byte order.
 pub fn meanings(words: &[u16], order: ByteOrder) -> Vec<f64> {
     let kinds = [DataType::U16, DataType::I16, DataType::U32, DataType::I32, DataType::F32, DataType::Bcd16];
-    let number = |kind| interpret::number(kind, order, words);
+    let number = |kind| interpret::number(kind, order, words).map(Exact::near);
     kinds.into_iter().filter_map(number).collect()
 }
 

@@ -37,8 +37,8 @@ struct Watched {
     samples: VecDeque<Sample>,
     good: u32,
     sum: f64,
-    least: f64,
-    greatest: f64,
+    least: Exact,
+    greatest: Exact,
 }
 
 /// A log under way.
@@ -106,7 +106,7 @@ impl WatchList {
 
 impl Watched {
     fn new(at: (Table, u16)) -> Watched {
-        let (least, greatest) = (f64::INFINITY, f64::NEG_INFINITY);
+        let (least, greatest) = (f64::INFINITY.into(), f64::NEG_INFINITY.into());
         Watched { at, samples: VecDeque::new(), good: 0, sum: 0.0, least, greatest }
     }
 
@@ -115,9 +115,10 @@ impl Watched {
             self.samples.pop_front();
         }
         self.samples.push_back(sample);
-        if let Some(value) = sample.good_value() {
-            (self.good, self.sum) = (self.good.saturating_add(1), self.sum + value);
-            (self.least, self.greatest) = (self.least.min(value), self.greatest.max(value));
+        if let Some(value) = sample.good_exact() {
+            (self.good, self.sum) = (self.good.saturating_add(1), self.sum + value.near());
+            self.least = if value < self.least { value } else { self.least };
+            self.greatest = if value > self.greatest { value } else { self.greatest };
         }
     }
 }
@@ -207,7 +208,7 @@ impl Registers {
             let before = item.samples.back().copied().unwrap_or(Sample::bad(Cause::NotRead, at));
             let sample = sample(reading, named, Sample { at, ..before });
             item.push(sample);
-            cells.push((sample.good_value().map_or(String::new(), |value| exact(named, value)), sample.quality));
+            cells.push((sample.good_exact().map_or(String::new(), |value| logged(named, value)), sample.quality));
         }
         if is_due { self.watch.log_row(at, cells) } else { Vec::new() }
     }
@@ -273,9 +274,9 @@ fn sample(reading: &LiveReading, named: &Named, before: Sample) -> Sample {
 }
 
 /// A value for the log: a plain float with all its digits, others with the decimals of their scale.
-fn exact(named: &Named, value: f64) -> String {
+fn logged(named: &Named, value: Exact) -> String {
     match named.kind {
-        DataType::F32 if named.scale == 1.0 => to_f32(value).to_string(),
+        DataType::F32 if named.scale == 1.0 => to_f32(value.near()).to_string(),
         DataType::F64 if named.scale == 1.0 => value.to_string(),
         DataType::Bool
         | DataType::I16
@@ -288,7 +289,7 @@ fn exact(named: &Named, value: f64) -> String {
         | DataType::F64
         | DataType::Bcd16
         | DataType::Bcd32
-        | DataType::Text(_) => format!("{value:.*}", usize::from(named.decimals)),
+        | DataType::Text(_) => digits(value, Some(named.decimals)),
     }
 }
 
@@ -345,18 +346,17 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         if item.good == 0 {
             continue;
         }
-        let decimals = usize::from(named.decimals);
-        let text = |value: f64| format!("{value:.decimals$}");
+        let text = |value: Exact| digits(value, Some(named.decimals));
         let (least, greatest) = (text(item.least), text(item.greatest));
-        let mean = text(item.sum / f64::from(item.good));
+        let mean = text((item.sum / f64::from(item.good)).into());
         let words = t!("{least} to {greatest}, mean {mean}", least, greatest, mean);
         let x = canvas.text(36, y, &words, theme.dim()) + 2;
         let room = usize::from(width.saturating_sub(x + 1)).min(60);
         let recent = item.samples.iter().rev().take(room).rev();
         let recent: Vec<Option<f64>> =
-            recent.map(|sample| sample.good_value().map(|value| value - item.least)).collect();
+            recent.map(|sample| sample.good_exact().map(|value| (value - item.least).near())).collect();
         if 4 <= room && 0 < to_u32(recent.len()) {
-            let range = (item.greatest - item.least).max(f64::MIN_POSITIVE);
+            let range = (item.greatest - item.least).near().max(f64::MIN_POSITIVE);
             canvas.text(x, y, &spark::bars(&recent, range, theme.glyphs), theme.normal());
         }
     }

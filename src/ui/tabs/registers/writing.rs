@@ -15,6 +15,7 @@ use crate::{
         diagnostics::{Diagnostic, DiagnosticState, Finding, RegisterWrite},
         event::ExceptionCode,
         live::number,
+        scale,
         tag::{ByteOrder, DataType, Point, Table},
     },
 };
@@ -242,7 +243,7 @@ fn typed_as(text: &str, named: &Named, held: &[u16]) -> Result<Vec<u16>, String>
         return words.ok_or_else(|| t!("found `{text}`, expected at most {most} printable characters", text, most));
     }
     if let Some((raw, _)) = named.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text)) {
-        return encode(named, *raw as f64).ok_or_else(|| does_not_fit(text, named));
+        return encode(named, Exact::whole(*raw)).ok_or_else(|| does_not_fit(text, named));
     }
     let wrong = || {
         t!(
@@ -252,20 +253,26 @@ fn typed_as(text: &str, named: &Named, held: &[u16]) -> Result<Vec<u16>, String>
             shown = named.text(held).unwrap_or_default()
         )
     };
-    let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite());
+    let number = |text: &str| text.parse::<Exact>().ok().filter(|value| value.is_finite());
     let value = match text.strip_prefix('+') {
         Some(by) => number(by).zip(named.value(held)).map(|(by, value)| value + by),
         None => number(text),
     };
-    let raw = (value.ok_or_else(wrong)? - named.offset) / named.scale;
+    let value = value.ok_or_else(wrong)?;
+    let raw = (value.near() - named.offset) / named.scale;
     if matches!(named.kind, DataType::F32 | DataType::F64) {
-        return encode(named, raw).ok_or_else(|| does_not_fit(text, named));
+        return encode(named, raw.into()).ok_or_else(|| does_not_fit(text, named));
     }
+    let whole = scale::whole_raw(value, named.scale, named.offset, 0).map(Exact::whole);
+    let whole = whole.ok_or_else(|| does_not_fit(text, named))?;
+    let held = scale::scaled(whole, named.scale, named.offset, 0);
     // 70.2 / 0.1 is not quite 702.
-    if 1e-6 * raw.abs().max(1.0) < (raw - raw.round()).abs() {
+    let is_step =
+        if held.rest().is_some() { held == value } else { (raw - whole.near()).abs() <= 1e-6 * raw.abs().max(1.0) };
+    if !is_step {
         return Err(t!("{text}: {name} has steps of {step}", text, name = named.name, step = named.scale.abs()));
     }
-    encode(named, raw.round()).ok_or_else(|| does_not_fit(text, named))
+    encode(named, whole).ok_or_else(|| does_not_fit(text, named))
 }
 
 fn does_not_fit(text: &str, named: &Named) -> String {
@@ -274,16 +281,15 @@ fn does_not_fit(text: &str, named: &Named) -> String {
 
 /// One step of its last digit up or down; `None` where the type ends.
 fn next_step(named: &Named, held: &[u16], by: i16) -> Option<Vec<u16>> {
-    let raw = (named.value(held)? - named.offset) / named.scale;
-    match named.kind {
-        DataType::F32 | DataType::F64 => {
-            encode(named, raw + f64::from(by) * 10_f64.powi(-i32::from(named.decimals)) / named.scale)
-        }
-        _ => encode(named, raw.round() + f64::from(by)),
-    }
+    let raw = named.raw(held)?;
+    let step = match named.kind {
+        DataType::F32 | DataType::F64 => f64::from(by) * 10_f64.powi(-i32::from(named.decimals)) / named.scale,
+        _ => f64::from(by),
+    };
+    encode(named, raw + step.into())
 }
 
-fn encode(named: &Named, raw: f64) -> Option<Vec<u16>> {
+fn encode(named: &Named, raw: Exact) -> Option<Vec<u16>> {
     codec::encode(named.point(), raw)
 }
 

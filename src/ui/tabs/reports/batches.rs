@@ -235,8 +235,7 @@ fn details(cx: &ViewContext, report: &BatchReport) -> Vec<String> {
 }
 
 fn figures(tag: &TagFigures) -> String {
-    let value =
-        |value: Option<f64>| value.map_or("–".to_owned(), |value| format!("{value:.*}", usize::from(tag.decimals)));
+    let value = |value: Option<Exact>| value.map_or("–".to_owned(), |value| digits(value, Some(tag.decimals)));
     t!(
         "{tag} {min} to {max} {unit}   mean/+ {mean}   good {good} %",
         tag = pad(&tag.tag, 16),

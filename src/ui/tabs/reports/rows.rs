@@ -127,7 +127,7 @@ impl Condition {
             Column::Pv => row.pv,
             Column::Er => row.er,
         };
-        value.is_some_and(|value| if self.above { self.limit < value } else { value < self.limit })
+        value.is_some_and(|value| if self.above { value > self.limit } else { value < self.limit })
     }
 }
 
@@ -183,8 +183,8 @@ impl Rows {
         let unit = report.record_of.as_ref().map_or("", |(_, unit)| unit.as_str());
         let heading = [t!("date"), t!("time"), "SV", "PV", "ER", unit];
         canvas.text(1, 0, &draw::columns(WIDTHS, heading), theme.dim());
-        let decimals = usize::from(record_decimals(report, cx.def()));
-        let number = |value: Option<f64>| value.map_or("----".to_owned(), |value| format!("{value:.decimals$}"));
+        let decimals = Some(record_decimals(report, cx.def()));
+        let number = |value: Option<Exact>| value.map_or("----".to_owned(), |value| digits(value, decimals));
         let first = self.scroll.first(rows.len(), room);
         for (y, _, row) in on_screen(&rows, first, room) {
             let [date, time] = ["%Y-%m-%d", "%H:%M:%S"].map(|format| draw::local(cx, row.at, format));
@@ -238,7 +238,7 @@ mod tests {
 
     #[test]
     fn what_is_not_known_fits_no_condition() {
-        let row = RecordRow { at: Timestamp::UNIX_EPOCH, sv: Some(70.0), pv: None, er: None };
+        let row = RecordRow { at: Timestamp::UNIX_EPOCH, sv: Some(70.0.into()), pv: None, er: None };
         let holds = |text: &str| match parse(text) {
             Some(Typed::Conditions(conditions)) => conditions.iter().all(|condition| condition.holds(&row)),
             _ => panic!("{text} is a condition"),

@@ -116,18 +116,20 @@ impl Stand {
 
 fn report(period: Period, full: bool) -> ShiftReport {
     let until = period.to.min(now());
-    let tag = |tag: &str, unit: &str, decimals, min: f64, mean, max, last: Option<f64>, in_alarm, good| TagFigures {
-        tag: tag.to_owned(),
-        unit: unit.to_owned(),
-        decimals,
-        first: None,
-        min: full.then_some(min),
-        mean: full.then_some(mean),
-        max: full.then_some(max),
-        last: last.filter(|_| full),
-        difference: None,
-        in_alarm: std::time::Duration::from_secs(in_alarm),
-        good: if full { good } else { 0.0 },
+    let tag = |tag: &str, unit: &str, decimals, min: f64, mean: f64, max: f64, last: Option<f64>, in_alarm, good| {
+        TagFigures {
+            tag: tag.to_owned(),
+            unit: unit.to_owned(),
+            decimals,
+            first: None,
+            min: full.then_some(min.into()),
+            mean: full.then_some(mean.into()),
+            max: full.then_some(max.into()),
+            last: last.filter(|_| full).map(Exact::from),
+            difference: None,
+            in_alarm: std::time::Duration::from_secs(in_alarm),
+            good: if full { good } else { 0.0 },
+        }
     };
     let at = |seconds: i64| period.from + SignedDuration::from_secs(seconds);
     let alarm = |seconds, priority, subject: &str, text: &str, step, by: Option<&str>| AlarmRecord {
@@ -136,7 +138,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         message: text.into(),
         priority,
         event: step,
-        value: (subject == "TIC-1.PV").then_some(72.44),
+        value: (subject == "TIC-1.PV").then_some(72.44.into()),
         limit: None,
         by: by.map(Into::into),
         reason: None,
@@ -168,9 +170,9 @@ fn report(period: Period, full: bool) -> ShiftReport {
         charts: Vec::new(),
         batches: Vec::new(),
         tags: vec![
-            tag("TIC-1.PV", "°C", 1, 26.8, 58.31, 72.6, Some(72.4), 41, 0.989_99),
-            tag("TIC-1.MV", "%", 1, 0.0, 41.3, 100.0, Some(12.0), 0, 1.0),
-            tag("PLC-1.FLOW", "l/min", 2, 0.0, 0.412, 1.25, None, 0, 0.742),
+            tag("TIC-1.PV", "°C", 1, 26.8, 58.31.into(), 72.6, Some(72.4), 41, 0.989_99),
+            tag("TIC-1.MV", "%", 1, 0.0, 41.3.into(), 100.0, Some(12.0), 0, 1.0),
+            tag("PLC-1.FLOW", "l/min", 2, 0.0, 0.412.into(), 1.25, None, 0, 0.742),
         ],
         suppressed: Vec::new(),
         alarms: if full { alarms } else { Vec::new() },

@@ -250,8 +250,8 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport, charted: Option<usize>, lat
 
 fn figures(cx: &ViewContext, tag: &TagFigures, charted: bool, later: bool) -> Line<'static> {
     let (theme, (name, figure)) = (cx.theme, widths(cx.area.width));
-    let value = |value: Option<f64>| match value {
-        Some(value) => pad_left(&format!("{value:.*}", usize::from(tag.decimals)), figure),
+    let value = |value: Option<Exact>| match value {
+        Some(value) => pad_left(&digits(value, Some(tag.decimals)), figure),
         None => pad_left("–", figure),
     };
     let mean = mean_or_difference(tag).replace('—', "–");
@@ -333,7 +333,7 @@ fn suppressed_line(cx: &ViewContext, alarm: &SuppressedSummary) -> Line<'static>
 /// One step of an alarm. An acknowledgement shows who, the other steps the value.
 fn alarm_line(cx: &ViewContext, alarm: &AlarmRecord, time: String) -> Line<'static> {
     let theme = cx.theme;
-    let value = |value: f64| match cx.def().tag_named(&alarm.subject) {
+    let value = |value: Exact| match cx.def().tag_named(&alarm.subject) {
         Some(tag) => format!("{} {}", value::number(cx, tag, value), cx.snapshot.unit(tag)),
         None => format!("{value}"),
     };

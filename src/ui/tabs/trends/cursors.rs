@@ -30,7 +30,7 @@ pub(super) struct Measured {
 
 impl Measured {
     /// From A to B, of good values only.
-    pub fn difference(&self) -> Option<f64> {
+    pub fn difference(&self) -> Option<Exact> {
         let [a, b] = self.ends.map(|end| end.filter(|end| end.quality.is_good()).and_then(|end| end.value));
         Some(b? - a?)
     }
@@ -38,7 +38,7 @@ impl Measured {
     /// The difference per minute.
     pub fn slope(&self, span: SignedDuration) -> Option<f64> {
         let minutes = span.as_secs_f64() / 60.0;
-        self.difference().map(|difference| difference / minutes).filter(|slope| slope.is_finite())
+        self.difference().map(|difference| difference.near() / minutes).filter(|slope| slope.is_finite())
     }
 }
 

@@ -10,7 +10,7 @@ impl Trends {
         }
         for pen in self.pens(cx) {
             let sample = cx.snapshot.sample(pen.tag);
-            let value = sample.good_value();
+            let value = sample.good_exact();
             let at = if value.is_some() { sample.at } else { cx.now };
             self.traces.entry(pen.tag).or_default().push(at, value);
         }

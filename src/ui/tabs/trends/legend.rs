@@ -140,7 +140,7 @@ fn cells(cx: &ViewContext, tag: TagId, measured: &Measured, span: SignedDuration
     let decimals = usize::from(cx.snapshot.decimals[tag.index()]) + 1;
     let slope = measured.slope(span).map(|slope| signed(format!("{slope:.decimals$}")));
     let summary = measured.figures.and_then(|(summary, _)| summary);
-    let of = |pick: fn((f64, f64, f64)) -> f64| summary.map(|all| cx.snapshot.format(tag, pick(all)));
+    let of = |pick: fn((Exact, Exact, Exact)) -> Exact| summary.map(|all| cx.snapshot.format(tag, pick(all)));
     let good = measured.figures.map(|(_, good)| share(good));
     let good_style = if measured.figures.is_some_and(|(_, good)| good < 0.9995) { theme.strong() } else { theme.dim() };
     let [a, b] = measured.ends.map(|end| held(cx, tag, end));

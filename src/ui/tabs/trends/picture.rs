@@ -339,7 +339,7 @@ fn legend(page: &mut Drawing, trends: &Trends, cx: &ViewContext, (n, pen): (usiz
     let own = own.map(|scale| t!("   scale {low} – {high}", low = number(scale.low), high = number(scale.high)));
     page.line(vec![(PLOT.0, y), (PLOT.0 + 24.0, y)], Ink::Pen(n), 3.0, false);
     let figures = trends.figures.get(&pen.tag).filter(|_| !lanes::is_state(def)).map(|(summary, good)| {
-        let value = |value: f64| cx.snapshot.format(pen.tag, value);
+        let value = |value: Exact| cx.snapshot.format(pen.tag, value);
         let values = summary.map(|(min, mean, max)| {
             t!("min {min}  mean {mean}  max {max}", min = value(min), mean = value(mean), max = value(max))
         });

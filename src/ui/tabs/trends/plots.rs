@@ -6,7 +6,7 @@ use super::{
     *,
 };
 use crate::{
-    plant::number::to_usize,
+    plant::number::{digits, to_usize},
     ui::widgets::{
         axes::Axes,
         chart::{axis::Scale, mark, raster, raster::Canvas as Dots, trace::Span},
@@ -160,13 +160,13 @@ pub(super) fn draw_histogram(trends: &Trends, cx: &ViewContext, canvas: &mut Can
             }
         }
     }
-    let decimals = usize::from(cx.snapshot.decimals[pen.tag.index()]) + 1;
+    let decimals = Some(cx.snapshot.decimals[pen.tag.index()] + 1);
     let view = trends.span(cx);
     let span = trends.both().map_or(view.width(), |(a, b)| b.duration_since(a).abs());
     let words = t!(
         "mean {mean}   standard deviation {deviation}   in {time}",
-        mean = mean.map_or("–".to_owned(), |mean| format!("{mean:.decimals$}")),
-        deviation = format!("{deviation:.decimals$}"),
+        mean = mean.map_or("–".to_owned(), |mean| digits(mean, decimals)),
+        deviation = digits(deviation, decimals),
         time = signed_time(span)
     );
     canvas.text_right(width.saturating_sub(1), 0, &words, theme.normal());

@@ -51,7 +51,7 @@ impl Response {
 
 /// The last step of SV and the answer of PV.
 fn last_step([sv, pv]: &[Series; 2]) -> Option<StepResponse> {
-    let lasts = |series: &Series| series.buckets.iter().map(|bucket| bucket.map(|b| b.last)).collect::<Vec<_>>();
+    let lasts = |series: &Series| series.buckets.iter().map(|bucket| bucket.map(|b| b.last.near())).collect::<Vec<_>>();
     step_response(Loop { from: pv.from, step: pv.step, sv: &lasts(sv), pv: &lasts(pv) })
 }
 

@@ -128,7 +128,7 @@ impl Stand {
                 message: "temperature high".into(),
                 priority: Priority::High,
                 event: AlarmEvent::Raised,
-                value: Some(72.1),
+                value: Some(72.1.into()),
                 limit: Some(72.0),
                 by: None,
                 reason: None,
@@ -156,8 +156,8 @@ impl Stand {
             let is_state = lanes::is_state(self.model.snapshot.def.tag(tag));
             let past = |tag, at| if is_state { (past(tag, at) / 12.0).floor() % 2.0 } else { past(tag, at) };
             let (first, last) = (past(tag, at), past(tag, at + step));
-            let bucket = Bucket { min: first.min(last), max: first.max(last), mean: (first + last) / 2.0, last };
-            known(at).then_some(bucket)
+            let (min, max, mean) = (first.min(last), first.max(last), (first + last) / 2.0);
+            known(at).then_some(Bucket { min, max, mean, last: last.into() })
         };
         // Good is the share of the whole span, also of the part that lies ahead.
         let ahead = to.duration_since(now()).max(SignedDuration::ZERO).as_secs_f64();
@@ -165,7 +165,7 @@ impl Stand {
         let good = if self.gap.0 < self.gap.1 { good - 0.166 } else { good };
         // What lies between two cursors has figures that tell from where on.
         let apart = if count == 1 { now().duration_since(from).as_secs_f64() / 100.0 } else { 0.0 };
-        let summary = (self.begin < now()).then_some((58.25 - apart, 64.0, 70.0));
+        let summary = (self.begin < now()).then_some(((58.25 - apart).into(), 64.0.into(), 70.0.into()));
         let good = if summary.is_some() { good } else { 0.0 };
         Series { tag, from, step, buckets: (0..count).map(bucket).collect(), summary, good }
     }

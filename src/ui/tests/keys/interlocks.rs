@@ -20,7 +20,7 @@ fn a_pump_is_switched_by_its_manual_command() {
         assert_eq!(sent_kind(&type_keys(&mut model, "⏎↓⏎")), None, "asks first");
         let shown = screen(&mut model, 80, 24);
         assert_eq!(shown.contains("! effective in MANUAL only (PLC-1.AUTO is AUTO)"), warned, "{shown}");
-        let command = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
+        let command = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0.into() };
         assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
     }
     // One without such a command has nothing to write.
@@ -39,7 +39,7 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     assert!(shown.contains("old AUTO  →  new MANUAL"), "{shown}");
     assert!(shown.contains("PLC-1.MAN.P-1 has no effect now"), "{shown}");
     assert!(shown.contains("Manual commands take over; no output changes."), "{shown}");
-    let command = CommandKind::Write { tag: fixture.tag("PLC-1.AUTO"), value: 0.0 };
+    let command = CommandKind::Write { tag: fixture.tag("PLC-1.AUTO"), value: 0.0.into() };
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
     assert!(matches!(model.modal, Some(Modal::Faceplate(_))), "back where it was asked from");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎⏎")), None, "further Enters send nothing that was not asked");
@@ -52,7 +52,7 @@ fn in_auto_the_change_to_manual_is_a_step_of_its_own() {
     fixture.set("PLC-1.AUTO", 0.0);
     let mut model = faceplate(&fixture, "PLC-1.P-1");
     assert_eq!(sent_kind(&type_keys(&mut model, "tt")), None, "a key pressed twice sends nothing");
-    let command = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0 };
+    let command = CommandKind::Write { tag: fixture.tag("PLC-1.MAN.P-1"), value: 1.0.into() };
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&command));
 }
 
@@ -152,7 +152,7 @@ fn a_key_that_is_sent_first_is_named_before_it_is() {
 fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.P-1", 1.0);
-    let stop = CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
+    let stop = CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0.into() };
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "r");
     let shown = screen(&mut model, 80, 24);
@@ -169,7 +169,7 @@ fn a_stop_takes_two_keys_and_says_what_it_switches_off() {
 fn a_stop_need_not_wait_for_a_window_to_close() {
     let mut fixture = Fixture::normal();
     fixture.set("PLC-1.AUTO", 0.0);
-    let stop = CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0 };
+    let stop = CommandKind::Write { tag: fixture.tag("PLC-1.RUN"), value: 0.0.into() };
     for before in ["", "t"] {
         let mut model = faceplate(&fixture, "PLC-1.P-1");
         type_keys(&mut model, before);
@@ -212,10 +212,10 @@ fn the_mimic_shows_how_a_command_went() {
     let id = CommandId { terminal: 9, number: 1 };
     let check = |fixture: &Fixture, outcome: Option<Outcome>, mismatch: bool, expect: &str| {
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        let kind = CommandKind::Write { tag, value: 1.0 };
+        let kind = CommandKind::Write { tag, value: 1.0.into() };
         let at = snapshot.at;
         let status = |outcome| CommandStatus {
-            old: Some(0.0),
+            old: Some(0.0.into()),
             outcome,
             ..CommandStatus::new(Command::new(0, id, kind), "b", at)
         };
@@ -249,7 +249,7 @@ fn a_mark_counts_from_the_outcome_of_its_command() {
     let tag = fixture.tag("PLC-1.MAN.P-1");
     let check = |outcome: Outcome, since: i64, expect: Option<&str>| {
         let mut snapshot = Arc::unwrap_or_clone(fixture.snapshot());
-        let kind = CommandKind::Write { tag, value: 1.0 };
+        let kind = CommandKind::Write { tag, value: 1.0.into() };
         // A slow line: accepted two minutes before.
         let accepted_at = snapshot.at - SignedDuration::from_secs(121);
         let status = CommandStatus::new(Command::new(0, CommandId::default(), kind), "b", accepted_at);

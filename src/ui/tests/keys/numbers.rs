@@ -8,7 +8,7 @@ fn a_number_is_written_only_after_enter() {
     let mut model = model(&fixture, Theme::FULL);
     assert_eq!(type_keys(&mut model, "s65.5"), []);
     let effects = type_keys(&mut model, "⏎");
-    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5 }));
+    assert_eq!(sent_kind(&effects), Some(&CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: 65.5.into() }));
     assert_eq!(model.modal, None);
     assert!(screen(&mut model, 80, 24).contains("TIC-1.SV ? → 65.5 °C  sent"));
 }
@@ -22,7 +22,11 @@ fn what_is_typed_is_what_is_written_or_refused() {
         let shown = screen(&mut model, 80, 24);
         match expect {
             Ok(value) => {
-                assert_eq!(command, Some(CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value }), "{keys}")
+                assert_eq!(
+                    command,
+                    Some(CommandKind::Write { tag: fixture.tag("TIC-1.SV"), value: value.into() }),
+                    "{keys}"
+                )
             }
             Err(words) => {
                 assert_eq!(command, None, "{keys}");
@@ -54,7 +58,7 @@ fn what_was_seen_is_sent_though_values_become_uncertain() {
         Effect::Command(command, _) => Some(command.expected_value),
         _ => None,
     });
-    assert_eq!(seen, Some(Some(70.0)), "the window showed `old 70.0`");
+    assert_eq!(seen, Some(Some(70.0.into())), "the window showed `old 70.0`");
 }
 
 #[test]
@@ -67,5 +71,5 @@ fn a_rounded_number_is_shown_rounded_before_it_is_written() {
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("72.3 → the resolution of the device is 0.5: 72.5"), "{shown}");
     assert!(shown.contains("new 72.5 °C"), "{shown}");
-    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&CommandKind::Write { tag: sv, value: 72.5 }));
+    assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), Some(&CommandKind::Write { tag: sv, value: 72.5.into() }));
 }

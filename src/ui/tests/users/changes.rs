@@ -13,7 +13,7 @@ fn refused_credentials_are_asked_again_in_their_window() {
     let outcome_of = |request: &Command, outcome: Outcome| {
         let mut snapshot = fixture.snapshot();
         Arc::make_mut(&mut snapshot).commands = vec![CommandStatus {
-            old: Some(70.0),
+            old: Some(70.0.into()),
             outcome,
             ..CommandStatus::new(Command::new(0, request.id, request.kind.clone()), "anna", fixture::now())
         }];

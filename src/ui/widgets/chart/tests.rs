@@ -17,7 +17,7 @@ fn at(second: i64) -> Timestamp {
 
 /// A trace of one-second columns from second 0; NAN is a gap.
 fn trace(values: impl IntoIterator<Item = f64>) -> Trace {
-    let bucket = |v: f64| v.is_finite().then_some(Bucket { min: v, max: v, mean: v, last: v });
+    let bucket = |v: f64| v.is_finite().then_some(Bucket { min: v, max: v, mean: v, last: v.into() });
     let mut trace = Trace::default();
     let buckets = values.into_iter().map(bucket).collect();
     let step = Duration::from_secs(1);

@@ -6,7 +6,10 @@ use jiff::{SignedDuration, Timestamp};
 
 use crate::{
     history::{Bucket, Series},
-    plant::number::{to_i64, to_u32, to_usize},
+    plant::{
+        exact::Exact,
+        number::{to_i64, to_u32, to_usize},
+    },
 };
 
 /// Live values kept while no newer answer comes; the oldest go first, and the history has them.
@@ -16,7 +19,7 @@ const LIVE_MAX: usize = 4096;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trace {
     past: Option<Series>,
-    live: VecDeque<(Timestamp, Option<f64>)>,
+    live: VecDeque<(Timestamp, Option<Exact>)>,
 }
 
 /// What a curve did within one column of dots.
@@ -48,7 +51,7 @@ impl Trace {
 
     /// Adds a live value if it is news; `None` is "no good value". A value that is not newer than the last one counts
     /// from just after it.
-    pub fn push(&mut self, at: Timestamp, value: Option<f64>) {
+    pub fn push(&mut self, at: Timestamp, value: Option<Exact>) {
         let value = value.filter(|value| value.is_finite());
         let at = match self.live.back() {
             Some((_, held)) if *held == value => return,
@@ -78,7 +81,7 @@ impl Trace {
     }
 
     /// The value at an instant: the live value that held, or the last one of its column in the history.
-    pub fn value_at(&self, at: Timestamp) -> Option<f64> {
+    pub fn value_at(&self, at: Timestamp) -> Option<Exact> {
         if self.live.front().is_some_and(|(first, _)| *first <= at) {
             let after = self.live.partition_point(|(live, _)| *live <= at);
             return self.live[after - 1].1;
@@ -127,7 +130,8 @@ impl Trace {
     fn live_span(&self, a: i64, b: i64) -> Option<Span> {
         let first = self.live.partition_point(|(at, _)| at.as_microsecond() <= a).saturating_sub(1);
         let values = self.live.iter().skip(first).take_while(|(at, _)| at.as_microsecond() < b);
-        let spans = values.map(|(_, value)| value.map(|value| Span { min: value, max: value, last: value }));
+        let span = |value: f64| Span { min: value, max: value, last: value };
+        let spans = values.map(|(_, value)| value.map(|value| span(value.near())));
         spans.fold(None, join)
     }
 }
@@ -143,7 +147,7 @@ fn join(a: Option<Span>, b: Option<Span>) -> Option<Span> {
 /// A column of the history, unless it is not a number.
 fn span(bucket: Bucket) -> Option<Span> {
     let finite = bucket.min.is_finite() && bucket.max.is_finite() && bucket.last.is_finite();
-    finite.then_some(Span { min: bucket.min, max: bucket.max, last: bucket.last })
+    finite.then_some(Span { min: bucket.min, max: bucket.max, last: bucket.last.near() })
 }
 
 fn micros(step: Duration) -> i64 {
@@ -163,7 +167,7 @@ mod tests {
 
     /// A history of 10 s columns from second 0; NAN is a gap.
     fn past(values: &[f64]) -> Series {
-        let bucket = |v: &f64| v.is_finite().then_some(Bucket { min: *v, max: *v, mean: *v, last: *v });
+        let bucket = |v: &f64| v.is_finite().then_some(Bucket { min: *v, max: *v, mean: *v, last: (*v).into() });
         Series {
             tag: TagId(0),
             from: at(0),
@@ -176,7 +180,7 @@ mod tests {
 
     fn trace(values: &[f64], live: &[(i64, f64)]) -> Trace {
         let mut trace = Trace { past: Some(past(values)), ..Trace::default() };
-        live.iter().for_each(|(second, value)| trace.push(at(*second), Some(*value)));
+        live.iter().for_each(|(second, value)| trace.push(at(*second), Some((*value).into())));
         trace
     }
 
@@ -216,7 +220,7 @@ mod tests {
         check(&trace(&[1., 2.], &[(12, 7.)]), 20, 20, 8, "1 1 1 1 2…7 7 7 7");
         let mut gap = trace(&[1.], &[(10, 5.)]);
         gap.push(at(20), None);
-        gap.push(at(30), Some(6.));
+        gap.push(at(30), Some(6.0.into()));
         check(&gap, 40, 40, 4, "1 5 - 6");
     }
 
@@ -224,7 +228,7 @@ mod tests {
     fn an_answer_takes_over_from_the_live_values_that_it_covers() {
         let mut trace = trace(&[], &[(0, 1.), (10, 2.), (20, 3.), (30, 4.)]);
         trace.set_past(past(&[1., 2., 3.]), at(28));
-        assert_eq!(trace.live, [(at(28), Some(3.)), (at(30), Some(4.))]);
+        assert_eq!(trace.live, [(at(28), Some(3.0.into())), (at(30), Some(4.0.into()))]);
         check(&trace, 40, 40, 4, "1 2 3 4");
     }
 
@@ -234,7 +238,7 @@ mod tests {
         for (second, expect) in
             [(-1, None), (0, Some(1.)), (9, Some(1.)), (10, None), (20, Some(7.)), (29, Some(7.)), (99, Some(8.))]
         {
-            assert_eq!(trace.value_at(at(second)), expect, "at {second} s");
+            assert_eq!(trace.value_at(at(second)).map(Exact::near), expect, "at {second} s");
         }
     }
 
@@ -250,9 +254,9 @@ mod tests {
     #[test]
     fn live_values_are_bounded_and_in_order() {
         let mut trace = Trace::default();
-        (0..5000).for_each(|second| trace.push(at(second), Some(second as f64)));
-        trace.push(at(5000), Some(4999.));
-        assert_eq!((trace.live.len(), trace.live.back()), (LIVE_MAX, Some(&(at(4999), Some(4999.)))));
+        (0..5000).for_each(|second| trace.push(at(second), Some((second as f64).into())));
+        trace.push(at(5000), Some(4999.0.into()));
+        assert_eq!((trace.live.len(), trace.live.back()), (LIVE_MAX, Some(&(at(4999), Some(4999.0.into())))));
         trace.push(at(10), None);
         assert!(trace.live.back().is_some_and(|(last, value)| *last > at(4999) && value.is_none()));
     }

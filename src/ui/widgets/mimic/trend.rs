@@ -55,7 +55,7 @@ pub fn view(
         canvas.text_right(end, rows, &bottom, theme.dim());
     }
     let style = theme.pen(0);
-    curve(&mut canvas.part(0, 1, columns, rows), series, (low, high), theme.glyphs, style);
+    curve(&mut canvas.part(0, 1, columns, rows), series, (low.near(), high.near()), theme.glyphs, style);
 }
 
 /// Two dots a cell across and four down in braille; else one bar a cell in eighths.

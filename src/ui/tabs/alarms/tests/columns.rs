@@ -11,7 +11,7 @@ fn a_status_word_is_shown_in_words_where_there_is_room() {
     fixture.def.tags[tag.index()].bit_labels = vec![(1, "input open".into()), (3, "low".into())];
     fixture.def.tags[tag.index()].unit.clear();
     fixture.samples[tag.index()].value = Some(10.0);
-    fixture.alarms[0].value = Some(10.0);
+    fixture.alarms[0].value = Some(10.0.into());
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "3");
     let shown = screen(&mut model, 160, 50);

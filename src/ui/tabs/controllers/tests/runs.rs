@@ -24,9 +24,9 @@ fn runs() -> Vec<ControlRun> {
 fn curve(tag: crate::plant::def::TagId, from: jiff::Timestamp) -> Answer {
     let bucket = |n: u32| {
         let mean = 27.0 + f64::from(n.min(40));
-        Some(Bucket { min: mean, max: mean, mean, last: mean })
+        Some(Bucket { min: mean, max: mean, mean, last: mean.into() })
     };
-    let (step, summary) = (Duration::from_secs(22), Some((27.0, 50.0, 67.0)));
+    let (step, summary) = (Duration::from_secs(22), Some((27.0.into(), 50.0.into(), 67.0.into())));
     Answer::Series(vec![Series { tag, from, step, buckets: (0..60).map(bucket).collect(), summary, good: 1.0 }])
 }
 

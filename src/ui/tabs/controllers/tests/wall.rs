@@ -49,10 +49,17 @@ fn each_faceplate_has_the_curve_of_its_own_value() {
     assert_eq!(tags.len(), 2);
     let step = Duration::try_from(now().duration_since(*from)).expect("a span") / *buckets as u32;
     let series = |(n, tag): (usize, &crate::plant::def::TagId)| {
-        let bucket = |mean: f64| Some(Bucket { min: mean, max: mean, mean, last: mean });
+        let bucket = |mean: f64| Some(Bucket { min: mean, max: mean, mean, last: mean.into() });
         let (low, high) = (n as f64 * 100.0, n as f64 * 100.0 + 9.0);
         let buckets = (0..*buckets).map(|n| bucket(low + n as f64 % 9.0)).collect();
-        Series { tag: *tag, from: *from, step, buckets, summary: Some((low, low, high)), good: 1.0 }
+        Series {
+            tag: *tag,
+            from: *from,
+            step,
+            buckets,
+            summary: Some((low.into(), low.into(), high.into())),
+            good: 1.0,
+        }
     };
     let answer = Answer::Series(tags.iter().enumerate().map(series).collect());
     update(&mut model, Msg::Answer(*id, Ok(answer)));

@@ -87,8 +87,8 @@ pub fn rising(tag: TagId, (from, to): (Timestamp, Timestamp), buckets: usize) ->
     let minutes = |n: usize| n as f64 * step.as_secs_f64() / 60.0;
     let bucket = |n| {
         let value = minutes(n);
-        Some(Bucket { min: value, max: value, mean: value, last: value })
+        Some(Bucket { min: value, max: value, mean: value, last: value.into() })
     };
-    let summary = Some((0.0, minutes(buckets) / 2.0, minutes(buckets)));
+    let summary = Some((0.0.into(), (minutes(buckets) / 2.0).into(), minutes(buckets).into()));
     Series { tag, from, step, buckets: (0..buckets).map(bucket).collect(), summary, good: 1.0 }
 }

@@ -11,7 +11,8 @@ fn recorded(theme: Theme, width: u16, height: u16) -> Stand {
         let row = |n: i64| {
             let pv = (n != 3).then_some(50.0 + n as f64 / 10.0);
             let at = period.from + SignedDuration::from_mins(n);
-            RecordRow { at, sv: Some(70.0), pv, er: pv.map(|pv| 70.0 - pv) }
+            let er = pv.map(|pv| (70.0 - pv).into());
+            RecordRow { at, sv: Some(70.0.into()), pv: pv.map(Exact::from), er }
         };
         let record = (0..120).map(row).collect();
         let report = ShiftReport { record, ..report(period, true) };

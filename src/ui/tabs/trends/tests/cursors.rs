@@ -75,7 +75,7 @@ fn only_good_values_make_a_difference() {
     let good = |value| Some(Sample::good(value, now()).into());
     let doubted = Some(Sample::good(5.0, now()).uncertain(Cause::Stale).into());
     let check = |ends, expect| assert_eq!(Measured { ends, figures: None }.difference(), expect);
-    check([good(2.0), good(5.0)], Some(3.0));
+    check([good(2.0), good(5.0)], Some(3.0.into()));
     check([good(2.0), doubted], None);
     check([None, good(2.0)], None);
     assert!(doubted.is_some_and(|held: crate::report::step_series::HeldValue| held.quality != Quality::Good));

@@ -128,7 +128,7 @@ fn no_number_of_the_legend_is_cut() {
         stand.gap = (ago(300), ago(180));
         stand.answer();
         for figures in stand.model.tabs.trends.figures.values_mut() {
-            *figures = (Some((123_456.7, 1_234_567.8, -1_234_567.8)), 1.0);
+            *figures = (Some((123_456.7.into(), 1_234_567.8.into(), (-1_234_567.8).into())), 1.0);
         }
         let screen = stand.screen();
         let row = screen.lines().find(|row| row.contains("TIC-1.SV")).unwrap_or_default();

@@ -90,7 +90,7 @@ fn live_values_are_on_the_screen_before_the_history_has_them() {
     stand.live(20, |second| if (8..12).contains(&second) { None } else { Some(90.0) });
     let cx = stand.model.cx();
     let trace = &stand.model.tabs.trends.traces[&TagId(0)];
-    assert_eq!(trace.value_at(cx.now), Some(90.0));
+    assert_eq!(trace.value_at(cx.now), Some(90.0.into()));
     assert_eq!(trace.value_at(ago(-9)), None, "no answer is a gap");
     insta::assert_snapshot!(stand.screen());
 }
