@@ -30,6 +30,7 @@
 //! | `logs` | logs of registers by `sightglass open`: killed, ended, shown again |
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
 //! | `settings` | settings of a line: tried out, saved into the plant file; commands made before a reload |
+//! | `exact` | counters of 64 bits from a slave to every screen, file and write: all digits; writes to all units of a line |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `guarded` | a station whose users must log in, for `rights` and `users` |
 //! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |
@@ -50,6 +51,7 @@ mod commands;
 mod devices;
 mod durability;
 mod endings;
+mod exact;
 mod formats;
 mod guarded;
 mod hostile;
