@@ -13,7 +13,7 @@ use super::{
     alarm::AlarmCommand,
     def::{DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::Diagnostic,
-    event::Fault,
+    event::{ExceptionCode, Fault},
     exact::Exact,
     procedure::ProcedureDef,
     restore::RestoreRequest,
@@ -254,6 +254,29 @@ pub struct WriteJob {
     pub verify: bool,
     /// It switches something off and goes before all that waits, see `super::interlock::is_stop`.
     pub urgent: bool,
+}
+
+/// The result of a write on the wire. The plant compares it and decides the outcome.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum WriteResult {
+    /// The device accepted it; then it was read back: this raw number.
+    ReadBack(Exact),
+    /// No valid answer; read once the unit was in sync again, the device holds this raw number.
+    ReadBackAfterNoResponse(Exact),
+    /// The device accepted it, but the read-back failed.
+    NotRead(Fault),
+    /// The device accepted it; the profile excludes a read-back.
+    Accepted,
+    /// A broadcast has left: no unit answers it.
+    Sent,
+    /// The device refused with an exception.
+    Refused(ExceptionCode),
+    /// No valid answer: it is not known whether the write took effect.
+    NoValidResponse(Fault),
+    /// Nothing was sent.
+    NotSent(Fault),
+    /// Nothing was sent: it still waited when a stop of the same tag came.
+    Superseded,
 }
 
 /// What the plant asks of a link task.

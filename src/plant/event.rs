@@ -6,6 +6,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
+pub use super::command::WriteResult;
 use super::{
     diagnostics::DiagnosticRun,
     exact::Exact,
@@ -128,29 +129,6 @@ pub enum Event {
         /// Its result.
         result: WriteResult,
     },
-}
-
-/// The result of a write on the wire. The plant compares it and decides the outcome.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum WriteResult {
-    /// The device accepted it; then it was read back: this raw number.
-    ReadBack(Exact),
-    /// No valid answer; read once the unit was in sync again, the device holds this raw number.
-    ReadBackAfterNoResponse(Exact),
-    /// The device accepted it, but the read-back failed.
-    NotRead(Fault),
-    /// The device accepted it; the profile excludes a read-back.
-    Accepted,
-    /// A broadcast has left: no unit answers it.
-    Sent,
-    /// The device refused with an exception.
-    Refused(ExceptionCode),
-    /// No valid answer: it is not known whether the write took effect.
-    NoValidResponse(Fault),
-    /// Nothing was sent.
-    NotSent(Fault),
-    /// Nothing was sent: it still waited when a stop of the same tag came.
-    Superseded,
 }
 
 /// Why a request did not end in a valid normal answer.
