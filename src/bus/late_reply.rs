@@ -228,10 +228,14 @@ impl LineReplies {
         self.units[usize::from(unit)].proof
     }
 
+    /// It has proved to be in sync by an answer.
+    pub fn proof_given(&mut self, unit: u8) {
+        self.units[usize::from(unit)].proof_given();
+    }
+
     /// That has proved nothing.
     pub fn proof_failed(&mut self, unit: u8) {
-        let proof = &mut self.units[usize::from(unit)].proof;
-        *proof = proof.next();
+        self.units[usize::from(unit)].proof_failed();
     }
 
     /// It has answered, and proves to be in sync if nothing more comes of it for so long; `None`: it is not about to.

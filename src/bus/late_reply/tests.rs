@@ -90,3 +90,19 @@ fn answers_that_overtake_each_other_prove_nothing() {
     replies.failed(&request, s(300));
     assert_eq!((replies.forget(1, s(305)), replies.forget(1, s(310))), (Some(s(5)), None), "or it never comes");
 }
+
+#[test]
+fn silence_is_tried_late_where_an_answer_has_proved_enough() {
+    let mut replies = LineReplies::new(Duration::from_secs(1), 0);
+    let tried = |replies: &mut LineReplies, count: usize| -> Vec<Proof> {
+        let next = |replies: &mut LineReplies| {
+            replies.proof_failed(1);
+            replies.proof(1)
+        };
+        (0..count).map(|_| next(replies)).collect()
+    };
+    assert!(tried(&mut replies, 3).contains(&Proof::Silence), "nothing is known of it");
+    replies.proof_given(1);
+    assert!(!tried(&mut replies, 8).contains(&Proof::Silence), "it has only been silent for a while");
+    assert!(tried(&mut replies, 3).contains(&Proof::Silence), "it may be another device");
+}

@@ -27,6 +27,9 @@ impl Proof {
     }
 }
 
+/// Proofs in vain after which a unit that has given one by an answer may be another one, which cannot.
+const IN_VAIN_MAX: u8 = 8;
+
 #[derive(Debug, Clone, Default)]
 pub(super) struct Unit {
     pub outstanding: OutstandingReplies,
@@ -50,6 +53,8 @@ pub(super) struct Unit {
     pub is_unsure: bool,
     /// What is tried next to prove that it is in sync.
     pub proof: Proof,
+    /// Proofs that may still be in vain before silence is tried: it has proved to be in sync by an answer.
+    spare_proofs: u8,
     /// Its last frame, if that answered a request without proving anything: see [`Proof::Silence`].
     pub settles_from: Option<Duration>,
 }
@@ -59,6 +64,20 @@ impl Unit {
         self.outstanding.clear();
         self.arrived.clear();
         (self.failed_at, self.unsolicited_at, self.is_unsure, self.settles_from) = (None, None, false, None);
+    }
+
+    /// It has proved to be in sync by an answer.
+    pub fn proof_given(&mut self) {
+        self.spare_proofs = IN_VAIN_MAX;
+    }
+
+    /// What was tried has proved nothing. Silence takes longest, and is not tried where an answer would do.
+    pub fn proof_failed(&mut self) {
+        self.proof = self.proof.next();
+        if self.proof == Proof::Silence && 0 < self.spare_proofs {
+            self.proof = self.proof.next();
+        }
+        self.spare_proofs = self.spare_proofs.saturating_sub(1);
     }
 
     /// A frame of it came that answers nothing.

@@ -19,6 +19,11 @@ impl Link {
         self.wire.replies.proof(unit)
     }
 
+    /// See [`crate::bus::late_reply::LineReplies::proof_given`].
+    pub fn proof_given(&mut self, unit: u8) {
+        self.wire.replies.proof_given(unit);
+    }
+
     /// See [`crate::bus::late_reply::LineReplies::proof_failed`].
     pub fn proof_failed(&mut self, unit: u8) {
         self.wire.replies.proof_failed(unit);

@@ -18,8 +18,12 @@ use crate::{
 };
 
 /// What came in between may have shown that the unit sends what it was not asked for.
-fn check_in_sync(link: &Link, block: &Block) -> Result<(), LinkError> {
-    if link.is_ambiguous(&block.request()) { Err(Fault::OutOfSync.into()) } else { Ok(()) }
+fn check_in_sync(link: &mut Link, block: &Block) -> Result<(), LinkError> {
+    if link.is_ambiguous(&block.request()) {
+        return Err(Fault::OutOfSync.into());
+    }
+    link.proof_given(block.unit);
+    Ok(())
 }
 
 /// What a block read gave: bits or registers, the first at the block's address.

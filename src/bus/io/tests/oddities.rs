@@ -232,7 +232,7 @@ async fn a_unit_that_blinks_beside_a_dead_block_is_back_at_once() {
                 last = at;
             }
         }
-        assert!(longest < Duration::from_millis(12_000), "{mode:?}: dark for {longest:?}");
+        assert!(longest < Duration::from_millis(4_500), "{mode:?}: dark for {longest:?}");
     }
 }
 
