@@ -89,3 +89,22 @@ fn a_device_slower_than_stated_is_an_alarm_with_figures() {
     fast.on_event(Event::Line { at: at(0), line: L1, state: LineState::Connected });
     assert_eq!(after(&mut fast, 6, 100, 400), none, "only the machine that plays the plant is slow");
 }
+
+/// Whatever its state is called: of a device that fails and has no value left, nothing is known.
+#[test]
+fn a_failing_device_without_a_value_raises_its_alarm() {
+    let mut plant = running();
+    let tags: Vec<TagId> = plant.def.tags_of(TIC).map(|tag| tag.id).collect();
+    let silent = |plant: &Plant| {
+        plant.snapshot().alarms.iter().find(|alarm| alarm.id == SILENT).map(|alarm| alarm.state.clone())
+    };
+    for (second, failed) in [(1, &[PV][..]), (10, &tags)] {
+        plant.on_event(fail(second, failed, Fault::Exception(ExceptionCode(0x0B))));
+        plant.on_tick(at(second + 5));
+        assert!(matches!(plant.snapshot().devices[TIC.index()].state, DeviceState::Failing(_)));
+        assert_eq!(silent(&plant).is_some(), failed.len() == tags.len(), "{failed:?}");
+    }
+    plant.on_event(read(20, &[(PV, 700.0)]));
+    plant.on_tick(at(25));
+    assert_eq!(silent(&plant), Some(AlarmState::ReturnedToNormal));
+}

@@ -170,9 +170,9 @@ fn report(period: Period, full: bool) -> ShiftReport {
         charts: Vec::new(),
         batches: Vec::new(),
         tags: vec![
-            tag("TIC-1.PV", "°C", 1, 26.8, 58.31.into(), 72.6, Some(72.4), 41, 0.989_99),
-            tag("TIC-1.MV", "%", 1, 0.0, 41.3.into(), 100.0, Some(12.0), 0, 1.0),
-            tag("PLC-1.FLOW", "l/min", 2, 0.0, 0.412.into(), 1.25, None, 0, 0.742),
+            tag("TIC-1.PV", "°C", 1, 26.8, 58.31, 72.6, Some(72.4), 41, 0.989_99),
+            tag("TIC-1.MV", "%", 1, 0.0, 41.3, 100.0, Some(12.0), 0, 1.0),
+            tag("PLC-1.FLOW", "l/min", 2, 0.0, 0.412, 1.25, None, 0, 0.742),
         ],
         suppressed: Vec::new(),
         alarms: if full { alarms } else { Vec::new() },
