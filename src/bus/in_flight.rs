@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::plant::line_finding::DeviceFinding;
+
 /// Requests after which their fate is looked at …
 const WINDOW: u32 = 40;
 /// … and what share of them, one in so many, may be lost as frames are.
@@ -47,6 +49,18 @@ impl InFlight {
         }
         (queue.sent, queue.lost) = (0, 0);
         too_many.then(|| self.step_down(unit, limit))
+    }
+
+    /// Remembers what was found of a unit earlier.
+    pub fn recall(&mut self, unit: u8, found: DeviceFinding) {
+        if let DeviceFinding::InFlight { most, .. } = found {
+            self.units.entry(unit).or_default().most = Some(most.max(1));
+        }
+    }
+
+    /// A unit may be another one.
+    pub fn forget(&mut self, unit: u8) {
+        self.units.remove(&unit);
     }
 
     /// So many under way were too much.

@@ -20,7 +20,7 @@ mod alternatives;
 mod tests;
 
 pub use cost::{Wire, cost};
-pub use gaps::{AddressRange, RangeBisection, Refused, Unreadable, UnreadableRanges, may_be_cut};
+pub use gaps::{AddressRange, RangeBisection, Refused, UnreadableRanges, may_be_cut};
 
 use std::{sync::Arc, time::Duration};
 

@@ -30,13 +30,12 @@ impl fmt::Display for OtherMasterHeard {
     }
 }
 
-/// A fact about a device or a connection.
+/// A fact about a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum LineFinding {
+#[serde(rename_all = "snake_case")]
+pub enum DeviceFinding {
     /// It takes fewer requests at once than the plant file says.
     InFlight {
-        /// The device.
-        device: DeviceId,
         /// As found.
         most: u16,
         /// As stated.
@@ -44,17 +43,15 @@ pub enum LineFinding {
     },
     /// It gives fewer registers or bits at once than it is asked for.
     ReadMost {
-        /// The device.
-        device: DeviceId,
         /// The table.
         table: Table,
         /// As found.
         most: u16,
+        /// What it has refused.
+        refused: u16,
     },
-    /// It does not have these, although the plan would read (over) them.
+    /// It does not have these, although the plan would read (over) them; none is a boundary that no request may cross.
     Unreadable {
-        /// The device.
-        device: DeviceId,
         /// The table.
         table: Table,
         /// The first.
@@ -62,6 +59,13 @@ pub enum LineFinding {
         /// How many.
         count: u16,
     },
+}
+
+/// A fact about a device or a connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum LineFinding {
+    /// About a device.
+    Device(DeviceId, DeviceFinding),
     /// The other side ends each connection after so many answers.
     AnswersPerConnection(u64),
     /// The other side does not answer for so long after it was connected.
@@ -72,44 +76,53 @@ impl LineFinding {
     /// The device that it is about, if it is about one.
     pub fn device(self) -> Option<DeviceId> {
         match self {
-            LineFinding::InFlight { device, .. }
-            | LineFinding::ReadMost { device, .. }
-            | LineFinding::Unreadable { device, .. } => Some(device),
+            LineFinding::Device(device, _) => Some(device),
             LineFinding::AnswersPerConnection(_) | LineFinding::DeafAfterConnect(_) => None,
         }
     }
 }
 
 /// With the setting of the plant file that says so.
-impl fmt::Display for LineFinding {
+impl fmt::Display for DeviceFinding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&match *self {
-            LineFinding::InFlight { most, stated, .. } => {
+            DeviceFinding::InFlight { most, stated } => {
                 t!("takes {most} requests at once, not {stated}: in_flight_max = {most}", most, stated)
             }
-            LineFinding::ReadMost { table, most, .. } => {
+            DeviceFinding::ReadMost { table, most, .. } => {
                 t!(
                     "gives {most} of table {table} at once: read_registers_max or read_bits_max = {most}",
                     most,
                     table = table.word()
                 )
             }
-            LineFinding::Unreadable { table, address, count: 0, .. } => {
+            DeviceFinding::Unreadable { table, address, count: 0 } => {
                 t!(
                     "table {table} cannot be read across address {address} with one request",
                     table = table.word(),
                     address
                 )
             }
-            LineFinding::Unreadable { table, address, count, .. } => {
+            DeviceFinding::Unreadable { table, address, count } => {
                 t!("table {table}: no address {address}, {count} in all", table = table.word(), address, count)
             }
-            LineFinding::AnswersPerConnection(answers) => {
-                t!("each connection is closed after {answers} responses: a new one is opened in time", answers)
-            }
-            LineFinding::DeafAfterConnect(time) => {
-                t!("no response for {ms} ms after each connection: connect_delay_ms = {ms}", ms = time.as_millis())
-            }
         })
+    }
+}
+
+/// With the setting of the plant file that says so.
+impl fmt::Display for LineFinding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            LineFinding::Device(_, found) => found.fmt(f),
+            LineFinding::AnswersPerConnection(answers) => f.write_str(&t!(
+                "each connection is closed after {answers} responses: a new one is opened in time",
+                answers
+            )),
+            LineFinding::DeafAfterConnect(time) => f.write_str(&t!(
+                "no response for {ms} ms after each connection: connect_delay_ms = {ms}",
+                ms = time.as_millis()
+            )),
+        }
     }
 }

@@ -221,6 +221,7 @@ fn start_lines(
             request_queue,
             live_queue,
             stopped,
+            Vec::new(),
         )));
     }
     if def.lines.is_empty() {

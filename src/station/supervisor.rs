@@ -23,8 +23,9 @@ use crate::{
     plant::{
         PlantDef,
         command::BusRequest,
-        def::LineId,
+        def::{DeviceId, LineId},
         event::{Event, Fault, LineState, WriteResult},
+        line_finding::DeviceFinding,
         station::{FaultState, StationFault},
     },
 };
@@ -44,6 +45,7 @@ pub(super) async fn run(
     requests: mpsc::Receiver<BusRequest>,
     live: mpsc::Receiver<LiveRequest>,
     mut stopped: watch::Receiver<bool>,
+    found: Vec<(DeviceId, DeviceFinding)>,
 ) {
     let (mut backoff, mut requests, mut live) = (Backoff::for_ports(), Requests::new(requests), LiveReads::new(live));
     loop {
@@ -51,7 +53,9 @@ pub(super) async fn run(
         let stop = stopped.clone();
         let (plant, connector, requests, live) = (def.clone(), &mut connector, &mut requests, &mut live);
         let link = match def.line(line).listens {
-            false => task::run(plant, line, clock, connector, events.clone(), requests, live, stop).left_future(),
+            false => {
+                task::run(plant, line, clock, connector, events.clone(), requests, live, stop, &found).left_future()
+            }
             true => listening::run(plant, line, clock, connector, events.clone(), requests, live, stop).right_future(),
         };
         // Nothing outlives the panic but the port's description and the requests, which it cannot leave half changed.
@@ -111,6 +115,7 @@ mod tests {
             queue,
             mpsc::channel(1).1,
             stopped,
+            Vec::new(),
         ));
         // A tag that this plant does not have: inside, ids are taken on trust.
         let tag = TagId(u16::MAX);

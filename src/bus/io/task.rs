@@ -9,6 +9,7 @@ mod live;
 mod opening;
 mod poll;
 mod read;
+mod recheck;
 mod test;
 mod wait;
 mod write;
@@ -17,6 +18,7 @@ use std::{collections::BTreeMap, convert::Infallible, sync::Arc, time::Duration}
 
 use exit::LinkExit;
 use jiff::Timestamp;
+use recheck::Recheck;
 use tokio::sync::{mpsc, watch};
 
 use super::{
@@ -42,6 +44,7 @@ use crate::{
         command::{BusRequest, WriteId},
         def::{DeviceId, LineDef, LineId, TagId},
         event::{Event, Fault, LineState, WriteResult},
+        line_finding::DeviceFinding,
         time::elapsed,
         traffic::Exchange,
     },
@@ -62,8 +65,15 @@ pub async fn run(
     requests: &mut Requests,
     live: &mut LiveReads,
     stop: watch::Receiver<bool>,
+    found: &[(DeviceId, DeviceFinding)],
 ) {
-    let unreadable = UnreadableRanges::default();
+    let mut unreadable = UnreadableRanges::default();
+    let mut in_flight = InFlight::default();
+    let own = || found.iter().map(|(id, found)| (def.device(*id), *found)).filter(|(device, _)| device.line == line);
+    for (device, found) in own() {
+        unreadable.recall(device.unit, found);
+        in_flight.recall(device.unit, found);
+    }
     let blocks = plan::blocks(&def, line, &unreadable);
     let task = Task {
         stats: LineStats::new(&def, line, &blocks),
@@ -76,7 +86,8 @@ pub async fn run(
         under_way: Vec::new(),
         cut: Vec::new(),
         hangups: Hangups::default(),
-        in_flight: InFlight::default(),
+        in_flight,
+        recheck: Recheck::new(own().map(|(device, _)| device.id).collect(), clock.now()),
         unheard: 0,
         opened_at: clock.now(),
         heard: false,
@@ -138,6 +149,8 @@ struct Task<'a> {
     hangups: Hangups,
     /// How many requests the units take at once, as found.
     in_flight: InFlight,
+    /// When what was found of devices is tried again.
+    recheck: Recheck,
     /// Connections in a row that were given up because nothing was ever answered.
     unheard: u32,
     /// When the present connection was opened, and whether something was answered on it.
@@ -189,6 +202,7 @@ impl Task<'_> {
             match (self.requests.next(may_write)?, next) {
                 (Some(request), _) => self.serve_request(link, schedule, request).await?,
                 (None, _) if self.is_turn_of_deferred_read_back(now) => self.deferred_read_back(link, schedule).await?,
+                (None, _) if self.recheck.is_due(now) => self.recheck(link, schedule).await?,
                 (None, next) if self.is_turn_of_diagnostic(next) => self.diagnostic_step(link).await?,
                 (None, next) if self.is_turn_of_live_read(next) => self.live_step(link).await?,
                 (None, Next::Run(index)) => self.poll(link, schedule, index).await?,

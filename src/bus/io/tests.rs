@@ -5,6 +5,7 @@ mod connecting;
 mod listening;
 mod live;
 mod oddities;
+mod recalled;
 mod silent;
 mod slave;
 mod slow;

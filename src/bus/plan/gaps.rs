@@ -10,10 +10,14 @@ use super::{Block, together};
 use crate::plant::{
     def::PlantDef,
     event::ExceptionCode,
+    line_finding::DeviceFinding,
     live::AddressSpan,
     number::to_u16,
     tag::{Table, TagDef},
 };
+
+/// Registers of one request (Modbus application protocol V1.1b3, 6.3).
+const USUAL_MOST: u16 = 125;
 
 /// May the exception mean that a request asks for too much, or for something that is not there?
 pub fn may_be_cut(code: ExceptionCode) -> bool {
@@ -26,29 +30,8 @@ pub fn may_be_cut(code: ExceptionCode) -> bool {
 pub struct UnreadableRanges {
     /// End by start. Ranges never touch the inside of each other.
     ends: BTreeMap<(u8, Table, u32), u32>,
-    /// Most registers or bits of one request.
-    most: BTreeMap<(u8, Table), u16>,
-}
-
-/// Something that a unit does not give.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unreadable {
-    /// More than this at once.
-    More {
-        /// The table.
-        table: Table,
-        /// Registers or bits.
-        most: u16,
-    },
-    /// These; none is a boundary that no request may cross.
-    Range {
-        /// The table.
-        table: Table,
-        /// The first.
-        address: u16,
-        /// How many.
-        count: u16,
-    },
+    /// Most registers or bits of one request, and how many were refused.
+    most: BTreeMap<(u8, Table), (u16, u16)>,
 }
 
 impl UnreadableRanges {
@@ -62,32 +45,63 @@ impl UnreadableRanges {
         self.ends.insert((unit, table, start), end);
     }
 
-    /// Remembers that a unit gives no more than `most` registers or bits at once.
-    pub fn limit(&mut self, unit: u8, table: Table, most: u16) {
-        let limit = self.most.entry((unit, table)).or_insert(most);
-        *limit = (*limit).min(most).max(1);
+    /// Remembers that a unit gives no more than `most` registers or bits at once, and not as many as were `refused`.
+    pub fn limit(&mut self, unit: u8, table: Table, most: u16, refused: u16) {
+        let limit = self.most.entry((unit, table)).or_insert((most, refused));
+        *limit = (limit.0.min(most).max(1), limit.1.min(refused));
     }
 
     /// Most registers or bits that a unit gives at once, if it gives less than was asked for.
     pub fn most(&self, unit: u8, table: Table) -> Option<u16> {
-        self.most.get(&(unit, table)).copied()
+        self.most.get(&(unit, table)).map(|(most, _)| *most)
     }
 
     /// All that is known of a unit.
-    pub fn of(&self, unit: u8) -> impl Iterator<Item = Unreadable> {
+    pub fn of(&self, unit: u8) -> impl Iterator<Item = DeviceFinding> {
         let most = self.most.range((unit, Table::Coil)..=(unit, Table::Holding));
-        let most = most.map(|((_, table), most)| Unreadable::More { table: *table, most: *most });
+        let most = most.map(|((_, table), &(most, refused))| DeviceFinding::ReadMost { table: *table, most, refused });
         let ranges = self.ends.range((unit, Table::Coil, 0)..=(unit, Table::Holding, u32::MAX));
-        most.chain(ranges.map(|((_, table, start), end)| Unreadable::Range {
+        most.chain(ranges.map(|((_, table, start), end)| DeviceFinding::Unreadable {
             table: *table,
             address: to_u16(*start),
             count: to_u16(end - start),
         }))
     }
 
+    /// Remembers what was found of a unit earlier.
+    pub fn recall(&mut self, unit: u8, found: DeviceFinding) {
+        match found {
+            DeviceFinding::ReadMost { table, most, refused } => self.limit(unit, table, most, refused),
+            DeviceFinding::Unreadable { table, address, count } => {
+                let start = u32::from(address);
+                self.add(unit, table, start, start + u32::from(count));
+            }
+            DeviceFinding::InFlight { .. } => {}
+        }
+    }
+
     /// Would a read from `start` up to before `end` touch a gap?
     pub fn touch(&self, unit: u8, table: Table, start: u32, end: u32) -> bool {
         self.touched(unit, table, start, end).is_some()
+    }
+
+    /// Requests of a unit that it has refused; one that it answers now shows that it is another one, or has another program. `start`
+    /// gives an address of each table from which it can be read.
+    pub fn refused_requests(&self, unit: u8, start: impl Fn(Table) -> Option<u16>) -> Vec<AddressSpan> {
+        let request = |found| match found {
+            DeviceFinding::ReadMost { table, refused, .. } => {
+                Some(AddressSpan { table, address: start(table)?, count: refused })
+            }
+            DeviceFinding::Unreadable { table, address, count: 0 } => {
+                Some(AddressSpan { table, address: address.checked_sub(1)?, count: 2 })
+            }
+            // What has grown together of several was never asked for at once.
+            DeviceFinding::Unreadable { table, address, count } => {
+                Some(AddressSpan { table, address, count }).filter(|span| span.count <= USUAL_MOST)
+            }
+            DeviceFinding::InFlight { .. } => None,
+        };
+        self.of(unit).filter_map(request).collect()
     }
 
     /// A unit may be another one, or have another program: its unreadable ranges are searched again.
@@ -108,7 +122,7 @@ impl UnreadableRanges {
 
     /// The requests that read a span around what is unreadable.
     pub fn requests(&self, unit: u8, span: AddressSpan) -> Vec<AddressSpan> {
-        let usual = if span.table.is_bits() { 2_000 } else { 125 };
+        let usual = if span.table.is_bits() { 2_000 } else { USUAL_MOST };
         let most = self.most(unit, span.table).unwrap_or(usual).max(1);
         let (mut from, range) = (span.range().start, span.range());
         let mut requests = Vec::new();
@@ -368,7 +382,7 @@ impl RangeBisection {
         for Obstacle { range, asked, .. } in obstacles {
             let given = self.given.get(&(range.unit, range.table)).copied().unwrap_or_default();
             if range.start == range.end && given < *asked {
-                unreadable.limit(range.unit, range.table, to_u16(given));
+                unreadable.limit(range.unit, range.table, to_u16(given), to_u16(*asked));
             } else {
                 unreadable.add(range.unit, range.table, range.start, range.end);
             }

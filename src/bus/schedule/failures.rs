@@ -27,15 +27,15 @@ impl Schedule {
 
     /// The device answered (an exception is an answer too), `reply` after the request, where that is known: to this block, if it
     /// was one of the plan. If it was down, everything of it is due. What was released while it did not answer is not missed: the
-    /// line had time.
+    /// line had time. `true` if it was down.
     pub fn answered(
         &mut self,
         index: Option<usize>,
         device: DeviceId,
         response_time: Option<Duration>,
         now: Timestamp,
-    ) {
-        let Some(place) = self.place_of(device) else { return };
+    ) -> bool {
+        let Some(place) = self.place_of(device) else { return false };
         let failing = self.devices[place].probe_at.is_some();
         let was_down = self.devices[place].answered(response_time);
         if let Some(index) = index {
@@ -50,6 +50,7 @@ impl Schedule {
                 poll.forgive(now);
             }
         }
+        was_down
     }
 
     /// An answer of the device came after it had been given up: it lives, and what it was asked last is asked again.

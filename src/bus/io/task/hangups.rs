@@ -5,16 +5,20 @@ use crate::{
     bus::{
         hangup::Hangup,
         io::link::Link,
-        plan::{Block, Unreadable},
+        plan::Block,
         schedule::{Failure, Next, Schedule},
     },
-    plant::{event::Fault, line_finding::LineFinding, time::elapsed},
+    plant::{
+        event::Fault,
+        line_finding::{DeviceFinding, LineFinding},
+        time::elapsed,
+    },
 };
 
 /// Connections in a row that were deaf at first.
 const DEAF_TIMES: u32 = 2;
 /// More unreadable ranges of a device are not listed.
-const FINDINGS_MAX: usize = 50;
+const FINDINGS_MAX: usize = 200;
 
 impl Task<'_> {
     /// A connection over a network is gone. The block that has ended it is named and waits; `true` if another connection may take its
@@ -81,13 +85,9 @@ impl Task<'_> {
         for device in self.def.devices.iter().filter(|device| device.line == self.line) {
             let (id, stated) = (device.id, device.limits.in_flight_max);
             let found = self.in_flight.found(device.unit).filter(|most| *most < stated);
-            findings.extend(found.map(|most| LineFinding::InFlight { device: id, most, stated }));
-            findings.extend(self.unreadable.of(device.unit).take(FINDINGS_MAX).map(|obstacle| match obstacle {
-                Unreadable::More { table, most } => LineFinding::ReadMost { device: id, table, most },
-                Unreadable::Range { table, address, count } => {
-                    LineFinding::Unreadable { device: id, table, address, count }
-                }
-            }));
+            let found = found.map(|most| DeviceFinding::InFlight { most, stated });
+            let all = found.into_iter().chain(self.unreadable.of(device.unit)).take(FINDINGS_MAX);
+            findings.extend(all.map(|found| LineFinding::Device(id, found)));
         }
         findings
     }

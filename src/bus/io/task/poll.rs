@@ -130,7 +130,8 @@ impl Task<'_> {
             Err(_) => false,
         };
         if is_answer {
-            schedule.answered(index, block.device, response_time, at);
+            let was_down = schedule.answered(index, block.device, response_time, at);
+            self.recheck.answered(block.device, was_down);
             index.into_iter().for_each(|index| schedule.spent(index, took));
             self.on_block_answered(link, block);
         }
@@ -241,7 +242,7 @@ impl Task<'_> {
     }
 
     /// Plans again when a bisection has ended, or when known unreadable ranges were `wrong`.
-    fn replan(&mut self, link: &mut Link, schedule: &mut Schedule, at: Timestamp, wrong: bool) {
+    pub(super) fn replan(&mut self, link: &mut Link, schedule: &mut Schedule, at: Timestamp, wrong: bool) {
         if wrong {
             self.bisection.reset();
         }

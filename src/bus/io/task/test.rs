@@ -17,8 +17,8 @@ use crate::{
     },
     plant::{
         command::{BusRequest, WriteJob},
-        def::Framing,
-        diagnostics::DiagnosticState,
+        def::{DeviceDef, Framing},
+        diagnostics::{Diagnostic, DiagnosticState},
         event::{Event, Fault, WriteResult},
         time::elapsed,
     },
@@ -53,6 +53,10 @@ impl Task<'_> {
         match (result, &mut self.job) {
             (Ok(result), Some(job)) => {
                 let (in_sync, done) = (stays_in_sync(link.framing(), &step.ask, &result), job.run().done);
+                if let Diagnostic::Identify { unit } = job.run().diagnostic {
+                    let own = |device: &&DeviceDef| (device.line, device.unit) == (self.line, unit);
+                    self.def.devices.iter().filter(own).for_each(|device| self.recheck.identified(device.id));
+                }
                 job.on_result(result);
                 if let Some((unit, holes)) = job.take_holes() {
                     self.live_budget.spent(elapsed(started, ended), ended);

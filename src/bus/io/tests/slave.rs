@@ -27,6 +27,7 @@ use crate::{
         def::{DeviceDef, DeviceId, Framing, Limits, LineId, Rs485, Serial, TagId, Transport},
         event::{Event, Fault},
         fixture,
+        line_finding::DeviceFinding,
         tag::{DataType, Point, Poll, Table, TagDef},
     },
 };
@@ -248,8 +249,23 @@ pub fn line(def: PlantDef) -> Line {
     line_on(def, ports, Connector::Memory(streams))
 }
 
+/// A line of whose devices something was found before the start.
+pub fn line_with(def: PlantDef, found: Vec<(DeviceId, DeviceFinding)>) -> Line {
+    let (ports, streams) = mpsc::channel(1_024);
+    start(def, ports, Connector::Memory(streams), found)
+}
+
 /// A line whose port is opened by this connector, which takes the `ports` if it is one in memory.
-pub fn line_on(def: PlantDef, ports: mpsc::Sender<DuplexStream>, mut connector: Connector) -> Line {
+pub fn line_on(def: PlantDef, ports: mpsc::Sender<DuplexStream>, connector: Connector) -> Line {
+    start(def, ports, connector, Vec::new())
+}
+
+fn start(
+    def: PlantDef,
+    ports: mpsc::Sender<DuplexStream>,
+    mut connector: Connector,
+    found: Vec<(DeviceId, DeviceFinding)>,
+) -> Line {
     let (sender, events) = mpsc::channel(64);
     let (requests, queue) = mpsc::channel(4);
     let (live, live_queue) = mpsc::channel(4);
@@ -259,7 +275,10 @@ pub fn line_on(def: PlantDef, ports: mpsc::Sender<DuplexStream>, mut connector: 
         let (mut requests, mut live) = (Requests::new(queue), LiveReads::new(live_queue));
         let def = Arc::new(def);
         match def.lines[0].listens {
-            false => task::run(def, LineId(0), clock, &mut connector, sender, &mut requests, &mut live, stopped).await,
+            false => {
+                let (requests, live) = (&mut requests, &mut live);
+                task::run(def, LineId(0), clock, &mut connector, sender, requests, live, stopped, &found).await;
+            }
             true => {
                 listening::run(def, LineId(0), clock, &mut connector, sender, &mut requests, &mut live, stopped).await
             }
