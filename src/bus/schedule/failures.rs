@@ -76,11 +76,12 @@ impl Schedule {
     ) -> bool {
         let Some(place) = self.place_of(device) else { return false };
         let of_block = index.map_or(0, |index| self.polls[index].failures());
+        let pays = index.is_some_and(|index| self.polls[index].pays());
         let blocks = || self.polls.iter().filter(|poll| poll.place == place);
         let alone = 0 < of_block && self.devices[place].failures() == 0 && blocks().any(ScheduledPoll::lives);
         let count = to_u32(blocks().count());
         // Who lives pays nothing, neither for a lost frame nor for the tries after it.
-        if !self.devices[place].is_trusted() || 2 <= of_block {
+        if !self.devices[place].is_trusted() || pays {
             self.probes.spent(spent.min(self.held_up(index, now)), now);
         }
         // Those that wait for their second or third try come first: none fails for long before it is given up.

@@ -23,6 +23,11 @@ const ONCE_DOUBLINGS: u32 = 4;
 const LATE_MAX: u32 = 3;
 /// A device that has acknowledged (05) wants to be left alone for a while.
 const ACKNOWLEDGED: Duration = Duration::from_secs(1);
+/// Failures in a row that cost a block nothing which has been answered before, and the wait after each but the first.
+const FREE_FAILURES: u32 = 4;
+const FREE_WAIT: Duration = Duration::from_secs(1);
+/// The same of one that has never been answered.
+const FREE_AT_FIRST: u32 = 2;
 /// A block whose answers are corrupt so often in a row is asked for less often.
 const CORRUPT_MAX: u32 = 3;
 /// The first wait for a device that is busy (06); it doubles up to [`BUSY_MAX`].
@@ -140,6 +145,12 @@ impl ScheduledPoll {
         self.answered && self.failures == 0
     }
 
+    /// Has it failed so often that its next failure is paid for?
+    pub fn pays(&self) -> bool {
+        let free = if self.answered { FREE_FAILURES } else { FREE_AT_FIRST };
+        free <= self.failures
+    }
+
     /// It was answered.
     pub fn answered(&mut self) {
         (self.failures, self.answered) = (0, true);
@@ -147,8 +158,8 @@ impl ScheduledPoll {
     }
 
     /// It failed: silence is asked for once more at once, then after a wait that grows, and not before the line has time for it
-    /// (`affordable_from`); what was corrupt stays on its grid a few times if it
-    /// has been answered before.
+    /// (`affordable_from`). One that has been answered before waits for a second at first, and stays on its grid where the
+    /// answer was corrupt.
     pub fn failed(&mut self, failure: Failure, now: Timestamp, affordable_from: Timestamp) {
         if failure == Failure::Doubt {
             return;
@@ -157,6 +168,7 @@ impl ScheduledPoll {
         match (failure, self.failures) {
             (Failure::Silence | Failure::OfGateway, 1) => self.later(now),
             (Failure::Corrupt, ..CORRUPT_MAX) if self.answered => {}
+            (Failure::Silence | Failure::OfGateway, ..=FREE_FAILURES) if self.answered => self.later(now + FREE_WAIT),
             _ => {
                 let until = now + self.backoff.fail();
                 self.later(until.max(affordable_from));

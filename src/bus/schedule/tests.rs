@@ -1,5 +1,6 @@
 //! Played lines: who is read when, and what is left out when there is too much to do.
 
+mod lively;
 mod overload;
 
 use proptest::prelude::*;
