@@ -89,7 +89,7 @@ pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
 /// Names what is left at the deadline.
 pub fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
     let corrupt = frames(buffer).find_map(|frame| open(&buffer[frame]).err());
-    let expected = 2 * frame::response_signature(message).map_or(3, frame::ResponseSignature::length) + 5;
+    let expected = 2 * frame::expected_length(message).unwrap_or(3) + 5;
     let cut =
         || Fault::Truncated { got: to_u16(open_frame(buffer).unwrap_or(buffer).len()), expected: to_u16(expected) };
     if buffer.is_empty() { Fault::Timeout } else { corrupt.unwrap_or_else(cut) }

@@ -1,10 +1,18 @@
 //! What a technician types or pastes: hex in any dress, ASCII frames, lines of a log.
 
-use super::{ascii, frame};
+mod paste;
+
+use super::{
+    ascii,
+    frame::{self, Mbap},
+    request_lint::check_request,
+};
 use crate::{
-    plant::{line::Framing, number::to_u8},
+    plant::{event::Fault, line::Framing, number::to_u8},
     t,
 };
+
+pub use paste::{Pasted, parse_paste};
 
 /// Bytes that were typed or pasted, with the framing and direction that their text names.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -15,6 +23,47 @@ pub struct ParsedInput {
     pub framing: Option<Framing>,
     /// `true` behind `TX` or in `[01]`, `false` behind `RX` or in `<01>`.
     pub sent: Option<bool>,
+}
+
+/// A request as it goes over a line.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FramedRequest {
+    /// Unit and PDU.
+    pub message: Vec<u8>,
+    /// With its check or header; what was typed, if it had that already.
+    pub frame: Vec<u8>,
+}
+
+impl ParsedInput {
+    /// The request that was typed, framed for a line. `Err`: it is an ASCII frame, and broken.
+    pub fn framed(&self, framing: Framing, transaction: u16) -> Result<FramedRequest, Fault> {
+        let message = match (self.framing, framing) {
+            // The characters of an ASCII frame mean its message, on any line.
+            (Some(Framing::Ascii), _) => Some(ascii::open(&self.bytes)?),
+            (_, Framing::Rtu) => {
+                frame::without_crc(&self.bytes).ok().filter(|message| 2 <= message.len()).map(Vec::from)
+            }
+            (_, Framing::Ascii) => ascii::open(&self.bytes).ok(),
+            (_, Framing::Mbap) => behind_header(&self.bytes),
+        };
+        let is_frame = message.is_some() && self.framing.is_none_or(|typed| typed == framing);
+        let message = message.unwrap_or_else(|| self.bytes.clone());
+        let frame = if is_frame { self.bytes.clone() } else { frame::wrap(framing, transaction, &message) };
+        Ok(FramedRequest { message, frame })
+    }
+}
+
+/// The first message of bytes that are Modbus TCP frames from end to end. A request of its own may look like that: a header
+/// is read where all behind it are requests as they should be, or where the bytes without it are none.
+fn behind_header(bytes: &[u8]) -> Option<Vec<u8>> {
+    let sound = |message: &[u8]| check_request(message, Framing::Mbap).is_empty();
+    let (mut messages, mut rest) = (Vec::new(), bytes);
+    while let Mbap::Whole { end, .. } = frame::mbap(rest) {
+        messages.push(&rest[6..end]);
+        rest = &rest[end..];
+    }
+    let is_header = rest.is_empty() && (messages.iter().all(|message| sound(message)) || !sound(bytes));
+    messages.first().filter(|_| is_header).map(|message| message.to_vec())
 }
 
 /// Why a text holds no bytes. Positions count characters from 1.
@@ -54,6 +103,18 @@ pub enum HexInputError {
 /// Reads hex with or without spaces, commas, dashes, brackets or `0x`; an ASCII frame; or a line of a log, where bytes
 /// stand between `TX` or `RX` and `|`. Framing is only needed for the longest length; without it 260 bytes are taken.
 pub fn parse(text: &str, framing: Option<Framing>) -> Result<ParsedInput, HexInputError> {
+    parse_up_to(
+        text,
+        match framing {
+            Some(Framing::Rtu) => 256,
+            Some(Framing::Ascii) => frame::MESSAGE_MAX + 1,
+            Some(Framing::Mbap) | None => 260,
+        },
+    )
+}
+
+/// The same, with at most `longest` bytes in hex.
+fn parse_up_to(text: &str, longest: usize) -> Result<ParsedInput, HexInputError> {
     let (sent, skipped, rest) = of_log(text);
     let indent = rest.chars().take_while(|letter| letter.is_whitespace()).count();
     let body = rest.trim();
@@ -72,17 +133,17 @@ pub fn parse(text: &str, framing: Option<Framing>) -> Result<ParsedInput, HexInp
     } else {
         None
     });
-    let bytes = hex(body, skipped)?;
-    let longest = match framing {
-        Some(Framing::Rtu) => 256,
-        Some(Framing::Ascii) => frame::MESSAGE_MAX + 1,
-        Some(Framing::Mbap) | None => 260,
-    };
+    let bytes = digits_of(body, skipped)?;
     match bytes.len() {
         0 => Err(HexInputError::Empty),
         got if longest < got => Err(HexInputError::TooLong { got, what: t!("bytes"), longest }),
         _ => Ok(ParsedInput { bytes, framing: None, sent }),
     }
+}
+
+/// Does a line of text say who sent its bytes?
+pub fn is_of_log(text: &str) -> bool {
+    of_log(text).0.is_some()
 }
 
 /// What stands behind `TX` or `RX` and before `|`: direction, characters skipped, the bytes.
@@ -130,7 +191,8 @@ fn ascii_frame(digits: &str, skipped: usize) -> Result<Vec<u8>, HexInputError> {
     }
 }
 
-fn hex(body: &str, skipped: usize) -> Result<Vec<u8>, HexInputError> {
+/// Bytes in hex, whatever stands between them.
+fn digits_of(body: &str, skipped: usize) -> Result<Vec<u8>, HexInputError> {
     let between = |letter: char| letter.is_whitespace() || ",;:-.[]<>(){}\"'".contains(letter);
     let letters: Vec<char> = body.chars().collect();
     let mut bytes = Vec::new();
@@ -176,6 +238,7 @@ fn run(digits: &[char], position: usize, prefixed: bool, bytes: &mut Vec<u8>) ->
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 
@@ -217,6 +280,74 @@ mod tests {
             ParsedInput { bytes: b":010300000001FB\r\n".to_vec(), framing: Some(Framing::Ascii), sent: Some(false) };
         assert_eq!(typed, Ok(expect.clone()));
         assert_eq!(parse(":01 03 00 00 00 01 FB", None), Ok(ParsedInput { sent: None, ..expect }));
+    }
+
+    #[test]
+    fn a_request_gets_what_its_line_adds_unless_it_has_it() {
+        let check = |text: &str, framing: Framing, message: &str, frame: &str| {
+            let bytes = |text: &str| parse(text, None).map(|typed| typed.bytes);
+            let framed = parse(text, None).map(|typed| typed.framed(framing, 1));
+            let expect = FramedRequest { message: bytes(message).unwrap(), frame: bytes(frame).unwrap() };
+            assert_eq!(framed, Ok(Ok(expect)), "{text} on {framing:?}");
+        };
+        let (bare, rtu, ascii) = ("01 03 00 00 00 01", "01 03 00 00 00 01 84 0A", ":010300000001FB");
+        let tcp = "00 01 00 00 00 06 01 03 00 00 00 01";
+        for (framing, whole) in [(Framing::Rtu, rtu), (Framing::Ascii, ascii), (Framing::Mbap, tcp)] {
+            check(bare, framing, bare, whole);
+            check(whole, framing, bare, whole);
+            check(ascii, framing, bare, whole);
+        }
+        assert!(parse(":010300000001FA", None).unwrap().framed(Framing::Rtu, 1).is_err());
+        // Requests that look like the header of Modbus TCP: function, address 0 and count stand where it has its length.
+        for request in [
+            "01 10 00 00 00 02 04 00 01 00 02",
+            "01 17 00 00 00 02 00 0A 00 01 02 00 05",
+            "01 0F 00 00 00 02 01 03",
+            "01 03 00 00 00 02",
+            "01 10 00 00 00 07 0E 07 D0 00 00 00 02 01 07 00 00 00 00 00 00",
+            // Sound as it stands, while what its header would hold is none.
+            "01 08 00 00 00 02 01 99",
+        ] {
+            let framed = format!("00 01 00 00 00 {:02X} {request}", request.split(' ').count());
+            check(request, Framing::Mbap, request, &framed);
+        }
+        // A transaction that looks like a function: what stands behind the header is a request.
+        for id in ["00 08", "01 10", "01 2B"] {
+            let whole = format!("{id} 00 00 00 06 01 03 00 00 00 01");
+            check(&whole, Framing::Mbap, bare, &whole);
+        }
+        // Wrong either way: the header is believed.
+        check(
+            "00 01 00 00 00 06 01 03 00 00 00 00",
+            Framing::Mbap,
+            "01 03 00 00 00 00",
+            "00 01 00 00 00 06 01 03 00 00 00 00",
+        );
+    }
+
+    #[test]
+    fn bytes_are_found_in_pasted_text() {
+        let pasted = |text: &str| parse_paste(text).unwrap();
+        let frames = b":010300000001FB\r\n:0103020007F3\r\n".to_vec();
+        for text in [
+            ":010300000001FB:0103020007F3",
+            ":010300000001FB\r\n:0103020007F3\r\n",
+            ":010300000001FB\\r\\n:0103020007F3\\r\\n",
+            ":010300000001FB\n:0103020007F3\n",
+        ] {
+            let input = ParsedInput { bytes: frames.clone(), framing: Some(Framing::Ascii), sent: None };
+            assert_eq!(pasted(text), Pasted { input, doubt: None }, "{text:?}");
+        }
+        assert_eq!(pasted("RX: xx:0103020007F3 yy").input.bytes, b" xx:0103020007F3\r\n yy");
+        assert_eq!(pasted("RX: xx:0103020007F3 yy").input.sent, Some(false));
+        // Colons between bytes begin no frame.
+        let doubt = parse("01:03:00:00:00:01:84:0a", None).unwrap();
+        assert_eq!(pasted("01:03:00:00:00:01:84:0a"), Pasted { input: doubt, doubt: None });
+        let log = pasted("10:00:01.123 got 01 03 00 00 00 01 84 0A, 8 bytes");
+        assert_eq!(log.input.bytes, READ, "{log:?}");
+        assert!(log.doubt.is_some());
+        assert_eq!(pasted(&"00".repeat(1_000)).input.bytes.len(), 1_000);
+        assert!(parse_paste("hello").is_err() && parse_paste("01 0").is_err() && parse_paste(":010").is_err());
     }
 
     #[test]

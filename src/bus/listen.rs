@@ -13,7 +13,6 @@
 //! after a lost response the roles are right again with the next frame that is not the same, or that comes after the
 //! response timeout. What is not a frame is noise: counted, recorded, and bounded like everything that is kept here.
 
-mod cut;
 mod follow;
 
 #[cfg(test)]
@@ -27,9 +26,10 @@ use std::{
 
 use jiff::Timestamp;
 
-use self::cut::Cut;
 use super::{
-    ascii, frame, framing,
+    ascii,
+    cut::{self, Cut},
+    frame, framing,
     late_reply::LineReplies,
     pdu::{self, Length},
 };
@@ -280,15 +280,11 @@ impl Listener {
     /// Is this the response to an open request?
     fn answers(&self, open: &Open, transaction: u16, message: &[u8], first: Timestamp) -> bool {
         let asked = &open.message;
-        if open.transaction != transaction || asked[0] != message[0] || asked[1] != message[1] & 0x7F {
-            return false;
-        }
         let same = *asked == message;
         let echoes = pdu::function(message[1]).is_none_or(|function| function.echoes);
         // A master that repeats a request waits for its own timeout before.
         let repeated = same && (!echoes || self.timeout < elapsed(open.at, first));
-        let fits = matches!(frame::check_answer(self.framing, asked, message), Ok(()) | Err(Fault::Exception(_)));
-        fits && is_response(message) && !repeated
+        open.transaction == transaction && frame::answers(self.framing, asked, message) && !repeated
     }
 
     fn request(&mut self, message: Vec<u8>, transaction: u16, bytes: Vec<u8>, at: Timestamp, heard: &mut Vec<Heard>) {
@@ -381,15 +377,6 @@ fn is_request(message: &[u8]) -> bool {
         Length::Known(length) => length == message.len(),
         // A function that is not in the standard; an exception is none.
         Length::BySilence => message[1] < 0x80,
-        Length::TooEarly => false,
-    }
-}
-
-/// May a message be a response?
-fn is_response(message: &[u8]) -> bool {
-    match pdu::response_length(message) {
-        Length::Known(length) => length == message.len(),
-        Length::BySilence => true,
         Length::TooEarly => false,
     }
 }

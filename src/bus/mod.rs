@@ -10,7 +10,7 @@
 //!
 //! | module | what is decided there |
 //! |---|---|
-//! | [`frame`], [`ascii`], [`framing`] | where a frame begins and ends, whether its check fits, whether it answers what was asked |
+//! | [`frame`], [`ascii`], [`framing`], `cut` | where a frame begins and ends, whether its check fits, whether it answers what was asked |
 //! | [`late_reply`] | which replies are outstanding, and what may be asked meanwhile |
 //! | `pdu` | the fields of every function |
 //! | [`codec`], [`interpret`] | words to numbers and back; everything that words may mean |
@@ -27,6 +27,7 @@ pub(crate) mod pdu;
 pub mod ascii;
 pub mod frame;
 pub mod framing;
+mod cut;
 pub mod names;
 pub mod request_lint;
 pub mod dissect;

@@ -74,11 +74,6 @@ pub struct Function {
 }
 
 impl Function {
-    /// Does the response begin with four bytes of the request?
-    pub(super) fn repeats_start(&self) -> bool {
-        self.code == 0x08 || matches!(self.response, [Address(_), ..])
-    }
-
     /// Does it change values, so that it may be sent to all units at once?
     pub fn writes(&self) -> bool {
         matches!(self.code, 0x05 | 0x06 | 0x0F | 0x10 | 0x15 | 0x16)
@@ -87,6 +82,10 @@ impl Function {
 
 /// Device identification (V1.1b3, 6.21).
 pub const MEI_IDENTIFICATION: u8 = 0x0E;
+/// Its read code for one object; 1 to 3 are for lists.
+pub const READ_ONE_OBJECT: u8 = 4;
+/// Reference type of every file record (V1.1b3, 6.14).
+pub const FILE_REFERENCE: u8 = 6;
 
 const fn count(name: &'static str, verb: &'static str, most: u16) -> Item {
     Count { name, verb, most }

@@ -82,6 +82,9 @@ pub fn advice(fault: Fault) -> &'static str {
         Fault::Hangup => {
             "the device cannot answer this request: check address and count of the block, lower read_registers_max or gap_registers_max"
         }
+        Fault::NoHeader => {
+            "not what Modbus TCP has: check the mode of the line (tcp, or rtu-over-tcp for a serial gateway), the TCP port, then the gateway"
+        }
         Fault::OutOfSync => {
             "check for a second master on the line, a duplicate address, or a repeater that repeats each response"
         }

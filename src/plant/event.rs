@@ -199,8 +199,11 @@ pub enum Fault {
     /// The other side closed the connection instead of answering this request.
     #[error("{}", t!("the device closes the connection on this request"))]
     Hangup,
-    /// The echo of a write names another address or value.
-    #[error("{}", t!("echo of the write differs from the request"))]
+    /// Bytes of a TCP connection that begin no frame.
+    #[error("{}", t!("no MBAP header"))]
+    NoHeader,
+    /// A field that repeats one of the request differs from it: address, value, mask, sub-function, object.
+    #[error("{}", t!("the response does not repeat the request"))]
     WrongEcho,
     /// Unsolicited frames came: the answer may be one of them.
     #[error("{}", t!("unsolicited frames: responses are not reliable"))]
@@ -244,6 +247,7 @@ impl Fault {
             | Fault::WrongFunction { .. }
             | Fault::WrongLength { .. }
             | Fault::WrongTransaction { .. }
+            | Fault::NoHeader
             | Fault::WrongEcho => FaultKind::Corrupt,
             Fault::OutOfSync => FaultKind::OutOfSync,
             Fault::Exception(code) => FaultKind::Exception(code),

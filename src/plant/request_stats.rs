@@ -62,6 +62,7 @@ impl RequestStats {
             Fault::WrongUnit { .. }
             | Fault::WrongFunction { .. }
             | Fault::WrongTransaction { .. }
+            | Fault::NoHeader
             | Fault::WrongEcho
             | Fault::OutOfSync => self.foreign += 1,
             Fault::Exception(code) => match self.exceptions.iter_mut().find(|(known, _)| *known == code) {

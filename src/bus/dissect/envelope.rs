@@ -26,16 +26,17 @@ pub(super) struct Envelope {
     pub fault: Option<String>,
 }
 
-/// The framing of bytes, recognised: `:` and text is ASCII, a header whose length fits is TCP, a CRC that fits is RTU.
+/// The framing of bytes, recognised: `:` and text is ASCII, a CRC that fits is RTU, a header whose length fits is TCP. A read
+/// of registers from 0 looks as if it had a header; a frame of TCP hardly ever has a CRC.
 pub fn recognise(bytes: &[u8]) -> Option<Framing> {
     // Unit 58 of a binary frame is a `:` too, but what follows it is no text.
     let text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
     if bytes.starts_with(b":") && bytes.iter().all(text) {
         Some(Framing::Ascii)
-    } else if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) {
-        Some(Framing::Mbap)
     } else if 4 <= bytes.len() && frame::without_crc(bytes).is_ok() {
         Some(Framing::Rtu)
+    } else if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) {
+        Some(Framing::Mbap)
     } else {
         None
     }

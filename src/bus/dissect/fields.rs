@@ -8,7 +8,7 @@ use crate::{
     bus::{
         frame::hex,
         names::{self, Counted, counted, place},
-        pdu::{Item, MEI_IDENTIFICATION},
+        pdu::{FILE_REFERENCE, Item, MEI_IDENTIFICATION},
         request_lint::coil_value_words,
     },
     t,
@@ -236,10 +236,10 @@ impl<'r, 'a> Fields<'r, 'a> {
     }
 
     fn reference(&mut self) -> Option<()> {
-        let kind = self
-            .reader
-            .byte(t!("reference"), |kind| if kind == 6 { t!("file record") } else { t!("must be 06") }.into())?;
-        if kind != 6 {
+        let kind = self.reader.byte(t!("reference"), |kind| {
+            if kind == FILE_REFERENCE { t!("file record") } else { t!("must be 06") }.into()
+        })?;
+        if kind != FILE_REFERENCE {
             self.reader.wrong(t!("reference type {kind}, expected 06", kind = format!("{kind:02X}")));
         }
         Some(())

@@ -18,7 +18,7 @@ use std::ops::Range;
 
 use self::{envelope::Envelope, reader::Reader};
 use super::{frame, names, pdu, request_lint};
-use crate::plant::{line::Framing, traffic::Frame};
+use crate::plant::{event::Fault, line::Framing, traffic::Frame};
 
 pub use envelope::{message_of, recognise};
 
@@ -76,22 +76,17 @@ pub fn dissect(
     let asked_of =
         |message: &[u8]| asked.filter(|asked| asked.get(1).copied() == message.get(1).map(|code| code & 0x7F));
     let direction = direction.or(asked.map(|_| Direction::Answer));
-    let mut envelope = envelope::open(bytes, framing.or_else(|| recognise(bytes)));
-    let mut read = Readings::new(&envelope, asked_of(&envelope.message));
-    if envelope.framing.is_none() && !read.fit(direction) {
-        // A CRC that does not fit is an RTU frame all the same, if the rest makes sense.
-        let rtu = envelope::open(bytes, Some(Framing::Rtu));
-        let readings = Readings::new(&rtu, asked_of(&rtu.message));
-        if readings.fit(direction) {
-            (envelope, read) = (rtu, readings);
-        }
-    }
+    let envelope = match framing {
+        Some(framing) => envelope::open(bytes, Some(framing)),
+        None => best_envelope(bytes, direction),
+    };
+    let read = Readings::new(&envelope, asked_of(&envelope.message));
     let (direction, reading, also) = read.choose(direction);
     // Bytes without unit and function have no direction.
     let direction = direction.filter(|_| 2 <= envelope.message.len());
     let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
         let fault = frame::check_answer(envelope.framing.unwrap_or(Framing::Rtu), asked, &envelope.message).err()?;
-        (!matches!(fault, crate::plant::event::Fault::Exception(_))).then(|| fault.to_string())
+        (!matches!(fault, Fault::Exception(_))).then(|| fault.to_string())
     });
     let wrong = envelope.fault.clone().or(reading.trouble).or(wrong);
     let place = |field: Field| Field {
@@ -113,6 +108,28 @@ pub fn dissect(
     }
 }
 
+/// The envelope that makes most sense of bytes.
+fn best_envelope(bytes: &[u8], direction: Option<Direction>) -> Envelope {
+    let fits = |envelope: &Envelope| {
+        let known = envelope.message.get(1).is_some_and(|code| pdu::function(code & 0x7F).is_some());
+        known && Readings::new(envelope, None).fit(direction)
+    };
+    let (recognised, bare) = (envelope::open(bytes, recognise(bytes)), envelope::open(bytes, None));
+    match recognised.framing {
+        Some(Framing::Rtu | Framing::Ascii) => return recognised,
+        // A message may look as if it had a header.
+        Some(Framing::Mbap) if fits(&recognised) || !fits(&bare) => return recognised,
+        Some(Framing::Mbap) | None => {}
+    }
+    // A frame whose check or header is wrong is one all the same, if the rest makes sense.
+    let damaged = [Framing::Rtu, Framing::Mbap].into_iter().filter(|framing| match framing {
+        Framing::Mbap => bytes.get(2..4) == Some(&[0, 0]),
+        Framing::Rtu | Framing::Ascii => true,
+    });
+    let damaged = damaged.map(|framing| envelope::open(bytes, Some(framing))).find(fits);
+    if fits(&bare) { bare } else { damaged.unwrap_or(bare) }
+}
+
 /// Decodes a frame of a line; `before` are the earlier frames of the line, the latest first: one of them is the
 /// request of an answer.
 pub fn in_traffic<'a>(frame: &Frame, before: impl Iterator<Item = &'a Frame>) -> Dissection {
@@ -126,14 +143,23 @@ pub fn in_traffic<'a>(frame: &Frame, before: impl Iterator<Item = &'a Frame>) ->
 /// Earlier frames among which the request of an answer is looked for.
 const BEFORE: usize = 16;
 
-/// The request message of an answer, among the earlier frames of its line.
+/// The request message of an answer, among the earlier frames of its line: the latest that it answers, else the latest to
+/// its unit with its function, which it answers wrongly.
 pub fn request_of<'a>(answer: &Frame, before: impl Iterator<Item = &'a Frame>) -> Option<Vec<u8>> {
     let message = message_of(&answer.bytes, answer.framing)?;
-    before.take(BEFORE).filter(|frame| frame.sent && frame.framing == answer.framing).find_map(|frame| {
-        let request = message_of(&frame.bytes, frame.framing)?;
+    let mut nearest = None;
+    for frame in before.take(BEFORE).filter(|frame| frame.sent && frame.framing == answer.framing) {
+        let Some(request) = message_of(&frame.bytes, frame.framing) else { continue };
         let same = answer.framing != Framing::Mbap || frame.bytes[..2] == answer.bytes[..2];
-        (same && request[0] == message[0] && request[1] == message[1] & 0x7F).then_some(request)
-    })
+        if !same || !frame::begins_answer(&request, &message) {
+            continue;
+        }
+        if frame::answers(answer.framing, &request, &message) {
+            return Some(request);
+        }
+        nearest.get_or_insert(request);
+    }
+    nearest
 }
 
 /// A message read as a request, or as an answer.

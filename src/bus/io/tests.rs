@@ -156,7 +156,7 @@ async fn each_corrupt_answer_is_reported_by_its_name() {
         (SlaveAction::Silent, Fault::Timeout),
         (SlaveAction::Instead(vec![9, 3, 2, 0, 1]), Fault::WrongUnit { got: 9, asked: 1 }),
         (SlaveAction::Instead(vec![1, 4, 8, 0, 1, 0, 2, 0, 3, 0, 4]), Fault::WrongFunction { got: 4, asked: 3 }),
-        (SlaveAction::Instead(vec![1, 3, 2, 0, 1]), Fault::WrongLength { got: 5, asked: 11 }),
+        (SlaveAction::Instead(vec![1, 3, 2, 0, 1]), Fault::WrongLength { got: 2, asked: 8 }),
         (SlaveAction::Exception(4), Fault::Exception(ExceptionCode(4))),
     ] {
         let def = plant(Mode::Rtu);

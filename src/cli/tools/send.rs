@@ -1,9 +1,15 @@
 //! `sightglass send`: bytes as they are, and everything that comes back.
 
+use std::time::Duration;
+
 use super::{PortArgs, answer_lines, run, shown};
 use crate::{
     bus::{
-        ascii, dissect, frame, hex_input, names,
+        dissect,
+        frame::{self, Mbap},
+        framing::{self, Reply},
+        hex_input::{self, FramedRequest},
+        names::{self, Counted, counted},
         request_lint::{check_request, only_reads},
     },
     cli::{CliError, in_runtime, menu, prompt, say, say_error},
@@ -39,18 +45,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let framing = line.transport.framing();
     let typed =
         hex_input::parse(&args.bytes.join(" "), Some(framing)).map_err(|error| CliError::Usage(error.to_string()))?;
-    let whole = frame::unwrap(framing, &typed.bytes).ok();
-    let (message, frame) = match (whole, typed.framing) {
-        (whole, _) if args.as_is => (whole.unwrap_or_default(), typed.bytes),
-        (Some(message), _) => (message, typed.bytes),
-        // The characters of an ASCII frame mean its message, on any line.
-        (None, Some(Framing::Ascii)) => {
-            let message =
-                ascii::open(&typed.bytes).map_err(|fault| CliError::Usage(format!("nothing was sent: {fault}")))?;
-            let frame = frame::wrap(framing, 1, &message);
-            (message, frame)
-        }
-        (None, _) => (typed.bytes.clone(), frame::wrap(framing, 1, &typed.bytes)),
+    let FramedRequest { message, frame } = match args.as_is {
+        true => FramedRequest { message: frame::unwrap(framing, &typed.bytes).unwrap_or_default(), frame: typed.bytes },
+        false => typed.framed(framing, 1).map_err(|fault| CliError::Usage(format!("nothing was sent: {fault}")))?,
     };
     let wrong = errors(&message, &frame, framing);
     // Bytes that are to go out as they are may be anything.
@@ -64,17 +61,13 @@ pub fn main(args: Args) -> Result<(), CliError> {
         agree(&format!("{} on {}{effect}", dissection.summary, line.transport))?;
     }
     let sent = [format!("TX {}", shown(&frame, framing)), format!("   {}", dissection.summary)];
-    let request = message.clone();
+    let asked = Asked { framing, frame: frame.clone(), message };
     let run = run(&line, Diagnostic::Send(frame), |finding| match finding {
         Finding::Bytes { bytes, .. } if bytes.is_empty() => sent.to_vec(),
-        Finding::Bytes { bytes, response_time: reply } => {
-            let mut lines = sent.to_vec();
-            lines.extend(answer_lines(bytes, framing, &request));
-            let verdict = verdict(framing, &request, bytes).unwrap_or_else(|why| why);
-            let after = reply.map(|reply| format!(", after {:.1} ms", reply.as_secs_f64() * 1e3)).unwrap_or_default();
-            lines.push(format!("   {verdict}{after}"));
-            lines
+        Finding::Bytes { bytes, response_time } => {
+            sent.iter().cloned().chain(asked.lines(bytes, *response_time)).collect()
         }
+        Finding::Conclusion(conclusion) => vec![format!("   {conclusion}")],
         Finding::Exchange(_)
         | Finding::Written(_)
         | Finding::Swept(_)
@@ -82,14 +75,13 @@ pub fn main(args: Args) -> Result<(), CliError> {
         | Finding::Unit { .. }
         | Finding::Object { .. }
         | Finding::Values { .. }
-        | Finding::Failed { .. }
-        | Finding::Conclusion(_) => Vec::new(),
+        | Finding::Failed { .. } => Vec::new(),
     })?;
     let answer = run.findings.iter().find_map(|finding| match finding {
         Finding::Bytes { bytes, .. } if !bytes.is_empty() => Some(bytes),
         _ => None,
     });
-    let broadcast = message.first().is_some_and(|unit| framing.is_broadcast(*unit));
+    let broadcast = asked.message.first().is_some_and(|unit| framing.is_broadcast(*unit));
     match (answer, broadcast) {
         (None, false) => Err(CliError::Failed(format!("no answer within {} ms", line.timeout.as_millis()))),
         (None, true) => {
@@ -97,8 +89,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
             Ok(())
         }
         // What was no request has no answer that could be wrong.
-        (Some(_), _) if message.is_empty() => Ok(()),
-        (Some(bytes), _) => verdict(framing, &message, bytes)
+        (Some(_), _) if asked.message.is_empty() => Ok(()),
+        (Some(bytes), _) => asked
+            .reply(bytes)
             .map(drop)
             .map_err(|why| CliError::Failed(format!("what came back is no answer to this: {why}"))),
     }
@@ -117,16 +110,59 @@ fn agree(what: &str) -> Result<(), CliError> {
     }
 }
 
-/// What an answer is, in words; `Err` for bytes that are none.
-fn verdict(framing: Framing, request: &[u8], bytes: &[u8]) -> Result<String, String> {
-    if framing == Framing::Mbap && frame::mbap(bytes) == frame::Mbap::Broken {
-        return Err("no Modbus TCP header".to_owned());
+/// What was sent.
+struct Asked {
+    framing: Framing,
+    frame: Vec<u8>,
+    /// Unit and PDU; empty if the bytes were no request.
+    message: Vec<u8>,
+}
+
+impl Asked {
+    /// The answer among what came back.
+    fn reply(&self, came: &[u8]) -> Result<Reply, Fault> {
+        framing::find_reply(self.framing, &self.frame, came, true)
     }
-    match frame::unwrap(framing, bytes).and_then(|answer| frame::check_answer(framing, request, &answer)) {
-        Ok(()) => Ok("ok".to_owned()),
-        // A refusal is an answer.
-        Err(fault @ Fault::Exception(_)) => Ok(fault.to_string()),
-        Err(fault) => Err(fault.to_string()),
+
+    /// What came back, byte for byte and in words, and whether it is the answer.
+    fn lines(&self, came: &[u8], response_time: Option<Duration>) -> Vec<String> {
+        let after =
+            response_time.map_or_else(String::new, |time| format!(", after {:.1} ms", time.as_secs_f64() * 1e3));
+        if self.message.is_empty() {
+            return [answer_lines(came, self.framing, &[]), vec![format!("   received{after}")]].concat();
+        }
+        let reply = self.reply(came);
+        let mut lines = vec![format!("RX {}", shown(came, self.framing))];
+        let part = reply.as_ref().map_or(came, |reply| &came[reply.range.clone()]);
+        lines.extend(answer_lines(part, self.framing, &self.message).into_iter().skip(1));
+        lines.push(match &reply {
+            Ok(Reply { exception: None, .. }) => format!("   ok{after}"),
+            Ok(Reply { exception: Some(code), .. }) => format!("   {code}{after}"),
+            Err(fault) => format!("   {fault}{after}"),
+        });
+        lines.extend(reply.iter().flat_map(|reply| self.oddities(reply, came)));
+        lines
+    }
+
+    /// What else came with an answer, and what its frame has that it should not have.
+    fn oddities(&self, reply: &Reply, came: &[u8]) -> Vec<String> {
+        let (before, behind) = (reply.range.start, came.len() - reply.range.end);
+        let around = |count: usize, place: &str| {
+            (0 < count).then(|| format!("   {} {place} it are no part of it", counted(count, Counted::Bytes)))
+        };
+        let header = match frame::mbap(&came[reply.range.clone()]) {
+            _ if self.framing != Framing::Mbap => None,
+            Mbap::Whole { .. } if reply.exception.is_some() && 3 < reply.message.len() => {
+                let surplus = counted(reply.message.len() - 3, Counted::Bytes);
+                Some(format!("   {surplus} behind the exception code: an exception has none"))
+            }
+            Mbap::Whole { .. } => None,
+            Mbap::Incomplete | Mbap::Broken => {
+                let length = u16::from_be_bytes([came[reply.range.start + 4], came[reply.range.start + 5]]);
+                Some(format!("   its header says {length} bytes, {} follow", reply.message.len()))
+            }
+        };
+        [around(before, "before"), around(behind, "behind"), header].into_iter().flatten().collect()
     }
 }
 

@@ -6,10 +6,7 @@ use tokio::time::Instant;
 
 use super::{Link, LinkError, receive::RECEIVE_MAX};
 use crate::{
-    bus::{
-        frame::{self, Mbap},
-        framing::{self, FrameMatch},
-    },
+    bus::{frame, framing},
     plant::{def::Framing, event::Fault, number::to_u32, traffic::FrameResult},
 };
 
@@ -36,13 +33,7 @@ impl Link {
                 until = (Instant::now() + self.frame_timeout).min(deadline);
                 continue;
             }
-            let whole = match framing {
-                Framing::Mbap => matches!(frame::mbap(&buffer), Mbap::Whole { .. }),
-                Framing::Rtu | Framing::Ascii => {
-                    matches!(framing::find_answer(framing, &request, &buffer), FrameMatch::Answer(_))
-                }
-            };
-            if whole {
+            if framing::find_reply(framing, bytes, &buffer, false).is_ok() {
                 break true;
             }
         };

@@ -12,6 +12,7 @@ use crate::{
     bus::{
         diagnostics::tally,
         dissect::{self, Direction},
+        framing::{self, Reply},
         meaning, names,
     },
     plant::{
@@ -185,8 +186,8 @@ fn came_back(
     if bytes.is_empty() {
         return vec![plain(t!("✗ no response within {ms}", ms = ms(at.settings.timeout)), theme.trouble())];
     }
-    let asked = match &run.diagnostic {
-        Diagnostic::Send(sent) => dissect::message_of(sent, framing),
+    let sent = match &run.diagnostic {
+        Diagnostic::Send(sent) => Some(sent),
         Diagnostic::Loopback { .. }
         | Diagnostic::Pattern { .. }
         | Diagnostic::Identify { .. }
@@ -196,17 +197,21 @@ fn came_back(
         | Diagnostic::Signal(_)
         | Diagnostic::Scan(_) => None,
     };
-    let dissection = dissect::dissect(bytes, Some(framing), Some(Direction::Answer), asked.as_deref());
+    let asked = sent.and_then(|sent| dissect::message_of(sent, framing));
+    let answer = sent.filter(|_| asked.is_some()).map(|sent| framing::find_reply(framing, sent, bytes, true));
+    let part =
+        answer.as_ref().and_then(|answer| answer.as_ref().ok()).map_or(bytes, |reply| &bytes[reply.range.clone()]);
+    let dissection = dissect::dissect(part, Some(framing), Some(Direction::Answer), asked.as_deref());
     let mut rows: Vec<Row> = broken(&t!("RX {bytes_text}", bytes_text = bytes_text(framing, bytes)), room)
         .into_iter()
         .map(|line| plain(line, theme.normal()))
         .collect();
     let reply = reply.map_or(String::new(), |reply| t!("   after {short_ms} ms", short_ms = short_ms(reply)));
-    let refused = dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
-    let (mark, style) = match (&dissection.wrong, refused) {
-        (None, false) => (t!("✓ ok").to_owned(), theme.normal()),
-        (None, true) => (t!("✗ refused by the device").to_owned(), theme.trouble()),
-        (Some(wrong), _) => (format!("✗ {wrong}"), theme.trouble()),
+    let (mark, style) = match answer {
+        Some(Ok(Reply { exception: None, .. })) => (t!("✓ ok").to_owned(), theme.normal()),
+        Some(Ok(Reply { exception: Some(_), .. })) => (t!("✗ refused by the device").to_owned(), theme.trouble()),
+        Some(Err(fault)) => (format!("✗ {fault}"), theme.trouble()),
+        None => (t!("received").to_owned(), theme.normal()),
     };
     rows.push(plain(format!("{mark}{reply}"), style));
     let means = asked.map(|asked| meaning::of_answer(cx.snapshot, at.id, &asked, &dissection.message));

@@ -17,10 +17,16 @@ use crate::{
     bus::{
         ascii,
         dissect::{self, Direction, Dissection},
-        frame::{self, Mbap, hex},
-        hex_input, meaning, names, request_lint,
+        frame::hex,
+        hex_input::{self, FramedRequest},
+        meaning, names, request_lint,
     },
-    plant::{command::Refusal, def::Framing, diagnostics::Diagnostic, event::LineState},
+    plant::{
+        command::Refusal,
+        def::Framing,
+        diagnostics::Diagnostic,
+        event::{Fault, LineState},
+    },
     ui::modal::{Next, line::Line},
 };
 

@@ -73,7 +73,9 @@ pub(super) fn of_device(
             t!("check baud rate, parity, termination and shield of the line").to_owned()
         }
         Fault::Exception(code) => names::advice(code.0).to_owned(),
-        Fault::WrongTransaction { .. } | Fault::Hangup => translate(crate::bus::source_frame::advice(fault)).to_owned(),
+        Fault::WrongTransaction { .. } | Fault::NoHeader | Fault::Hangup => {
+            translate(crate::bus::source_frame::advice(fault)).to_owned()
+        }
         Fault::WrongUnit { got, .. } => {
             t!("is its unit address {got}? Else check for a second master, or a gateway that changes the address", got)
         }

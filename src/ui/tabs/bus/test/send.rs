@@ -59,7 +59,10 @@ impl Send {
 
     fn ready(&self, framing: Framing) -> Result<Ready, String> {
         let typed = hex_input::parse(&self.text.text(), Some(framing)).map_err(|error| error.to_string())?;
-        let (frame, added) = if self.bare { (typed.bytes.clone(), String::new()) } else { dress(&typed, framing) };
+        let (frame, added) = match self.bare {
+            true => (typed.bytes, String::new()),
+            false => framed(&typed, framing).map_err(|fault| fault.to_string())?,
+        };
         let dissection = dissect::dissect(&frame, Some(framing), Some(Direction::Request), None);
         let mut errors: Vec<String> =
             request_lint::check_request(&dissection.message, framing).iter().map(ToString::to_string).collect();
@@ -143,26 +146,13 @@ impl Ready {
 }
 
 /// The frame of what was typed, and what was added to it, if it is not a frame already.
-fn dress(typed: &hex_input::ParsedInput, framing: Framing) -> (Vec<u8>, String) {
-    let bytes = &typed.bytes;
-    match framing {
-        Framing::Rtu if 4 <= bytes.len() && frame::without_crc(bytes).is_ok() => (bytes.clone(), String::new()),
-        Framing::Rtu => {
-            let whole = frame::with_crc(bytes);
-            let crc = hex(&whole[bytes.len()..]);
-            (whole, t!("+ CRC {crc}", crc))
-        }
-        Framing::Ascii if typed.framing == Some(Framing::Ascii) => (bytes.clone(), String::new()),
-        Framing::Ascii => {
-            (ascii::encode(bytes), t!("+ LRC {lrc}, as : hex CR LF", lrc = format!("{:02X}", ascii::lrc(bytes))))
-        }
-        Framing::Mbap if matches!(frame::mbap(bytes), Mbap::Whole { end, .. } if end == bytes.len()) => {
-            (bytes.clone(), String::new())
-        }
-        Framing::Mbap => {
-            let whole = frame::with_mbap(TRANSACTION, bytes);
-            let header = hex(&whole[..6]);
-            (whole, t!("+ header {header}", header))
-        }
-    }
+fn framed(typed: &hex_input::ParsedInput, framing: Framing) -> Result<(Vec<u8>, String), Fault> {
+    let FramedRequest { message, frame } = typed.framed(framing, TRANSACTION)?;
+    let added = match framing {
+        _ if frame == typed.bytes => String::new(),
+        Framing::Rtu => t!("+ CRC {crc}", crc = hex(&frame[message.len()..])),
+        Framing::Ascii => t!("+ LRC {lrc}, as : hex CR LF", lrc = format!("{:02X}", ascii::lrc(&message))),
+        Framing::Mbap => t!("+ header {header}", header = hex(&frame[..6])),
+    };
+    Ok((frame, added))
 }

@@ -31,7 +31,7 @@ pub(super) fn cut(framing: Framing, bytes: &[u8], asked: Option<&[u8]>, ended: b
     let cut = match framing {
         Framing::Rtu => rtu(bytes, asked, ended),
         Framing::Ascii => in_ascii(bytes),
-        Framing::Mbap => mbap(bytes),
+        Framing::Mbap => mbap(bytes, asked),
     };
     if cut == Cut::Wait && ended { Cut::Noise } else { cut }
 }
@@ -64,11 +64,11 @@ fn rtu(bytes: &[u8], asked: Option<&[u8]>, ended: bool) -> Cut {
 /// Do these bytes begin like the response to a request?
 fn may_answer(asked: &[u8], bytes: &[u8]) -> bool {
     let counted = |asked: &[u8]| match asked.get(1) {
-        Some(0x01..=0x04 | 0x17) => frame::response_signature(asked).map(|signature| signature.length() - 3),
+        Some(0x01..=0x04 | 0x17) => frame::expected_length(asked).map(|length| length - 3),
         Some(_) | None => None,
     };
-    let same = bytes.first() == asked.first() && bytes.get(1) == asked.get(1);
-    same && counted(asked).is_none_or(|count| bytes.get(2).is_some_and(|byte| usize::from(*byte) == count))
+    frame::begins_answer(asked, bytes)
+        && counted(asked).is_none_or(|count| bytes.get(2).is_some_and(|byte| usize::from(*byte) == count))
 }
 
 /// The lengths of frames of functions that are not in the standard: only a silence or the frames around them show where they
@@ -97,8 +97,8 @@ fn in_ascii(bytes: &[u8]) -> Cut {
     }
 }
 
-/// A header has no check, so the length that it gives must be that of its function.
-fn mbap(bytes: &[u8]) -> Cut {
+/// A header has no check, so the length that it gives must be that of its function; or it answers the request.
+fn mbap(bytes: &[u8], asked: Option<&[u8]>) -> Cut {
     if bytes.get(2..4).is_some_and(|protocol| protocol != [0, 0]) {
         return Cut::Noise;
     }
@@ -112,7 +112,9 @@ fn mbap(bytes: &[u8]) -> Cut {
                 Length::BySilence => true,
                 Length::TooEarly => false,
             };
-            let good = fits(pdu::request_length(message)) || fits(pdu::response_length(message));
+            let good = fits(pdu::request_length(message))
+                || fits(pdu::response_length(message))
+                || asked.is_some_and(|asked| frame::answers(Framing::Mbap, asked, message));
             if good { Cut::Frame(end) } else { Cut::Noise }
         }
     }
