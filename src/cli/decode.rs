@@ -10,10 +10,14 @@ use jiff::Timestamp;
 use crate::{
     bus::{
         ascii,
-        dissect::{self, Direction, Dissection},
+        dissect::{
+            Direction, Dissection,
+            paste::{self, Asked, Part, Paste, Why},
+        },
         frame::{crc16, hex},
-        hex_input::{self, ParsedInput},
+        hex_input::{self, HexInputError, Pasted},
         meaning,
+        names::{Counted, counted},
         request_lint::check_request,
     },
     plant::{Plant, Snapshot, def::LineDef, line::Framing},
@@ -24,8 +28,8 @@ use super::{CliError, StationArgs, load, say, say_error};
 /// Arguments of `decode`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Bytes in hex (`01 03 00 00 00 01`, `0x01,0x03…`), an ASCII frame (`:0103…`) or lines of a log (`TX 01 03 …`);
-    /// none or `-`: lines from standard input
+    /// Bytes in hex (`01 03 00 00 00 01`, `0x01,0x03…`), ASCII frames (`:0103…`) or lines of a log (`TX 01 03 …`), with
+    /// anything before, between and behind the frames; none or `-`: lines from standard input
     #[arg(value_name = "BYTES")]
     bytes: Vec<String>,
     /// The bytes are an RTU frame, with CRC
@@ -57,12 +61,16 @@ pub fn main(args: Args) -> Result<(), CliError> {
     };
     let plant = args.plant.as_deref().map(|plant| load(plant, &StationArgs::default())).transpose()?;
     let plant = plant.map(|def| Plant::new(Arc::new(def), Timestamp::UNIX_EPOCH, 1.0).snapshot());
-    let plant = plant.as_ref();
+    let mut decoder = Decoder { framing, plant: plant.as_ref(), asked: Asked::default() };
+    let text = args.bytes.join(" ");
+    // A log is read line by line: each says who sent it.
+    if text.lines().filter(|line| hex_input::is_of_log(line)).count() > 1 {
+        return lines(text.as_bytes(), &mut decoder);
+    }
     if !args.bytes.is_empty() && args.bytes != ["-"] {
-        let typed =
-            hex_input::parse(&args.bytes.join(" "), framing).map_err(|error| CliError::Usage(error.to_string()))?;
-        describe(&typed, framing, None, plant).iter().for_each(|line| say(line));
-        return match dissection(&typed, framing, None).wrong {
+        let (said, wrong) = decoder.decode(&text).map_err(|error| CliError::Usage(error.to_string()))?;
+        said.iter().for_each(|line| say(line));
+        return match wrong {
             None => Ok(()),
             Some(wrong) => Err(CliError::Failed(format!("the frame is wrong: {wrong}"))),
         };
@@ -70,108 +78,178 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if std::io::stdin().is_terminal() {
         say_error("one frame per line, Ctrl-D ends");
     }
-    lines(std::io::stdin().lock(), framing, plant)
+    lines(std::io::stdin().lock(), &mut decoder)
 }
 
 /// Explains frames as their lines come. An answer behind its request gets its addresses.
-fn lines(input: impl BufRead, framing: Option<Framing>, plant: Option<&Snapshot>) -> Result<(), CliError> {
+fn lines(input: impl BufRead, decoder: &mut Decoder) -> Result<(), CliError> {
     let (mut frames, mut corrupt, mut wrong) = (0, 0, 0);
-    let mut asked: Option<Dissection> = None;
     for (index, line) in input.split(b'\n').enumerate() {
         let line = line.map_err(CliError::io("cannot read standard input"))?;
         let line = String::from_utf8_lossy(&line);
         if line.trim().is_empty() {
             continue;
         }
-        let typed = match hex_input::parse(&line, framing) {
-            Ok(typed) => typed,
+        match decoder.decode(&line) {
+            Ok((said, fault)) => {
+                let blank = (0 < frames).then(String::new);
+                blank.iter().chain(&said).for_each(|line| say(line));
+                frames += 1;
+                wrong += usize::from(fault.is_some());
+            }
             Err(error) => {
                 say_error(&format!("line {}: {error}", index + 1));
                 corrupt += 1;
-                continue;
             }
-        };
-        if 0 < frames {
-            say("");
         }
-        frames += 1;
-        describe(&typed, framing, asked.as_ref(), plant).iter().for_each(|line| say(line));
-        wrong += usize::from(dissection(&typed, framing, asked.as_ref()).wrong.is_some());
-        let dissection = dissection(&typed, framing, None);
-        asked = (dissection.direction != Some(Direction::Answer)).then_some(dissection);
     }
     match (frames, corrupt, wrong) {
-        (0, 0, _) => Err(CliError::Usage(hex_input::HexInputError::Empty.to_string())),
+        (0, 0, _) => Err(CliError::Usage(HexInputError::Empty.to_string())),
         (_, 0, 0) => Ok(()),
         (_, 0, _) => Err(CliError::Failed(format!("{wrong} of {frames} frames are wrong"))),
         _ => Err(CliError::Usage(format!("{corrupt} of {} lines cannot be read", frames + corrupt))),
     }
 }
 
-fn dissection(typed: &ParsedInput, framing: Option<Framing>, asked: Option<&Dissection>) -> Dissection {
-    let direction = typed.sent.map(|sent| if sent { Direction::Request } else { Direction::Answer });
-    // Only what may be an answer to the request before it is read as one.
-    let plain = dissect::dissect(&typed.bytes, typed.framing.or(framing), direction, None);
-    let matching = asked.filter(|asked| {
-        let same =
-            |at: usize, mask: u8| plain.message.get(at).map(|byte| byte & mask) == asked.message.get(at).copied();
-        direction != Some(Direction::Request) && same(0, 0xFF) && same(1, 0x7F)
-    });
-    match matching {
-        Some(asked) if plain.direction != Some(Direction::Request) => {
-            dissect::dissect(&typed.bytes, typed.framing.or(framing), Some(Direction::Answer), Some(&asked.message))
+/// Text to words.
+struct Decoder<'a> {
+    framing: Option<Framing>,
+    plant: Option<&'a Snapshot>,
+    asked: Asked,
+}
+
+impl Decoder<'_> {
+    /// The lines about all that is pasted, and the first thing that is wrong with a frame of it.
+    fn decode(&mut self, text: &str) -> Result<(Vec<String>, Option<String>), HexInputError> {
+        let Pasted { input, doubt } = hex_input::parse_paste(text)?;
+        let direction = input.sent.map(|sent| if sent { Direction::Request } else { Direction::Answer });
+        let paste = paste::read(&input.bytes, input.framing.or(self.framing), direction, &mut self.asked);
+        if let Some(error) = doubt.filter(|_| !matches!(paste.why, Why::Check | Why::Header)) {
+            return Err(error);
         }
-        Some(_) | None => plain,
+        let mut lines = Vec::new();
+        if let [Part { dissection: Some(dissection), asked, .. }] = &paste.parts[..] {
+            lines.extend(self.describe(dissection, 0, asked.as_deref()));
+            lines.extend(wrap(&why(&paste), WIDTH, 2));
+            lines.extend(instead(&paste));
+        } else {
+            lines.extend(wrap(&overview(&paste), WIDTH, 2));
+            lines.extend(instead(&paste));
+            for part in &paste.parts {
+                lines.push(String::new());
+                lines.extend(self.part(part, &input.bytes));
+            }
+        }
+        let wrong = paste.parts.iter().find_map(|part| part.dissection.as_ref()?.wrong.clone());
+        Ok((lines, wrong))
+    }
+
+    /// One frame of several, or what is none.
+    fn part(&self, part: &Part, bytes: &[u8]) -> Vec<String> {
+        let (first, count) = (part.range.start, part.range.len());
+        match &part.dissection {
+            Some(dissection) => self.describe(dissection, first, part.asked.as_deref()),
+            None => {
+                let place = match count {
+                    1 => format!("byte {first} is"),
+                    _ => format!("bytes {first}–{} are", first + count - 1),
+                };
+                let none = format!("{place} in no frame: {}", hex(&bytes[part.range.clone()]));
+                wrap(&none, WIDTH, 2)
+            }
+        }
+    }
+
+    /// The lines about one frame, whose first byte is at `offset`: what it is, every byte, the checks, what is wrong with it.
+    fn describe(&self, dissection: &Dissection, offset: usize, asked: Option<&[u8]>) -> Vec<String> {
+        let direction = match dissection.direction {
+            Some(Direction::Request) => "request",
+            Some(Direction::Answer) => "answer",
+            None if dissection.also.is_some() => "request or answer",
+            None => "bytes",
+        };
+        let kind = match dissection.framing {
+            Some(framing) => format!("{} {direction}", name_of(framing)),
+            None => format!("{direction} without CRC or header"),
+        };
+        let mut lines = wrap(&format!("{kind}: {}", dissection.summary), WIDTH, 2);
+        lines.extend(means(self.plant, dissection, asked).iter().flat_map(|means| wrap(means, WIDTH, 2)));
+        lines.extend(table(dissection, offset));
+        lines.extend(checks(dissection));
+        if let Some(wrong) = &dissection.wrong {
+            lines.extend(wrap(&format!("wrong: {wrong}"), WIDTH, 2));
+        }
+        let refused = check_request(&dissection.message, dissection.framing.unwrap_or(Framing::Rtu));
+        if let Some(also) = &dissection.also {
+            let words = match (dissection.direction, refused.first()) {
+                (None, _) => also.clone(),
+                (Some(Direction::Answer), Some(error)) => format!("may also be {also}; but must not be sent: {error}"),
+                (Some(_), _) => format!("may also be {also}; as a request no device would refuse it"),
+            };
+            lines.extend(wrap(&words, WIDTH, 2));
+        }
+        if dissection.direction != Some(Direction::Answer) && dissection.wrong.is_none() {
+            lines.extend(refused.iter().flat_map(|error| wrap(&format!("must not be sent: {error}"), WIDTH, 2)));
+        }
+        lines
     }
 }
 
-/// The lines about one frame: what it is, every byte, the checks, what is wrong with it.
-fn describe(
-    typed: &ParsedInput,
-    framing: Option<Framing>,
-    asked: Option<&Dissection>,
-    plant: Option<&Snapshot>,
-) -> Vec<String> {
-    let dissection = dissection(typed, framing, asked);
-    let direction = match dissection.direction {
-        Some(Direction::Request) => "request",
-        Some(Direction::Answer) => "answer",
-        None if dissection.also.is_some() => "request or answer",
-        None => "bytes",
-    };
-    let kind = match dissection.framing {
-        Some(Framing::Rtu) => format!("RTU {direction}"),
-        Some(Framing::Ascii) => format!("ASCII {direction}"),
-        Some(Framing::Mbap) => format!("TCP {direction}"),
-        None => format!("{direction} without CRC or header"),
-    };
-    let mut lines = wrap(&format!("{kind}: {}", dissection.summary), WIDTH, 2);
-    lines.extend(means(plant, &dissection, asked).iter().flat_map(|means| wrap(means, WIDTH, 2)));
-    lines.extend(table(&dissection));
-    lines.extend(checks(&dissection));
-    if let Some(wrong) = &dissection.wrong {
-        lines.extend(wrap(&format!("wrong: {wrong}"), WIDTH, 2));
+/// How many frames there are, and why these bytes are read so.
+fn overview(paste: &Paste) -> String {
+    let frames = paste.parts.iter().filter(|part| part.dissection.is_some()).count();
+    let noise: usize = paste.parts.iter().filter(|part| part.dissection.is_none()).map(|part| part.range.len()).sum();
+    let noise = (0 < noise).then(|| format!(", {} in no frame", counted(noise, Counted::Bytes)));
+    let kind = paste.framing.map_or("bare", name_of);
+    let frames = if frames == 1 { format!("1 {kind} frame") } else { format!("{frames} {kind} frames") };
+    format!("{frames}{}; {}", noise.unwrap_or_default(), why(paste))
+}
+
+fn name_of(framing: Framing) -> &'static str {
+    match framing {
+        Framing::Rtu => "RTU",
+        Framing::Ascii => "ASCII",
+        Framing::Mbap => "TCP",
     }
-    if let Some(also) = &dissection.also {
-        let words = if dissection.direction.is_none() { also.clone() } else { format!("may also be {also}") };
-        lines.extend(wrap(&words, WIDTH, 2));
-    }
-    if dissection.direction != Some(Direction::Answer) && dissection.wrong.is_none() {
-        for error in check_request(&dissection.message, dissection.framing.unwrap_or(Framing::Rtu)) {
-            lines.extend(wrap(&format!("must not be sent: {error}"), WIDTH, 2));
+}
+
+/// Why bytes are read as they are.
+fn why(paste: &Paste) -> String {
+    let place = "every other byte has its place";
+    match (paste.why, paste.framing) {
+        (Why::Check, Some(Framing::Ascii)) => "read as ASCII: the LRC fits".to_owned(),
+        (Why::Check, _) => "read as RTU: the CRC fits".to_owned(),
+        (Why::Header, _) => "read as TCP: header and function give the same length".to_owned(),
+        (Why::Message, _) => {
+            "read as a message alone: no CRC fits, there is no header, and every byte has its place".to_owned()
+        }
+        (Why::BadCheck, Some(Framing::Ascii)) => format!("read as ASCII: the LRC is wrong, but {place}"),
+        (Why::BadCheck, _) => format!("read as RTU: the CRC is wrong, but {place}"),
+        (Why::BadHeader, _) => format!("read as TCP: the header is wrong, but {place}"),
+        (Why::Nothing, _) => {
+            "no CRC or LRC fits, there is no header, and no message of the standard is like this".to_owned()
         }
     }
-    lines
+}
+
+/// The reading that was not preferred, and why.
+fn instead(paste: &Paste) -> Vec<String> {
+    let Some(other) = &paste.instead else { return Vec::new() };
+    let reason = match paste.framing {
+        Some(Framing::Rtu) => "a CRC fits by chance once in 65,536 times",
+        Some(Framing::Ascii) => "digits between `:` and CR LF are no chance",
+        Some(Framing::Mbap) | None => "a header that fits is less of a chance",
+    };
+    let kind = other.framing.map_or("a message alone", name_of);
+    wrap(&format!("may also be {kind}: {}; {reason}", other.summary), WIDTH, 2)
 }
 
 /// What a frame means for the tags of a plant: on whichever of its lines has the unit. Nothing is read, so what a device would
 /// say of its decimals is not known.
-fn means(plant: Option<&Snapshot>, dissection: &Dissection, asked: Option<&Dissection>) -> Vec<String> {
+fn means(plant: Option<&Snapshot>, dissection: &Dissection, asked: Option<&[u8]>) -> Vec<String> {
     let Some(plant) = plant else { return Vec::new() };
     let of_line = |line: &LineDef| match (dissection.direction, asked) {
-        (Some(Direction::Answer), Some(asked)) => {
-            meaning::of_answer(plant, line.id, &asked.message, &dissection.message)
-        }
+        (Some(Direction::Answer), Some(asked)) => meaning::of_answer(plant, line.id, asked, &dissection.message),
         (Some(Direction::Answer), None) => Vec::new(),
         (Some(Direction::Request) | None, _) => meaning::of_request(plant, line.id, &dissection.message),
     };
@@ -185,8 +263,8 @@ fn checks(dissection: &Dissection) -> Option<String> {
         .then(|| format!("CRC {}   LRC {:02X}", hex(&crc16(message).to_le_bytes()), ascii::lrc(message)))
 }
 
-/// Offset counted from 0, bytes, field, meaning.
-fn table(dissection: &Dissection) -> Vec<String> {
+/// Offset counted from 0, bytes, field, meaning; the frame begins at `offset`.
+fn table(dissection: &Dissection, offset: usize) -> Vec<String> {
     let hex_rows = |hex: &str| -> Vec<String> {
         let bytes: Vec<&str> = hex.split(' ').collect();
         bytes.chunks(BYTES).map(|row| row.join(" ")).collect()
@@ -203,7 +281,7 @@ fn table(dissection: &Dissection) -> Vec<String> {
         let (hex, words) = (hex_rows(&field.hex), wrap(&field.words, words_width, 0));
         for index in 0..hex.len().max(words.len()) {
             let part = |rows: &[String]| rows.get(index).cloned().unwrap_or_default();
-            let at = if index == 0 { field.range.start.to_string() } else { String::new() };
+            let at = if index == 0 { (offset + field.range.start).to_string() } else { String::new() };
             let name = if index == 0 { field.name.as_str() } else { "" };
             lines.push(row(&at, &part(&hex), name, &part(&words)));
         }

@@ -7,6 +7,7 @@
 
 mod envelope;
 mod fields;
+pub mod paste;
 mod reader;
 mod summary;
 
