@@ -1,5 +1,6 @@
 //! Diagnostics of a line as pure step machines: which request is next, and what follows from its response.
 
+mod identify;
 mod loopback;
 mod pattern;
 mod scan;
@@ -80,6 +81,7 @@ pub struct Job {
     /// The response to a write, once it was sent.
     written: Result<(), Fault>,
     sweep: Option<sweep::SweepJob>,
+    identify: identify::IdentifyJob,
 }
 
 impl Job {
@@ -101,8 +103,17 @@ impl Job {
             state: DiagnosticState::Running,
             findings: Vec::new(),
         };
-        let (queued, corrupt_units) = (VecDeque::new(), Vec::new());
-        let mut job = Job { run, step: None, queued, made: 0, planned, corrupt_units, written: Ok(()), sweep };
+        let mut job = Job {
+            run,
+            step: None,
+            queued: VecDeque::new(),
+            made: 0,
+            planned,
+            corrupt_units: Vec::new(),
+            written: Ok(()),
+            sweep,
+            identify: identify::IdentifyJob::default(),
+        };
         job.advance();
         job.update_now();
         job
@@ -166,6 +177,7 @@ impl Job {
             (Diagnostic::Sweep(_), StepResult::Answer(answer, _)) => return self.on_swept(&step, answer),
             // It only had an adapter with echo give itself away.
             (Diagnostic::Loopback { .. }, StepResult::Answer(..)) if self.run.done == 1 => {}
+            (Diagnostic::Identify { .. }, result @ StepResult::Answer(..)) => self.on_identified(&step, result),
             (Diagnostic::Write(write), StepResult::Answer(answer, exchange)) => {
                 let write = write.clone();
                 self.found(Finding::Exchange(exchange));
@@ -221,36 +233,20 @@ impl Job {
         let answer = match answer {
             Ok(answer) => answer,
             Err(fault) => {
-                if let Some(what) = request_step(request, None) {
-                    self.found(Finding::Failed { what, fault });
-                }
-                self.after_failure(request, fault);
+                self.failed(request, fault);
+                self.after_failure(fault);
                 return;
             }
         };
-        match (request.get(1), answer.get(1)) {
-            (Some(0x2B), _) => self.on_identification(request, &answer),
-            (Some(0x11), _) => {
-                let text = text_of(answer.get(3..).unwrap_or_default());
-                self.found(Finding::Object { id: None, text });
-            }
-            (Some(0x01..=0x04), _) => {
-                let values = answer.get(1..).and_then(|pdu| pdu::values_read(&request[1..], pdu));
-                if let Some((table, address, words)) = values {
-                    self.found(Finding::Values { table, address, words });
-                }
-            }
-            _ => {}
+        let values = answer.get(1..).and_then(|pdu| pdu::values_read(&request[1..], pdu));
+        if let Some((table, address, words)) = values {
+            self.found(Finding::Values { table, address, words });
         }
     }
 
-    /// A device without 2B/0E may know 11; a block that does not exist as a whole may exist in parts.
-    fn after_failure(&mut self, request: &[u8], fault: Fault) {
+    /// A block that does not exist as a whole may exist in parts.
+    fn after_failure(&mut self, fault: Fault) {
         match (&self.run.diagnostic, fault) {
-            (Diagnostic::Identify { unit }, Fault::Exception(_)) if request.get(1..4) == Some(&[0x2B, 0x0E, 0x01]) => {
-                self.made = self.planned;
-                self.queued.push_back(step(vec![*unit, 0x11]));
-            }
             (Diagnostic::Read { unit, table, address, count }, Fault::Exception(code))
                 if code.0 == 2 && 1 < *count && self.run.done == 1 =>
             {
@@ -261,16 +257,14 @@ impl Job {
         }
     }
 
-    /// Objects: id, length, text. If more follow, they are asked for (V1.1b3, 6.21).
-    fn on_identification(&mut self, request: &[u8], answer: &[u8]) {
-        let [unit, _, _, code, ..] = *request else { return };
-        let [_, _, _, _, _, more, next, _, ..] = *answer else { return };
-        for (id, text) in pdu::identification_objects(&answer[1..]) {
-            self.found(Finding::Object { id: Some(id), text: text_of(text) });
-        }
-        // A device that always says "more" at the same place would be asked for ever.
-        if more == 0xFF && request[4] < next {
-            self.queued.push_front(step(vec![unit, 0x2B, 0x0E, code, next]));
+    /// The device heard nothing for so long after it had accepted the connection.
+    pub fn note_deaf(&mut self, span: Duration) {
+        self.found(Finding::Conclusion(Conclusion::Deaf(span)));
+    }
+
+    fn failed(&mut self, request: &[u8], fault: Fault) {
+        if let Some(what) = request_step(request, None) {
+            self.found(Finding::Failed { what, fault });
         }
     }
 
@@ -314,10 +308,9 @@ impl Job {
 /// How many steps a diagnostic has before any answer calls for more.
 fn steps_in(diagnostic: &Diagnostic) -> u32 {
     match diagnostic {
-        Diagnostic::Send(_) | Diagnostic::Read { .. } => 1,
+        Diagnostic::Send(_) | Diagnostic::Read { .. } | Diagnostic::Identify { .. } => 1,
         Diagnostic::Loopback { count, .. } => 1 + u32::from(*count),
         Diagnostic::Pattern { count, .. } => u32::from(*count),
-        Diagnostic::Identify { .. } => 2,
         Diagnostic::Write(_) => write::STEPS,
         Diagnostic::Scan(scan) => scan::steps_in(scan),
         Diagnostic::Sweep(sweep) => sweep.addresses(),
@@ -339,9 +332,7 @@ fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
             let [high, low] = data.wrapping_add(to_u16(n) - 1).to_be_bytes();
             step(vec![*unit, 0x08, 0, 0, high, low])
         }
-        // Basic objects, then the regular ones that follow them (id 3 and on).
-        Diagnostic::Identify { unit } if n == 0 => step(vec![*unit, 0x2B, 0x0E, 0x01, 0]),
-        Diagnostic::Identify { unit } => step(vec![*unit, 0x2B, 0x0E, 0x02, 3]),
+        Diagnostic::Identify { unit } => identify::first(*unit),
         Diagnostic::Write(write) => write::step_of(write, n),
         Diagnostic::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
         Diagnostic::Scan(scan) => scan::step_of(scan, n),

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Runs a diagnostic against a device given as a function from request to answer.
-fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> DiagnosticRun {
+pub(super) fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u8>, Fault>) -> DiagnosticRun {
     let id = CommandId { terminal: 1, number: 1 };
     let mut job = Job::new(id, "anna".into(), diagnostic, Timestamp::UNIX_EPOCH);
     for _ in 0..10_000 {

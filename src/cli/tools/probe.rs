@@ -36,13 +36,13 @@ pub fn main(args: Args) -> Result<(), CliError> {
         Finding::Object { id, text } => vec![format!("{:20}  {text}", names::identity(*id))],
         Finding::Values { table, address, words } => value_lines(*table, *address, words),
         Finding::Failed { what, fault } => vec![format!("{what}: {fault}")],
+        Finding::Conclusion(conclusion) => vec![conclusion.to_string()],
         Finding::Exchange(_)
         | Finding::Written(_)
         | Finding::Swept(_)
         | Finding::Signals { .. }
         | Finding::Bytes { .. }
-        | Finding::Unit { .. }
-        | Finding::Conclusion(_) => Vec::new(),
+        | Finding::Unit { .. } => Vec::new(),
     })?;
     let found = |finding: &Finding| matches!(finding, Finding::Object { .. } | Finding::Values { .. });
     if run.findings.iter().any(found) {
@@ -55,7 +55,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
         })
     };
     let wrong = faults().find(|fault| fault.is_corrupt());
-    Err(CliError::Failed(match (faults().any(|fault| matches!(fault, Fault::Exception(_))), wrong) {
+    let answered = run.findings.iter().any(|finding| match finding {
+        Finding::Exchange(exchange) => matches!(exchange.outcome, Ok(()) | Err(Fault::Exception(_))),
+        _ => false,
+    });
+    Err(CliError::Failed(match (answered, wrong) {
         (true, _) => "the unit responds, but does not support that".to_owned(),
         (false, Some(fault)) => format!("something answers, but wrongly: {fault}"),
         (false, None) => "the unit does not respond".to_owned(),

@@ -59,6 +59,8 @@ pub enum Conclusion {
         /// Not all ranges are among the findings.
         cut: bool,
     },
+    /// The device has answered nothing for so long after it had accepted the connection.
+    Deaf(Duration),
 }
 
 /// Why a sweep ended before its last address.
@@ -104,6 +106,10 @@ impl fmt::Display for Conclusion {
             }
             .to_owned(),
             Conclusion::Signals { test, held, after } => signals(*test, *held, *after),
+            Conclusion::Deaf(span) => {
+                let seconds = format!("{:.1}", span.as_secs_f64());
+                t!("the device answered nothing for the first {seconds} s of the connection", seconds)
+            }
             Conclusion::Sweep { ended: Some(ended), answers: 0, refused: 0, silent: 0, .. } => return ended.fmt(f),
             Conclusion::Sweep { ended: Some(ended), .. } => format!("{ended}; {}", self.swept()),
             Conclusion::Sweep { ended: None, .. } => self.swept(),
