@@ -81,25 +81,78 @@ fn group_words(path: &str) -> String {
     }
 }
 
-/// The program that has a port open, as far as we may see: `minicom (process 1234)`.
-pub(super) fn holder(path: &str) -> Option<String> {
-    let port = fs::canonicalize(path).ok()?;
-    let processes = fs::read_dir("/proc").ok()?.flatten();
-    let own = std::process::id().to_string();
-    let holds = |folder: &Path| {
-        let handles = fs::read_dir(folder.join("fd")).into_iter().flatten().flatten();
-        handles.into_iter().any(|handle| fs::read_link(handle.path()).is_ok_and(|target| target == port))
-    };
-    let is_process = |folder: &Path| {
-        folder.file_name().is_some_and(|name| name.to_string_lossy().bytes().all(|digit| digit.is_ascii_digit()))
-    };
-    let found = processes.map(|process| process.path()).find(|folder| is_process(folder) && holds(folder))?;
-    let id = found.file_name()?.to_string_lossy().into_owned();
-    if id == own {
-        return Some("this program, on another line".into());
+/// A program that has a port open.
+struct Holder {
+    process: u32,
+    /// It serves the port too: the other end of a pseudo-terminal.
+    is_other_end: bool,
+}
+
+impl Holder {
+    /// `mbpoll -m rtu /dev/ttyUSB0 (process 1234)`.
+    fn words(&self) -> String {
+        let read = |name: &str| fs::read(format!("/proc/{}/{name}", self.process)).unwrap_or_default();
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).replace('\0', " ").trim().to_owned();
+        let command =
+            Some(text(&read("cmdline"))).filter(|line| !line.is_empty()).unwrap_or_else(|| text(&read("comm")));
+        // A control character of another program's arguments is no business of this terminal.
+        let shown: String = command.chars().filter(|letter| !letter.is_control()).take(COMMAND_MAX).collect();
+        format!("{shown} (process {})", self.process)
     }
-    let name = fs::read_to_string(found.join("comm")).ok()?;
-    Some(format!("{} (process {id})", name.trim()))
+}
+
+/// Most characters of a command that are shown.
+const COMMAND_MAX: usize = 80;
+
+/// The programs that have a port open, as far as we may see.
+fn holders(path: &str) -> Vec<Holder> {
+    let Ok(port) = fs::metadata(path) else { return Vec::new() };
+    let index = fs::canonicalize(path)
+        .ok()
+        .and_then(|path| path.strip_prefix("/dev/pts").ok().and_then(|name| name.to_str()?.parse::<u32>().ok()));
+    let entries = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_port =
+        |handle: &Path| fs::metadata(handle).is_ok_and(|open| (open.dev(), open.ino()) == (port.dev(), port.ino()));
+    // The kernel says which pseudo-terminal a master belongs to.
+    let is_master = |handle: &Path, folder: &Path| {
+        let info = handle.file_name().map(|name| folder.join("fdinfo").join(name));
+        let info = info.and_then(|info| fs::read_to_string(info).ok()).unwrap_or_default();
+        let of = info.lines().find_map(|line| line.strip_prefix("tty-index:")?.trim().parse().ok());
+        of.is_some() && of == index
+    };
+    let of_process = |folder: PathBuf| {
+        let process = folder.file_name()?.to_str()?.parse().ok()?;
+        let handles: Vec<PathBuf> = entries(&folder.join("fd")).collect();
+        let holds = handles.iter().any(|handle| is_port(handle));
+        let is_other_end = || index.is_some() && handles.iter().any(|handle| is_master(handle, &folder));
+        holds.then(|| Holder { process, is_other_end: is_other_end() })
+    };
+    entries(Path::new("/proc")).filter_map(of_process).collect()
+}
+
+/// The programs that have a port open: `minicom -D /dev/ttyUSB0 (process 1234)`.
+pub(super) fn holder(path: &str) -> Option<String> {
+    user(path).or_else(|| words_of(holders(path).iter()))
+}
+
+/// The same without what only serves a pseudo-terminal.
+pub(super) fn user(path: &str) -> Option<String> {
+    let own = std::process::id();
+    match holders(path).iter().any(|holder| holder.process == own) {
+        true => Some("this program, on another line".into()),
+        false => also_open(path),
+    }
+}
+
+/// The programs that have a port open beside this one, and take bytes from it.
+pub fn also_open(path: &str) -> Option<String> {
+    let own = std::process::id();
+    words_of(holders(path).iter().filter(|holder| holder.process != own && !holder.is_other_end))
+}
+
+fn words_of<'a>(holders: impl Iterator<Item = &'a Holder>) -> Option<String> {
+    let words: Vec<String> = holders.map(Holder::words).collect();
+    (!words.is_empty()).then(|| words.join(", "))
 }
 
 #[cfg(test)]

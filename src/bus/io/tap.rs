@@ -1,10 +1,6 @@
 //! Opens a port or connection to listen: it is read, and nothing can be written to it.
 
-use std::{
-    fs::{self, OpenOptions},
-    io,
-    os::unix::fs::OpenOptionsExt,
-};
+use std::{fs::OpenOptions, io, os::unix::fs::OpenOptionsExt};
 
 use rustix::{
     fs::{FlockOperation, OFlags, flock},
@@ -58,10 +54,8 @@ fn open_serial(path: &str, serial: Serial, rts: bool) -> Result<Tap, String> {
             "{path}: in use by {holder}: two programs at one port take each other's bytes; to listen needs a port of its own"
         )
     };
-    // A pseudo-terminal is held open by what joins it to another.
-    let is_joined = fs::canonicalize(path).is_ok_and(|path| path.starts_with("/dev/pts"));
-    if let Some(holder) = ports::holder(path).filter(|_| !is_joined) {
-        return Err(in_use(Some(holder)));
+    if let Some(user) = ports::user(path) {
+        return Err(in_use(Some(user)));
     }
     let failed = |error: io::Error| ports::why_not(path, &error.into());
     let flags = (OFlags::NONBLOCK | OFlags::NOCTTY).bits().cast_signed();
@@ -134,7 +128,7 @@ mod tests {
     async fn what_cannot_be_listened_to_is_named() {
         let folder = tempfile::tempdir().expect("a folder of its own");
         let file = folder.path().join("file");
-        fs::write(&file, "text").expect("it can be written");
+        std::fs::write(&file, "text").expect("it can be written");
         for (path, part) in [("/dev/no-such-port", "no such port ("), (&file.to_string_lossy(), "not a serial port")] {
             let failed = Tap::open(&Transport::rtu(path, Serial::USUAL), false).await.err().unwrap_or_default();
             assert!(failed.contains(part), "{path}: {failed}");
