@@ -17,7 +17,10 @@ use super::{
     tools::{self, scan},
 };
 use crate::{
-    bus::recognise::{self, Fit},
+    bus::{
+        io::testing::Bench,
+        recognise::{self, Fit},
+    },
     history::{Answer, Query},
     plant::{
         PlantDef,
@@ -146,7 +149,7 @@ async fn find_units(line: &LineDef, known: &[Arc<PlantDef>]) -> Result<Option<(V
     let usual = if line.transport.serial().is_some() { "1-32" } else { "1-247" };
     let (first, last) = ask_until("  units to look for", usual, scan::units).await?;
     let scan = Diagnostic::Scan(Scan { first, last, serials: Vec::new(), timeout: line.timeout });
-    let run = tools::search(line, scan, |_| false).await?;
+    let run = tools::search(&mut Bench::new(line), scan, |_| false).await?;
     if let DiagnosticState::Failed(why) = &run.state {
         say(&format!("{why}; the line is left out"));
         return Ok(None);

@@ -11,11 +11,11 @@ use super::{
     tools::{self, PortArgs},
 };
 use crate::{
-    bus::io::{clock::Clock, transport::Connector},
+    bus::io::{clock::Clock, testing::Bench, transport::Connector},
     plant::{
         PlantDef,
         def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Parity, Serial, Transport},
-        diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
+        diagnostics::{Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
     },
     profile::{self, OwnProfiles, Search},
     station::io as station,
@@ -169,7 +169,7 @@ pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError>
         }
         let serials = USUAL.map(|(baud, parity)| Serial { baud, parity, ..serial });
         let serials = serials.into_iter().filter(|serial| args.port.fits(*serial)).collect();
-        return match first_answer(&line, (unit, unit), serials).await? {
+        return match first_answer(&mut Bench::new(&line), &line, (unit, unit), serials).await? {
             Ok((unit, serial, words)) => {
                 let serial = serial.unwrap_or(serial_of(&line));
                 say(&format!("unit {unit} answers at {serial}: {words}"));
@@ -187,12 +187,12 @@ pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError>
     if let Some(unit) = args.unit {
         return Ok((line, unit));
     }
-    let mut came = String::new();
+    let (mut came, mut bench) = (String::new(), Bench::new(&line));
     for range in USUAL_UNITS {
         if !line.transport.units().contains(&range.0) {
             continue;
         }
-        match first_answer(&line, range, Vec::new()).await? {
+        match first_answer(&mut bench, &line, range, Vec::new()).await? {
             Ok((unit, _, words)) => {
                 say(&format!("unit {unit} answers: {words}"));
                 return Ok((line, unit));
@@ -212,12 +212,15 @@ pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError>
 /// The first unit that answers, with the settings that it answers at, and what it has said; `Err` with what came in place
 /// of an answer, `, something is there: …`, or empty.
 async fn first_answer(
+    bench: &mut Bench,
     line: &LineDef,
     (first, last): (u8, u8),
     serials: Vec<Serial>,
 ) -> Result<Result<(u8, Option<Serial>, String), String>, CliError> {
     let scan = Diagnostic::Scan(Scan { first, last, serials, timeout: line.timeout.min(TRIAL) });
-    let run = tools::search(line, scan, |run| answer(run).is_some()).await?;
+    let run = tools::search(bench, scan, |run| answer(run).is_some()).await?;
+    let deaf = |finding: &&Finding| matches!(finding, Finding::Conclusion(Conclusion::Deaf(_)));
+    run.findings.iter().find(deaf).into_iter().flat_map(tools::scan::describe).for_each(|words| say(&words));
     match &run.state {
         DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
         DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => {

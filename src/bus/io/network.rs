@@ -5,7 +5,7 @@ use std::{fs, net::Ipv4Addr, str::FromStr, time::Duration};
 use futures_util::{StreamExt, stream};
 use jiff::Timestamp;
 
-use super::testing;
+use super::testing::{self, Hearing};
 use crate::{
     bus::diagnostics::Job,
     plant::{
@@ -102,13 +102,14 @@ async fn ask(host: Ipv4Addr, line: &LineDef) -> Option<HostAnswer> {
     let Transport::Tcp { port, framing, .. } = line.transport else { return None };
     let transport = Transport::Tcp { host: host.to_string(), port, framing };
     let line = LineDef { transport, ..line.clone() };
-    let mut link = tokio::time::timeout(CONNECT_MAX, testing::open(&line)).await.ok()??;
+    let mut connection = tokio::time::timeout(CONNECT_MAX, testing::open(&line)).await.ok()??;
+    let hearing = Hearing::default();
     for unit in UNITS.into_iter().filter(|unit| line.transport.units().contains(unit)) {
         let scan = Scan { first: unit, last: unit, serials: Vec::new(), timeout: line.timeout };
         let mut job = Job::new(CommandId::default(), "cli".into(), Diagnostic::Scan(scan), Timestamp::UNIX_EPOCH);
         while let Some(step) = job.next().cloned() {
-            match testing::step(&mut link, &step).await {
-                Ok(result) => job.on_result(result),
+            match connection.step(&hearing, &step).await {
+                Ok((result, _)) => job.on_result(result),
                 // It has hung up: it is there, and not willing.
                 Err(_) => return Some(HostAnswer::Open),
             }

@@ -1,8 +1,13 @@
 //! Carries the steps of a line diagnostic over a link.
 
-use std::{cell::RefCell, collections::VecDeque, time::Duration};
+use std::{
+    cell::{Cell, RefCell},
+    collections::VecDeque,
+    time::Duration,
+};
 
 use futures_util::future::join_all;
+use tokio::time::Instant;
 
 use super::{
     clock::Clock,
@@ -11,7 +16,11 @@ use super::{
     transport::Connector,
 };
 use crate::{
-    bus::diagnostics::{Ask, Job, Step, StepResult},
+    bus::{
+        diagnostics::{Ask, Job, Step, StepResult},
+        frame,
+        request_lint::only_reads,
+    },
     plant::{
         def::{Framing, LineDef, Transport},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState},
@@ -24,6 +33,98 @@ use crate::{
 pub const SCAN_CONNECTIONS: usize = 16;
 /// A gateway has so long to work off what it was asked at once.
 const WORK_OFF_MAX: Duration = Duration::from_secs(30);
+/// Some devices lose what they are asked for seconds after they have accepted a connection: until something has come, what
+/// changes nothing is asked again for so long. To connect again would begin that time again.
+pub const DEAF_MAX: Duration = Duration::from_secs(5);
+
+/// Whether anything has come from a device since it accepted the first connection, and when.
+#[derive(Debug, Default)]
+pub struct Hearing {
+    /// So long after the connection that it came on was accepted.
+    heard: Cell<Option<Duration>>,
+}
+
+impl Hearing {
+    /// A serial port accepts nothing: what is not answered at once is not there.
+    fn of(line: &LineDef) -> Hearing {
+        let at_once = line.transport.serial().is_some().then_some(Duration::ZERO);
+        Hearing { heard: Cell::new(at_once) }
+    }
+
+    /// May what was sent on a connection so old have been lost?
+    fn may_be_lost(&self, age: Duration) -> bool {
+        age < self.heard.get().unwrap_or(DEAF_MAX)
+    }
+
+    /// Something has come on a connection so old; within the time that an answer may take, the device was never deaf.
+    fn hear(&self, age: Duration, timeout: Duration) {
+        let deaf = if age <= timeout { Duration::ZERO } else { age };
+        self.heard.set(self.heard.get().or(Some(deaf)));
+    }
+
+    /// How long the device was deaf, if it was.
+    fn deaf_for(&self) -> Option<Duration> {
+        self.heard.get().filter(|span| !span.is_zero())
+    }
+}
+
+/// From a request to the first byte that came.
+fn response_time(result: &StepResult) -> Option<Duration> {
+    match result {
+        StepResult::Answer(_, exchange) => exchange.response_time,
+        StepResult::Bytes(_, response_time) => *response_time,
+        StepResult::Signals(_) => None,
+    }
+}
+
+/// An open connection, and since when.
+pub struct Connection {
+    link: Link,
+    opened: Instant,
+}
+
+impl Connection {
+    fn new(link: Link) -> Connection {
+        Connection { link, opened: Instant::now() }
+    }
+
+    /// One step, on this connection again while the device may be deaf. `Err` only when the port is gone. The second is whether
+    /// an answer came late meanwhile.
+    pub async fn step(&mut self, hearing: &Hearing, next: &Step) -> Result<(StepResult, bool), LinkError> {
+        let (mut late, mut is_again) = (false, false);
+        loop {
+            let sent = self.opened.elapsed();
+            let result = ask(&mut self.link, next, is_again).await?;
+            late |= !self.link.take_late().is_empty();
+            if late || !is_silent(&result) {
+                let came = response_time(&result).map_or(self.opened.elapsed(), |time| sent + time);
+                hearing.hear(came, next.timeout.unwrap_or(self.link.timeout()));
+            }
+            if !is_silent(&result) || !hearing.may_be_lost(sent) || !self.is_harmless(next) {
+                return Ok((result, late));
+            }
+            is_again = true;
+        }
+    }
+
+    /// May it be asked twice?
+    fn is_harmless(&self, step: &Step) -> bool {
+        match &step.ask {
+            Ask::Message(message) => only_reads(message),
+            Ask::Raw(bytes) => frame::unwrap(self.link.framing(), bytes).is_ok_and(|message| only_reads(&message)),
+            Ask::Hold(..) | Ask::PutBack => false,
+        }
+    }
+}
+
+/// Has nothing come?
+fn is_silent(result: &StepResult) -> bool {
+    match result {
+        StepResult::Answer(answer, _) => matches!(answer, Err(Fault::Timeout)),
+        StepResult::Bytes(bytes, _) => bytes.is_empty(),
+        StepResult::Signals(_) => false,
+    }
+}
 
 /// A scan over several connections.
 struct WideScan<'a> {
@@ -42,45 +143,51 @@ impl WideScan<'_> {
     }
 }
 
-/// The results of a scan over Modbus TCP, as far as units can be asked at once; `None` where one must be asked again, alone.
-async fn scan_at_once(line: &LineDef, steps: &[Step], progress: &mut impl FnMut() -> bool) -> Vec<Option<StepResult>> {
+/// The results of a scan over Modbus TCP, as far as units can be asked at once, `None` where one must be asked again, alone;
+/// and a connection that is still open.
+async fn scan_at_once(
+    line: &LineDef,
+    steps: &[Step],
+    hearing: &Hearing,
+    progress: &mut impl FnMut() -> bool,
+) -> (Vec<Option<StepResult>>, Option<Connection>) {
     let wide = RefCell::new(WideScan { steps, results: vec![None; steps.len()], begun: 0, one_by_one: false });
     let progress = RefCell::new(progress);
-    let connection = || async {
-        let mut link = open(line).await?;
+    let scan = || async {
+        let mut connection = open(line).await?;
         loop {
-            let Some((n, next)) = wide.borrow_mut().begin() else { return Some(link) };
+            let Some((n, next)) = wide.borrow_mut().begin() else { return Some(connection) };
             // A unit whose connection fails is asked again, alone.
-            let result = step(&mut link, &next).await.ok()?;
+            let (result, late) = connection.step(hearing, &next).await.ok()?;
             let mut wide = wide.borrow_mut();
             wide.results[n] = Some(result);
-            wide.one_by_one |= !link.take_late().is_empty();
+            wide.one_by_one |= late;
             if !(progress.borrow_mut())() {
                 wide.begun = steps.len();
             }
         }
     };
-    let links = join_all((0..SCAN_CONNECTIONS.min(steps.len())).map(|_| connection())).await;
+    let connections = join_all((0..SCAN_CONNECTIONS.min(steps.len())).map(|_| scan())).await;
+    let mut connections: Vec<Connection> = connections.into_iter().flatten().collect();
     let WideScan { mut results, one_by_one, .. } = wide.into_inner();
     if one_by_one {
         // What is still asked would hold up what is asked next.
-        let _ = tokio::time::timeout(WORK_OFF_MAX, join_all(links.into_iter().flatten().map(work_off))).await;
-        let is_silent = |result: &mut StepResult| matches!(result, StepResult::Answer(Err(Fault::Timeout), _));
-        results.iter_mut().for_each(|result| drop(result.take_if(is_silent)));
+        let _ = tokio::time::timeout(WORK_OFF_MAX, join_all(connections.iter_mut().map(work_off))).await;
+        results.iter_mut().for_each(|result| drop(result.take_if(|result| is_silent(result))));
     }
-    results
+    (results, connections.pop())
 }
 
-/// A link of its own to a line that is not polled; `None` if it cannot be opened.
-pub async fn open(line: &LineDef) -> Option<Link> {
+/// A connection of its own to a line that is not polled; `None` if it cannot be opened.
+pub async fn open(line: &LineDef) -> Option<Connection> {
     let opened = Connector::Real(line.transport.clone()).open().await.ok()?;
-    Some(Link::new(opened, line, Clock::real(), LineMemory::new(line, Clock::real())))
+    Some(Connection::new(Link::new(opened, line, Clock::real(), LineMemory::new(line, Clock::real()))))
 }
 
 /// Waits for the answers that were given up.
-async fn work_off(mut link: Link) {
-    while 0 < link.late_awaited() {
-        let look = tokio::time::timeout(Duration::from_millis(100), link.listen()).await;
+async fn work_off(connection: &mut Connection) {
+    while 0 < connection.link.late_awaited() {
+        let look = tokio::time::timeout(Duration::from_millis(100), connection.link.listen()).await;
         if matches!(look, Ok(Err(_))) {
             return;
         }
@@ -89,6 +196,11 @@ async fn work_off(mut link: Link) {
 
 /// One step. `Err` only when the port is gone.
 pub async fn step(link: &mut Link, step: &Step) -> Result<StepResult, LinkError> {
+    ask(link, step, false).await
+}
+
+/// The same; `is_again`: it was not answered, and nothing else was asked since.
+async fn ask(link: &mut Link, step: &Step, is_again: bool) -> Result<StepResult, LinkError> {
     match &step.ask {
         Ask::Raw(bytes) => {
             link.send_raw(bytes).await.map(|(bytes, response_time)| StepResult::Bytes(bytes, response_time))
@@ -98,19 +210,17 @@ pub async fn step(link: &mut Link, step: &Step) -> Result<StepResult, LinkError>
         Ask::Message(message) => {
             let (usual, unanswered) = (link.timeout(), link.unanswered);
             link.set_timeout(step.timeout.unwrap_or(usual));
-            // An outstanding reply would be shown as the answer to this.
-            if let (true, Some(unit)) = (link.is_ambiguous(message), message.first()) {
+            // An outstanding reply would be shown as the answer to this, unless it is one.
+            let is_ambiguous = |link: &Link| !is_again && link.is_ambiguous(message);
+            if let (true, Some(unit)) = (is_ambiguous(link), message.first()) {
                 match link.loopback(*unit).await {
                     Ok(()) => {}
                     Err(LinkError::Fault(_)) => drop(link.forget_outstanding(*unit)),
                     Err(gone) => return Err(gone),
                 }
             }
-            let sent = if link.is_ambiguous(message) {
-                Err(LinkError::Fault(Fault::BackedOff))
-            } else {
-                link.exchange(message).await
-            };
+            let sent =
+                if is_ambiguous(link) { Err(LinkError::Fault(Fault::BackedOff)) } else { link.exchange(message).await };
             // Absent units are what a scan asks for: they say nothing of the connection.
             link.unanswered = unanswered;
             let answer = match sent {
@@ -134,117 +244,100 @@ pub fn settings_for(line: &LineDef, step: &Step) -> LineDef {
     settings
 }
 
-/// Runs a diagnostic to its end on a line that is not polled; `progress` sees every step and may stop it by `false`.
-pub async fn run(line: &LineDef, mut job: Job, mut progress: impl FnMut(&DiagnosticRun) -> bool) -> DiagnosticRun {
-    let mut connector = Connector::Real(line.transport.clone());
-    let mut memory = LineMemory::new(line, Clock::real());
-    let mut open: Option<(LineDef, Link)> = None;
-    let scans = matches!(job.run().diagnostic, Diagnostic::Scan(_)) && line.transport.framing() == Framing::Mbap;
-    let mut at_once: VecDeque<Option<StepResult>> = match scans {
-        true => {
-            let (run, mut done) = (job.run().clone(), 0);
-            let mut progress_of = || {
-                done += 1;
-                progress(&DiagnosticRun { done, ..run.clone() })
-            };
-            scan_at_once(line, &job.planned_steps(), &mut progress_of).await.into()
+/// A line that is not polled: what is tried on it one after another uses one connection.
+pub struct Bench {
+    line: LineDef,
+    connector: Connector,
+    memory: LineMemory,
+    hearing: Hearing,
+    open: Option<(LineDef, Connection)>,
+}
+
+impl Bench {
+    /// Nothing is open yet.
+    pub fn new(line: &LineDef) -> Bench {
+        Bench {
+            line: line.clone(),
+            connector: Connector::Real(line.transport.clone()),
+            memory: LineMemory::new(line, Clock::real()),
+            hearing: Hearing::of(line),
+            open: None,
         }
-        false => VecDeque::new(),
-    };
-    while let Some(next) = job.next().cloned() {
-        let wanted = settings_for(line, &next);
-        let mut link = match open.take().filter(|(settings, _)| *settings == wanted) {
-            Some((_, link)) => link,
-            None => match connector.open_as(&wanted.transport).await {
-                Ok(opened) => Link::new(opened, &wanted, Clock::real(), memory.clone()),
+    }
+
+    /// The path of its serial port.
+    pub fn port(&self) -> Option<&str> {
+        match &self.line.transport {
+            Transport::Serial { port, .. } => Some(port),
+            Transport::Tcp { .. } => None,
+        }
+    }
+
+    /// Runs a diagnostic to its end; `progress` sees every step and may stop it by `false`.
+    pub async fn run(&mut self, mut job: Job, mut progress: impl FnMut(&DiagnosticRun) -> bool) -> DiagnosticRun {
+        let mut deaf_for = self.hearing.deaf_for();
+        let mut at_once = self.scan_at_once(&job, &mut progress).await;
+        while let Some(next) = job.next().cloned() {
+            let mut connection = match self.connect(&next).await {
+                Ok(connection) => connection,
                 Err(why) => {
                     job.stop(DiagnosticState::Failed(why));
                     break;
                 }
-            },
-        };
-        let result = match at_once.pop_front().flatten() {
-            Some(result) => Ok(result),
-            None => step(&mut link, &next).await,
-        };
-        match result {
-            Ok(result) => job.on_result(result),
-            Err(LinkError::Gone(why)) => job.stop(DiagnosticState::Failed(why)),
-            Err(LinkError::Fault(fault)) => job.stop(DiagnosticState::Failed(fault.to_string())),
+            };
+            let result = match at_once.pop_front().flatten() {
+                Some(result) => Ok(result),
+                None => connection.step(&self.hearing, &next).await.map(|(result, _)| result),
+            };
+            match result {
+                Ok(result) => job.on_result(result),
+                Err(LinkError::Gone(why)) => job.stop(DiagnosticState::Failed(why)),
+                Err(LinkError::Fault(fault)) => job.stop(DiagnosticState::Failed(fault.to_string())),
+            }
+            if let Some(span) = self.hearing.deaf_for().filter(|span| deaf_for.replace(*span).is_none()) {
+                job.note_deaf(span);
+            }
+            if !progress(job.run()) {
+                job.stop(DiagnosticState::Cancelled);
+            }
+            self.memory = connection.link.memory();
+            self.open = Some((settings_for(&self.line, &next), connection));
         }
-        if !progress(job.run()) {
-            job.stop(DiagnosticState::Cancelled);
-        }
-        memory = link.memory();
-        open = Some((wanted, link));
+        job.run().clone()
     }
-    job.run().clone()
+
+    /// The connection for a step: the one that is open, if it has the settings.
+    async fn connect(&mut self, step: &Step) -> Result<Connection, String> {
+        let wanted = settings_for(&self.line, step);
+        if let Some((_, connection)) = self.open.take().filter(|(settings, _)| *settings == wanted) {
+            return Ok(connection);
+        }
+        let opened = self.connector.open_as(&wanted.transport).await?;
+        Ok(Connection::new(Link::new(opened, &wanted, Clock::real(), self.memory.clone())))
+    }
+
+    /// The results of a scan over several connections, and one of these to go on with; none for any other diagnostic, and on a
+    /// connection that is already open.
+    async fn scan_at_once(
+        &mut self,
+        job: &Job,
+        progress: &mut impl FnMut(&DiagnosticRun) -> bool,
+    ) -> VecDeque<Option<StepResult>> {
+        let (run, steps) = (job.run().clone(), job.planned_steps());
+        let is_tcp = self.line.transport.framing() == Framing::Mbap;
+        if !is_tcp || self.open.is_some() || steps.len() < 2 || !matches!(run.diagnostic, Diagnostic::Scan(_)) {
+            return VecDeque::new();
+        }
+        let mut done = 0;
+        let mut progress = || {
+            done += 1;
+            progress(&DiagnosticRun { done, ..run.clone() })
+        };
+        let (results, connection) = scan_at_once(&self.line, &steps, &self.hearing, &mut progress).await;
+        self.open = connection.map(|connection| (settings_for(&self.line, &steps[0]), connection));
+        results.into()
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use jiff::Timestamp;
-    use tokio::{
-        io::{AsyncReadExt, AsyncWriteExt},
-        net::{TcpListener, TcpStream},
-        sync::Mutex,
-    };
-
-    use super::*;
-    use crate::plant::{
-        command::CommandId,
-        def::LineId,
-        diagnostics::{Finding, Scan},
-    };
-
-    const UNITS: [u8; 3] = [3, 17, 40];
-
-    /// A gateway that takes one request at a time of all its connections, and has no patience of its own: dead units cost
-    /// `dead` and are refused with exception 0B, or with nothing where that is zero.
-    async fn gateway(mut stream: TcpStream, one_at_a_time: Arc<Mutex<()>>, dead: Duration) -> std::io::Result<()> {
-        loop {
-            let mut frame = [0; 12];
-            stream.read_exact(&mut frame).await?;
-            let unit = frame[6];
-            let _turn = one_at_a_time.lock().await;
-            let answer: &[u8] = match UNITS.contains(&unit) {
-                true => &[0, 5, unit, 3, 2, 0, unit],
-                false if dead.is_zero() => continue,
-                false => {
-                    tokio::time::sleep(dead).await;
-                    &[0, 3, unit, 0x83, 0x0B]
-                }
-            };
-            stream.write_all(&[&frame[..4], answer].concat()).await?;
-        }
-    }
-
-    /// The units that a scan of 1 to 60 finds behind such a gateway.
-    async fn scanned(dead: Duration) -> Vec<u8> {
-        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
-        let port = listener.local_addr().expect("it listens").port();
-        let turn = Arc::new(Mutex::new(()));
-        tokio::spawn(async move {
-            while let Ok((stream, _)) = listener.accept().await {
-                tokio::spawn(gateway(stream, turn.clone(), dead));
-            }
-        });
-        let timeout = Duration::from_millis(40);
-        let line = LineDef { timeout, ..LineDef::new(LineId(0), "line", Transport::tcp("127.0.0.1", port)) };
-        let scan = Diagnostic::Scan(Scan { first: 1, last: 60, serials: Vec::new(), timeout });
-        let job = Job::new(CommandId::default(), "test".into(), scan, Timestamp::UNIX_EPOCH);
-        let run = run(&line, job, |_| true).await;
-        assert_eq!((run.done, &run.state), (60, &DiagnosticState::Done));
-        let unit = |finding: &Finding| if let Finding::Unit { unit, .. } = finding { Some(*unit) } else { None };
-        run.findings.iter().filter_map(unit).collect()
-    }
-
-    #[tokio::test]
-    async fn a_wide_scan_misses_no_unit_behind_a_slow_gateway() {
-        assert_eq!(scanned(Duration::ZERO).await, UNITS);
-        // Sixteen at once take longer than the timeout: the answers come late.
-        assert_eq!(scanned(Duration::from_millis(10)).await, UNITS);
-    }
-}
+mod tests;

@@ -17,7 +17,7 @@ use crate::{
         diagnostics::Job,
         dissect,
         frame::hex,
-        io::{network::Network, testing},
+        io::{network::Network, ports, testing::Bench},
     },
     plant::{
         command::CommandId,
@@ -28,7 +28,7 @@ use crate::{
     profile::BAUDS,
 };
 
-use super::{CliError, menu, runtime, say};
+use super::{CliError, menu, runtime, say, say_error};
 
 /// The port that a diagnostic works on.
 #[derive(Debug, Clone, clap::Args)]
@@ -92,7 +92,7 @@ impl PortArgs {
     /// The network that is meant, and the arguments with one of its hosts instead; `None` for a port.
     pub fn network(&self) -> Option<Result<(Network, PortArgs), String>> {
         let (text, tcp_port) = self.port.split_once(':').map_or((self.port.as_str(), ""), |(text, port)| (text, port));
-        if self.port.starts_with('/') || !text.contains('/') {
+        if self.is_path() || !text.contains('/') {
             return None;
         }
         let colon = if tcp_port.is_empty() { "" } else { ":" };
@@ -103,18 +103,29 @@ impl PortArgs {
         Some(text.parse().map(with_host))
     }
 
+    /// Is a file of this machine meant, not a host or a network? A name without a folder is one in this folder, if that is there
+    /// or only a serial port can be meant.
+    fn is_path(&self) -> bool {
+        let is_serial = matches!(self.mode.as_deref(), Some("rtu" | "ascii"));
+        let begins_network = |(address, _): (&str, &str)| {
+            address.starts_with(|first: char| first.is_ascii_digit())
+                && address.chars().all(|letter| letter.is_ascii_digit() || letter == '.')
+        };
+        let is_network = self.port.split_once('/').is_some_and(begins_network);
+        match self.port.contains('/') {
+            true => !is_network,
+            false => is_serial && !self.port.contains(':') || Path::new(&self.port).exists(),
+        }
+    }
+
     /// The line that the arguments describe.
     pub fn line(&self) -> Result<LineDef, CliError> {
-        if self.port.starts_with(['.', '~']) {
-            let words = format!("port: found `{}`, expected a whole path such as /dev/ttyUSB0", self.port);
-            return Err(CliError::Usage(words));
-        }
         if let Some(network) = self.network() {
             network.map_err(CliError::Usage)?;
             let words = format!("port: found a network; `sightglass scan {}` looks for its devices", self.port);
             return Err(CliError::Usage(words));
         }
-        let is_path = self.port.starts_with('/');
+        let is_path = self.is_path();
         let mode = self.mode.as_deref().unwrap_or(if is_path { "rtu" } else { "tcp" });
         let (serial_mode, framing) = match mode {
             "rtu" => (true, Framing::Rtu),
@@ -127,7 +138,10 @@ impl PortArgs {
             return Err(CliError::Usage(format!("port: found `{}`, expected {expected} for {mode}", self.port)));
         }
         let transport = if is_path {
-            Transport::Serial { port: self.port.clone(), serial: self.serial(framing)?, framing, rs485: Rs485::Off }
+            let path = std::path::absolute(&self.port)
+                .map_err(|error| CliError::Usage(format!("port: found `{}`: {error}", self.port)))?;
+            let port = path.display().to_string();
+            Transport::Serial { port, serial: self.serial(framing)?, framing, rs485: Rs485::Off }
         } else {
             let (host, tcp_port) = Transport::host_and_port(&self.port).ok_or_else(|| {
                 let expected = "expected HOST or HOST:TCPPORT with a TCP port up to 65535, or [IPV6]:TCPPORT";
@@ -193,7 +207,7 @@ pub fn run(
         run.findings.iter().skip(printed).flat_map(&describe).for_each(|text| say(&text));
         printed = run.findings.len();
     };
-    let run = runtime()?.block_on(search(line, diagnostic, |run| {
+    let run = runtime()?.block_on(search(&mut Bench::new(line), diagnostic, |run| {
         print(run);
         false
     }))?;
@@ -206,12 +220,12 @@ pub fn run(
 
 /// Runs a diagnostic until something is `found`, and shows how far it has come. Ctrl-C is an error.
 pub async fn search(
-    line: &LineDef,
+    bench: &mut Bench,
     diagnostic: Diagnostic,
     mut found: impl FnMut(&DiagnosticRun) -> bool,
 ) -> Result<DiagnosticRun, CliError> {
     let job = Job::new(CommandId::default(), Arc::from("cli"), diagnostic, Timestamp::now());
-    let work = testing::run(line, job, |run: &DiagnosticRun| {
+    let work = bench.run(job, |run: &DiagnosticRun| {
         let found = found(run);
         if 1 < run.total {
             let now = run.now.map(|now| now.to_string()).unwrap_or_default();
@@ -224,6 +238,11 @@ pub async fn search(
         _ = tokio::signal::ctrl_c() => Err(CliError::Failed("stopped".into())),
     };
     show_progress("");
+    if let (Ok(DiagnosticRun { state: DiagnosticState::Done, .. }), Some(port)) = (&run, bench.port())
+        && let Some(who) = ports::also_open(port)
+    {
+        say_error(&format!("{port} is also open in {who}: each takes bytes from the other"));
+    }
     run
 }
 
@@ -304,17 +323,26 @@ mod tests {
         ] {
             assert_eq!(line(args).as_deref(), Ok(expect), "{args}");
         }
+        // A path may be relative; plant files get the whole.
+        let here = std::env::current_dir().expect("tests run in a folder").display().to_string();
+        for (args, port) in [
+            ("./ttyV0", "ttyV0"),
+            ("pty/ttyV0", "pty/ttyV0"),
+            ("Cargo.toml", "Cargo.toml"),
+            ("ttyV0 --mode rtu", "ttyV0"),
+        ] {
+            assert_eq!(line(args), Ok(format!("RTU {here}/{port} 9600 8N1")), "{args}");
+        }
     }
 
     #[test]
     fn wrong_settings_are_reported_with_what_was_expected() {
         for (args, part) in [
             ("/dev/ttyUSB0 --mode tcp", "expected HOST or HOST:TCPPORT for tcp"),
-            ("plc --mode rtu", "expected a path such as /dev/ttyUSB0"),
+            ("plc:502 --mode rtu", "expected a path such as /dev/ttyUSB0"),
             ("plc:99999", "found `plc:99999`, expected HOST or HOST:TCPPORT with a TCP port"),
             ("[::1]x", "or [IPV6]:TCPPORT"),
             ("10.0.0.0/24", "found a network; `sightglass scan 10.0.0.0/24`"),
-            ("./ttyUSB0", "expected a whole path such as /dev/ttyUSB0"),
             ("10.0.0.0/8", "at most 256 addresses"),
             ("/dev/ttyUSB0 --baud 9601", "found 9601, expected one of 300"),
             ("/dev/ttyUSB0 --data 7", "found 7, expected 8"),

@@ -4,7 +4,10 @@ use std::{net::Ipv4Addr, time::Duration};
 
 use super::show_progress;
 use crate::{
-    bus::io::network::{self, AT_ONCE, CONNECT_MAX, HostAnswer, Network, UNITS},
+    bus::io::{
+        network::{self, AT_ONCE, CONNECT_MAX, HostAnswer, Network, UNITS},
+        testing::DEAF_MAX,
+    },
     cli::{CliError, in_runtime, menu, open, prompt, say},
     plant::{
         def::{LineDef, Transport},
@@ -48,7 +51,7 @@ pub fn main(network: Network, line: &LineDef, yes: bool) -> Result<(), CliError>
 async fn permitted(network: Network, line: &LineDef) -> Result<bool, CliError> {
     let hosts = network.hosts();
     let rounds = to_u32(hosts.len().div_ceil(AT_ONCE));
-    let worst: Duration = (CONNECT_MAX + line.timeout * to_u32(UNITS.len())) * rounds;
+    let worst: Duration = (CONNECT_MAX + DEAF_MAX + line.timeout * to_u32(UNITS.len())) * rounds;
     let (Some(first), Some(last)) = (hosts.first(), hosts.last()) else { return Ok(false) };
     say(&format!(
         "This connects to {} hosts, {first} to {last},\non TCP port {}, {AT_ONCE} at once, and reads one register of each \

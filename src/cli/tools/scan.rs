@@ -53,7 +53,8 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let requests = scan.serials.len().max(1) * (usize::from(last - first) + 1);
     // Where a gateway takes one request at a time it can be longer.
     let at_once = if line.transport.framing() == Framing::Mbap { testing::SCAN_CONNECTIONS } else { 1 };
-    let most = line.timeout * to_u32(requests.div_ceil(at_once));
+    let deaf = if line.transport.serial().is_none() { testing::DEAF_MAX } else { Duration::ZERO };
+    let most = deaf + line.timeout * to_u32(requests.div_ceil(at_once));
     let seconds = most.as_secs_f64().ceil();
     say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if no unit answers", line.transport));
     let run = run(&line, Diagnostic::Scan(scan), describe)?;
