@@ -27,6 +27,7 @@
 //! | `tampering` | the audit log changed by hand: what `sightglass audit verify` says |
 //! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
 //! | `tools` | the tools for a line against peers that echo, chatter and lie |
+//! | `odd_answers` | the same against odd answers, pasted bytes and a port that others have open; all functions of pymodbus |
 //! | `logs` | logs of registers by `sightglass open`: killed, ended, shown again |
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
 //! | `settings` | settings of a line: tried out, saved into the plant file; commands made before a reload |
@@ -62,6 +63,7 @@ mod logs;
 mod masters;
 mod mqtt;
 mod mqtt_requests;
+mod odd_answers;
 mod outstanding;
 mod peers;
 mod users;

@@ -25,7 +25,7 @@ const SEEN: [(&str, &str); 8] = [
     ("PLC-1.RUN", "RUN good"),
 ];
 
-fn slave(python: &Path, kind: &str, place: &str) -> Process {
+pub fn slave(python: &Path, kind: &str, place: &str) -> Process {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/peers/slave.py");
     let mut slave = Process::start(Command::new(python).arg(script).args([kind, place]));
     slave.wait_for("ready");

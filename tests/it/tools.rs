@@ -10,7 +10,7 @@ use std::{
 use crate::support::{Cable, Process, folder, have, sightglass};
 
 /// A peer that does this with every connection. Gives its address.
-fn peer(work: impl Fn(TcpStream) + Send + 'static) -> String {
+pub fn peer(work: impl Fn(TcpStream) + Send + 'static) -> String {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
     let address = listener.local_addr().unwrap().to_string();
     serve(listener, work);
@@ -22,7 +22,7 @@ fn serve(listener: TcpListener, work: impl Fn(TcpStream) + Send + 'static) {
 }
 
 /// A peer that gives this for every request it gets.
-fn answers(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> impl Fn(TcpStream) + Send + 'static {
+pub fn answers(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> impl Fn(TcpStream) + Send + 'static {
     move |mut stream| {
         let mut buffer = [0; 300];
         while let Ok(length @ 1..) = stream.read(&mut buffer) {
@@ -34,7 +34,7 @@ fn answers(answer: impl Fn(&[u8]) -> Vec<u8> + Send + 'static) -> impl Fn(TcpStr
 }
 
 /// Exit code, and all that was said.
-fn run(args: &[&str]) -> (Option<i32>, String) {
+pub fn run(args: &[&str]) -> (Option<i32>, String) {
     let output = sightglass().args(args).output().unwrap();
     let said = [output.stdout, output.stderr].concat();
     (output.status.code(), String::from_utf8(said).unwrap())
