@@ -95,11 +95,6 @@ impl ResponseSignature {
     pub fn is_loopback(self) -> bool {
         self.function == 0x08
     }
-
-    /// Length of the message.
-    pub fn length(self) -> usize {
-        self.length
-    }
 }
 
 /// Do these bytes begin like an answer to a request message, or a refusal: the same unit, the same function?

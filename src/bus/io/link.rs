@@ -38,7 +38,7 @@ use super::{
     wire::Wire,
 };
 use crate::{
-    bus::frame::{self, ResponseSignature},
+    bus::frame,
     plant::{
         def::{Framing, LineDef},
         event::{ExceptionCode, Fault, FaultKind, LineCounters},
@@ -375,7 +375,7 @@ impl Link {
     /// The answer to this message may still come: it is remembered, and the line stays silent until it would have passed.
     fn expect_late(&mut self, message: &[u8]) {
         self.wire.replies.failed(message, self.wire.uptime());
-        let longest = frame::response_signature(message).map_or(frame::MESSAGE_MAX, ResponseSignature::length);
+        let longest = frame::expected_length(message).unwrap_or(frame::MESSAGE_MAX);
         let chars = to_u32(frame::wrapped_length(self.framing(), longest));
         self.wire.hold_off(self.wire.char_time * chars + self.wire.silent_interval);
     }

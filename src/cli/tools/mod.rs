@@ -103,8 +103,8 @@ impl PortArgs {
         Some(text.parse().map(with_host))
     }
 
-    /// Is a file of this machine meant, not a host or a network? A name without a folder is one in this folder, if that is there
-    /// or only a serial port can be meant.
+    /// Is a file of this machine meant, not a host or a network? A name without a folder is one in this folder, if such a file is
+    /// there or only a serial port can be meant.
     fn is_path(&self) -> bool {
         let is_serial = matches!(self.mode.as_deref(), Some("rtu" | "ascii"));
         let begins_network = |(address, _): (&str, &str)| {
@@ -114,7 +114,10 @@ impl PortArgs {
         let is_network = self.port.split_once('/').is_some_and(begins_network);
         match self.port.contains('/') {
             true => !is_network,
-            false => is_serial && !self.port.contains(':') || Path::new(&self.port).exists(),
+            false => {
+                let is_file = std::fs::metadata(&self.port).is_ok_and(|file| !file.is_dir());
+                is_serial && !self.port.contains(':') || is_file
+            }
         }
     }
 
@@ -316,6 +319,7 @@ mod tests {
             ("/dev/ttyUSB0", "RTU /dev/ttyUSB0 9600 8N1"),
             ("/dev/ttyUSB0 --mode ascii --parity e --baud 19200", "ASCII /dev/ttyUSB0 19200 7E1"),
             ("plc", "TCP plc:502"),
+            ("src", "TCP src:502"),
             ("plc:1502 --mode rtu-over-tcp", "RTU over TCP plc:1502"),
             ("[::1]:1502", "TCP [::1]:1502"),
             ("[fe80::1]", "TCP [fe80::1]:502"),

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 use super::{Link, LinkError};
 use crate::{
     bus::{
-        frame::{self, ResponseSignature},
+        frame,
         framing::{self, FrameMatch},
     },
     plant::{
@@ -49,7 +49,7 @@ impl Link {
     ) -> Result<Received, LinkError> {
         let framing = self.framing();
         let mut echo = self.expects_echo(message).then_some(sent);
-        let longest = frame::response_signature(message).map_or(frame::MESSAGE_MAX, ResponseSignature::length);
+        let longest = frame::expected_length(message).unwrap_or(frame::MESSAGE_MAX);
         let deadline = sent_at + self.timeout + self.wire.char_time * to_u32(frame::wrapped_length(framing, longest));
         let mut buffer: Vec<u8> = Vec::new();
         // What came and did not fit: it names the fault if nothing better comes.

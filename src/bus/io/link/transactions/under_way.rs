@@ -201,9 +201,7 @@ impl Transactions {
 
     /// An answer came with a transaction id of which nothing is known: those that it may be meant for.
     pub fn note_strange(&mut self, got: u16, answer: &[u8]) {
-        let [unit, function, ..] = *answer else { return };
-        let meant =
-            |request: &&mut Transaction| request.is_to(unit) && request.message.get(1) == Some(&(function & 0x7F));
+        let meant = |request: &&mut Transaction| frame::begins_answer(&request.message, answer);
         self.under_way.iter_mut().filter(meant).for_each(|request| request.strange = Some(got));
     }
 }
