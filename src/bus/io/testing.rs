@@ -56,10 +56,9 @@ impl Hearing {
         age < self.heard.get().unwrap_or(DEAF_MAX)
     }
 
-    /// Something has come on a connection so old; within the time that an answer may take, the device was never deaf.
-    fn hear(&self, age: Duration, timeout: Duration) {
-        let deaf = if age <= timeout { Duration::ZERO } else { age };
-        self.heard.set(self.heard.get().or(Some(deaf)));
+    /// Something has come; `deaf`: so long after the connection, to a request that was lost before.
+    fn hear(&self, deaf: Option<Duration>) {
+        self.heard.set(self.heard.get().or(deaf).or(Some(Duration::ZERO)));
     }
 
     /// How long the device was deaf, if it was.
@@ -97,8 +96,7 @@ impl Connection {
             let result = ask(&mut self.link, next, is_again).await?;
             late |= !self.link.take_late().is_empty();
             if late || !is_silent(&result) {
-                let came = response_time(&result).map_or(self.opened.elapsed(), |time| sent + time);
-                hearing.hear(came, next.timeout.unwrap_or(self.link.timeout()));
+                hearing.hear((is_again && !late).then(|| sent + response_time(&result).unwrap_or_default()));
             }
             if !is_silent(&result) || !hearing.may_be_lost(sent) || !self.is_harmless(next) {
                 return Ok((result, late));
@@ -152,30 +150,59 @@ async fn scan_at_once(
     progress: &mut impl FnMut() -> bool,
 ) -> (Vec<Option<StepResult>>, Option<Connection>) {
     let wide = RefCell::new(WideScan { steps, results: vec![None; steps.len()], begun: 0, one_by_one: false });
-    let progress = RefCell::new(progress);
+    let (progress, stopped) = (RefCell::new(progress), Cell::new(false));
     let scan = || async {
-        let mut connection = open(line).await?;
+        let (mut connection, mut asked) = (open(line).await?, Vec::new());
         loop {
-            let Some((n, next)) = wide.borrow_mut().begin() else { return Some(connection) };
+            let Some((n, next)) = wide.borrow_mut().begin() else { return Some((connection, asked)) };
             // A unit whose connection fails is asked again, alone.
             let (result, late) = connection.step(hearing, &next).await.ok()?;
+            asked.push(n);
             let mut wide = wide.borrow_mut();
             wide.results[n] = Some(result);
             wide.one_by_one |= late;
             if !(progress.borrow_mut())() {
+                stopped.set(true);
                 wide.begun = steps.len();
             }
         }
     };
-    let connections = join_all((0..SCAN_CONNECTIONS.min(steps.len())).map(|_| scan())).await;
-    let mut connections: Vec<Connection> = connections.into_iter().flatten().collect();
+    let shares = join_all((0..SCAN_CONNECTIONS.min(steps.len())).map(|_| scan())).await;
+    let mut shares: Vec<Share> = shares.into_iter().flatten().collect();
     let WideScan { mut results, one_by_one, .. } = wide.into_inner();
     if one_by_one {
         // What is still asked would hold up what is asked next.
-        let _ = tokio::time::timeout(WORK_OFF_MAX, join_all(connections.iter_mut().map(work_off))).await;
+        let work = join_all(shares.iter_mut().map(|(connection, _)| work_off(connection)));
+        let _ = tokio::time::timeout(WORK_OFF_MAX, work).await;
         results.iter_mut().for_each(|result| drop(result.take_if(|result| is_silent(result))));
+    } else if !stopped.get() && 1 < shares.len() {
+        doubt_unserved(&mut shares, steps, &mut results, hearing).await;
     }
-    (results, connections.pop())
+    // The last one is one that is served.
+    shares.sort_by_key(|(_, asked)| asked.iter().any(|n| is_answered(&results[*n])));
+    (results, shares.pop().map(|(connection, _)| connection))
+}
+
+/// A connection of a scan, and the steps that were taken on it.
+type Share = (Connection, Vec<usize>);
+
+fn is_answered(result: &Option<StepResult>) -> bool {
+    result.as_ref().is_some_and(|result| !is_silent(result))
+}
+
+/// Many devices serve one connection and let the others wait: on a connection that is silent even where a unit has answered on
+/// another, or where none has, silence says nothing of a unit.
+async fn doubt_unserved(shares: &mut [Share], steps: &[Step], results: &mut [Option<StepResult>], hearing: &Hearing) {
+    let known = results.iter().position(is_answered).map(|n| &steps[n]);
+    let silent = shares.iter_mut().filter(|(_, asked)| !asked.iter().any(|n| is_answered(&results[*n])));
+    let checks = silent.map(|(connection, asked)| async move {
+        let served = match known {
+            Some(step) => connection.step(hearing, step).await.is_ok_and(|(result, _)| !is_silent(&result)),
+            None => false,
+        };
+        if served { Vec::new() } else { asked.clone() }
+    });
+    join_all(checks).await.into_iter().flatten().for_each(|n| results[n] = None);
 }
 
 /// A connection of its own to a line that is not polled; `None` if it cannot be opened.

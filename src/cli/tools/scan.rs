@@ -51,10 +51,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
     // Time for request and answer on the wire of the slowest setting is added by the link.
     let scan = Scan { first, last, serials, timeout: line.timeout.min(Duration::from_secs(60)) };
     let requests = scan.serials.len().max(1) * (usize::from(last - first) + 1);
-    // Where a gateway takes one request at a time it can be longer.
-    let at_once = if line.transport.framing() == Framing::Mbap { testing::SCAN_CONNECTIONS } else { 1 };
+    // Where nothing answers on several connections at once, it is asked again on one.
+    let is_wide = line.transport.framing() == Framing::Mbap && 1 < requests;
+    let at_once = if is_wide { requests.div_ceil(testing::SCAN_CONNECTIONS) } else { 0 };
     let deaf = if line.transport.serial().is_none() { testing::DEAF_MAX } else { Duration::ZERO };
-    let most = deaf + line.timeout * to_u32(requests.div_ceil(at_once));
+    let most = deaf + line.timeout * to_u32(requests + at_once);
     let seconds = most.as_secs_f64().ceil();
     say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if no unit answers", line.transport));
     let run = run(&line, Diagnostic::Scan(scan), describe)?;

@@ -16,17 +16,22 @@ use crate::plant::{
     diagnostics::{Conclusion, Finding, Scan},
 };
 
-const UNITS: [u8; 3] = [3, 17, 40];
+const UNITS: &[u8] = &[3, 17, 40];
 
-/// A gateway that takes one request at a time of all its connections, and has no patience of its own: dead units cost
-/// `dead` and are refused with exception 0B, or with nothing where that is zero.
-async fn gateway(mut stream: TcpStream, one_at_a_time: Arc<Mutex<()>>, dead: Duration) -> std::io::Result<()> {
+/// A gateway to these units that takes one request at a time of all its connections, and has no patience of its own: dead units
+/// cost `dead` and are refused with exception 0B, or with nothing where that is zero.
+async fn gateway(
+    mut stream: TcpStream,
+    units: &[u8],
+    one_at_a_time: Arc<Mutex<()>>,
+    dead: Duration,
+) -> std::io::Result<()> {
     loop {
         let mut frame = [0; 12];
         stream.read_exact(&mut frame).await?;
         let unit = frame[6];
         let _turn = one_at_a_time.lock().await;
-        let answer: &[u8] = match UNITS.contains(&unit) {
+        let answer: &[u8] = match units.contains(&unit) {
             true => &[0, 5, unit, 3, 2, 0, unit],
             false if dead.is_zero() => continue,
             false => {
@@ -38,21 +43,31 @@ async fn gateway(mut stream: TcpStream, one_at_a_time: Arc<Mutex<()>>, dead: Dur
     }
 }
 
-/// The units that a scan of 1 to 60 finds behind such a gateway.
-async fn scanned(dead: Duration) -> Vec<u8> {
+/// A line to such a gateway, which serves all connections or lets all but one wait.
+async fn line_to(units: &'static [u8], dead: Duration, serves_all: bool) -> LineDef {
     let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
     let port = listener.local_addr().expect("it listens").port();
     let turn = Arc::new(Mutex::new(()));
     tokio::spawn(async move {
         while let Ok((stream, _)) = listener.accept().await {
-            tokio::spawn(gateway(stream, turn.clone(), dead));
+            let served = tokio::spawn(gateway(stream, units, turn.clone(), dead));
+            if !serves_all {
+                // How it ended is the business of the other side.
+                let _ = served.await;
+            }
         }
     });
     let timeout = Duration::from_millis(40);
-    let line = LineDef { timeout, ..LineDef::new(LineId(0), "line", Transport::tcp("127.0.0.1", port)) };
-    let scan = Diagnostic::Scan(Scan { first: 1, last: 60, serials: Vec::new(), timeout });
+    LineDef { timeout, ..LineDef::new(LineId(0), "line", Transport::tcp("127.0.0.1", port)) }
+}
+
+/// The units that a scan of 1 to 60 finds behind a gateway that is known not to be deaf.
+async fn scanned(line: LineDef) -> Vec<u8> {
+    let scan = Diagnostic::Scan(Scan { first: 1, last: 60, serials: Vec::new(), timeout: line.timeout });
     let job = Job::new(CommandId::default(), "test".into(), scan, Timestamp::UNIX_EPOCH);
-    let run = Bench::new(&line).run(job, |_| true).await;
+    let mut bench = Bench::new(&line);
+    bench.hearing.hear(None);
+    let run = bench.run(job, |_| true).await;
     assert_eq!((run.done, &run.state), (60, &DiagnosticState::Done));
     let unit = |finding: &Finding| if let Finding::Unit { unit, .. } = finding { Some(*unit) } else { None };
     run.findings.iter().filter_map(unit).collect()
@@ -60,9 +75,28 @@ async fn scanned(dead: Duration) -> Vec<u8> {
 
 #[tokio::test]
 async fn a_wide_scan_misses_no_unit_behind_a_slow_gateway() {
-    assert_eq!(scanned(Duration::ZERO).await, UNITS);
+    assert_eq!(scanned(line_to(UNITS, Duration::ZERO, true).await).await, UNITS);
     // Sixteen at once take longer than the timeout: the answers come late.
-    assert_eq!(scanned(Duration::from_millis(10)).await, UNITS);
+    assert_eq!(scanned(line_to(UNITS, Duration::from_millis(10), true).await).await, UNITS);
+}
+
+#[tokio::test]
+async fn a_wide_scan_misses_no_unit_of_a_device_that_serves_one_connection_at_a_time() {
+    for units in [UNITS, &[40]] {
+        assert_eq!(scanned(line_to(units, Duration::ZERO, false).await).await, units);
+    }
+}
+
+#[tokio::test]
+async fn a_device_that_answers_at_once_whenever_it_is_asked_is_not_called_deaf() {
+    let mut connection = open(&line_to(UNITS, Duration::ZERO, true).await).await.expect("it accepts");
+    connection.opened -= 2 * DEAF_MAX;
+    let read = Diagnostic::Read { unit: 3, table: crate::plant::tag::Table::Holding, address: 0, count: 1 };
+    let mut job = Job::new(CommandId::default(), "test".into(), read, Timestamp::UNIX_EPOCH);
+    let (step, hearing) = (job.next().cloned().expect("a request"), Hearing::default());
+    let (result, _) = connection.step(&hearing, &step).await.expect("it stays open");
+    assert!(matches!(result, StepResult::Answer(Ok(_), _)), "{result:?}");
+    assert_eq!(hearing.deaf_for(), None);
 }
 
 /// A device with unit 1 that loses the first requests of each connection, or answers them all.
