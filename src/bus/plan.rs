@@ -4,13 +4,14 @@
 //!   tags ──> groups ──────────────> runs ──────────────────> blocks
 //!            device, table, period  cheapest cut (cheapest)  one request each (cost)
 //!                                        ▲
-//!                                   unreadable: what the device refused (gaps)
+//!                                   unreadable: what the device refused (gaps), as found (bisection)
 //! ```
 //!
 //! Tags of different [`PollClass`] share blocks, and the block has the most important of them: a word that is read along costs
 //! two characters, a request of its own twenty, so to leave it out would make the line slower for the critical ones as well.
 
 pub mod cost;
+pub mod bisection;
 pub mod gaps;
 mod cheapest;
 #[cfg(test)]
@@ -19,8 +20,9 @@ mod alternatives;
 #[cfg(test)]
 mod tests;
 
+pub use bisection::{AddressRange, RangeBisection, Refused};
 pub use cost::{Wire, cost};
-pub use gaps::{AddressRange, RangeBisection, Refused, UnreadableRanges, may_be_cut};
+pub use gaps::{UnreadableRanges, may_be_cut};
 
 use std::{sync::Arc, time::Duration};
 

@@ -92,7 +92,7 @@ async fn a_device_that_answers_at_once_whenever_it_is_asked_is_not_called_deaf()
     let mut connection = open(&line_to(UNITS, Duration::ZERO, true).await).await.expect("it accepts");
     connection.opened -= 2 * DEAF_MAX;
     let read = Diagnostic::Read { unit: 3, table: crate::plant::tag::Table::Holding, address: 0, count: 1 };
-    let mut job = Job::new(CommandId::default(), "test".into(), read, Timestamp::UNIX_EPOCH);
+    let job = Job::new(CommandId::default(), "test".into(), read, Timestamp::UNIX_EPOCH);
     let (step, hearing) = (job.next().cloned().expect("a request"), Hearing::default());
     let (result, _) = connection.step(&hearing, &step).await.expect("it stays open");
     assert!(matches!(result, StepResult::Answer(Ok(_), _)), "{result:?}");
