@@ -94,6 +94,7 @@ impl Ended {
                     | NotConfirmed::PartlyWritten { .. }
                     | NotConfirmed::PartlyAccepted { .. }
                     | NotConfirmed::StationStopped
+                    | NotConfirmed::Reloaded
                     | NotConfirmed::ConnectionLost
                     | NotConfirmed::NoReadBack => RequestResult::Unknown,
                 };

@@ -163,10 +163,18 @@ pub struct BatchTracker {
 }
 
 impl BatchTracker {
-    /// Goes on after the last record of this rule, if there is one; `off` is when the station before this one ended.
+    /// Goes on after the last record of this rule, if there is one, unless it does already; `off` is when the station before this
+    /// one ended.
     pub fn restore(&mut self, latest: Option<BatchRecord>, off: Option<Timestamp>) -> Option<BatchRecord> {
-        (self.restored, self.latest) = (true, latest);
-        let at = off?;
+        if std::mem::replace(&mut self.restored, true) {
+            return None;
+        }
+        self.latest = latest;
+        self.lose(off?)
+    }
+
+    /// It is not followed from here on.
+    pub fn lose(&mut self, at: Timestamp) -> Option<BatchRecord> {
         let running = self.running().filter(|latest| latest.event != BatchEvent::Unknown)?;
         let record = next(running, BatchEvent::Unknown, None, at);
         self.push(record)

@@ -7,6 +7,7 @@ use super::{
     delay::{Delay, DelayTimer},
     expr::Expr,
     id::TagId,
+    redefinition::Redefinition,
     sample::{Cause, Quality, Sample},
     tag::TagDef,
     totalizer::{Total, Totalizer},
@@ -85,6 +86,19 @@ impl Calculator {
             Some(*tag)
         });
         totals.collect()
+    }
+
+    /// Goes on with what calculations have kept that are as they were. A total that is calculated otherwise goes on from its
+    /// value, as it does after a restart.
+    pub fn redefine(&mut self, before: &mut Calculator, change: &Redefinition) {
+        for (tag, _, state) in &mut self.order {
+            let step = change.named(*tag).and_then(|was| before.order.iter_mut().find(|(tag, ..)| *tag == was));
+            match (state, step.and_then(|(.., state)| state.take())) {
+                (Some(state), Some(was)) if change.source(*tag).is_some() => *state = was,
+                (Some(State::Total(total)), Some(State::Total(was))) => total.go_on_from(&was),
+                (Some(_) | None, _) => {}
+            }
+        }
     }
 
     /// The new samples of all tags that need a `touched` one, themselves or through others.

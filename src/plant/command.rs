@@ -123,6 +123,29 @@ impl CommandKind {
         }
     }
 
+    /// The line that it works on; `None` for one that works on none, or on more than one.
+    pub fn line(&self, def: &PlantDef) -> Option<LineId> {
+        let of_device = |device: DeviceId| Some(def.device(device).line);
+        match self {
+            CommandKind::Write { tag, .. } => of_device(def.tag(*tag).device),
+            CommandKind::Refresh(device) | CommandKind::SaveSet { device, .. } | CommandKind::StopRestore(device) => {
+                of_device(*device)
+            }
+            CommandKind::Restore(request) => of_device(request.device),
+            CommandKind::Connect(line, _)
+            | CommandKind::SaveSettings(line)
+            | CommandKind::Test(line, _)
+            | CommandKind::StopTest(line) => Some(*line),
+            CommandKind::Configure(settings) => Some(settings.id),
+            CommandKind::Alarm(_)
+            | CommandKind::ReadSets
+            | CommandKind::StartProcedure(_)
+            | CommandKind::AbortProcedure(_)
+            | CommandKind::HandOver
+            | CommandKind::TakeOver => None,
+        }
+    }
+
     /// Each tag with the value that it gets: of a write one, of a restore all its changes, of a procedure those of all steps
     /// and of its safe state.
     pub fn writes<'a>(&'a self, def: &'a PlantDef) -> impl Iterator<Item = (TagId, Exact)> + 'a {

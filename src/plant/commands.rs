@@ -232,11 +232,28 @@ impl CommandTracker {
 
     /// The station stops: ends every pending command.
     pub fn stop(&mut self, image: &ProcessImage, at: Timestamp) -> Vec<ActionRecord> {
-        self.writes.clear();
+        self.end_pending(|_| true, NotConfirmed::StationStopped, image, at)
+    }
+
+    /// Ends the pending commands that are meant, oldest first.
+    pub fn end_pending(
+        &mut self,
+        is_meant: impl Fn(&CommandKind) -> bool,
+        why: NotConfirmed,
+        image: &ProcessImage,
+        at: Timestamp,
+    ) -> Vec<ActionRecord> {
         let pending = self.commands.iter().rev().filter(|status| status.is_pending());
-        let ids: Vec<CommandId> = pending.map(|status| status.command.id).collect();
-        let stopped = || Outcome::NotConfirmed(NotConfirmed::StationStopped);
-        ids.into_iter().filter_map(|id| self.complete(id, stopped(), image, at)).collect()
+        let meant = pending.filter(|status| is_meant(&status.command.kind)).map(|status| status.command.id);
+        let ids: Vec<CommandId> = meant.collect();
+        self.writes.retain(|(command, _)| !ids.contains(command));
+        ids.into_iter().filter_map(|id| self.complete(id, Outcome::NotConfirmed(why.clone()), image, at)).collect()
+    }
+
+    /// Goes on under another definition, with those commands that it `knows` as this one does.
+    pub fn redefine(&mut self, def: &Arc<PlantDef>, knows: impl Fn(&CommandKind) -> bool) {
+        self.commands.retain(|status| knows(&status.command.kind));
+        self.def = def.clone();
     }
 
     /// The record that a write is about to be sent, for the case that the station ends before its outcome.

@@ -73,6 +73,13 @@ impl Heard {
 pub(super) struct Stated(BTreeSet<TagId>);
 
 impl Stated {
+    /// What was known of a tag under the id that it had before.
+    pub fn take_over(&mut self, tag: TagId, before: &Stated, was: TagId) {
+        if before.0.contains(&was) {
+            self.0.insert(tag);
+        }
+    }
+
     /// The sample that a tag gets: what is stated stands for what is not good, until the device contradicts it.
     pub fn instead_of(&mut self, tag: &TagDef, sample: Sample) -> Sample {
         let Some(stated) = tag.stated else { return sample };

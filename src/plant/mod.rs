@@ -68,6 +68,7 @@ pub(crate) mod delay;
 pub(crate) mod calculation;
 pub(crate) mod clock_step;
 pub(crate) mod heard;
+pub(crate) mod redefinition;
 pub(crate) mod process_image;
 pub(crate) mod commands;
 pub(crate) mod reducer;
@@ -76,5 +77,5 @@ pub(crate) mod reducer;
 pub mod fixture;
 
 pub use def::PlantDef;
-pub use reducer::{Effects, Plant, SetWork};
+pub use reducer::{Effects, Plant, Redefined, SetWork};
 pub use snapshot::Snapshot;

@@ -1,5 +1,7 @@
 //! The values of all tags: raw responses become samples, faults and age make them uncertain, changes are stored.
 
+mod redefine;
+
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
@@ -148,7 +150,7 @@ impl ProcessImage {
     /// may go before it is read again.
     fn doubt(&mut self, tag: TagId, cause: Cause, at: Timestamp) {
         match self.sample(tag).quality {
-            Quality::Bad(Cause::NotRead) => self.set(tag, Sample::bad(cause, at)),
+            Quality::Bad(Cause::NotRead | Cause::Reloaded) => self.set(tag, Sample::bad(cause, at)),
             Quality::Bad(_) => {
                 if let Some(reading) = &mut self.raw[tag.index()] {
                     reading.uncertain = Some(cause);

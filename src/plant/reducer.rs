@@ -6,6 +6,7 @@ mod connection;
 mod health;
 mod procedures;
 mod alarm_metrics;
+mod redefine;
 mod restore;
 mod service;
 mod shown;
@@ -42,6 +43,7 @@ use super::{
     tuning::TuningTracker,
 };
 
+pub use redefine::Redefined;
 pub use restore::SetWork;
 
 /// What the station must do after a change of the plant.

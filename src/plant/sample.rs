@@ -58,6 +58,8 @@ keyword_enum! {
         NotHeard = 16 => "not heard",
         /// It is not read from the device: the plant file states it.
         Stated = 17 => "stated in the plant file",
+        /// The plant file was reloaded, and has other registers for it.
+        Reloaded = 18 => "plant file reloaded",
     }
 }
 

@@ -46,6 +46,11 @@ impl Totalizer {
         }
     }
 
+    /// Goes on from another total, with an input of its own.
+    pub fn go_on_from(&mut self, before: &Totalizer) {
+        (self.restored, self.sum) = (before.restored, before.sum);
+    }
+
     /// The total with the next sample of its input. An input holds until the next one that has a value, however uncertain;
     /// the time before and while it is bad is not counted, and the total is uncertain as long.
     pub fn add(&mut self, input: Sample) -> Sample {

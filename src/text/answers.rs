@@ -51,7 +51,7 @@ fn words() -> &'static [&'static str] {
         "this tag requires your password again",
         "this tag requires your own password",
         "this tag requires a second user",
-        "the station was restarted since this was shown: check and confirm again",
+        "the station was restarted, or its plant file reloaded, since this was shown: check and confirm again",
     ]
 }
 

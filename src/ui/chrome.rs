@@ -229,6 +229,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
             | NotConfirmed::Different(_)
             | NotConfirmed::NotRead(_)
             | NotConfirmed::StationStopped
+            | NotConfirmed::Reloaded
             | NotConfirmed::ConnectionLost),
         ) => (t!("NOT CONFIRMED: {why}", why), true),
         Outcome::Failed(fault) => (t!("FAILED, may have taken effect: {fault}", fault), true),

@@ -16,7 +16,8 @@ use crate::{
 };
 
 /// Said of a command that was made before the station was started again, with the same plant file or with another.
-const OTHER_RUN: &str = "the station was restarted since this was shown: check and confirm again";
+const OTHER_RUN: &str =
+    "the station was restarted, or its plant file reloaded, since this was shown: check and confirm again";
 
 impl AccessControl {
     /// Checks a command of a terminal and passes it on to the plant, permitted or refused.

@@ -22,7 +22,7 @@ use crate::{
     plant::{
         batch::BatchRecord,
         control_run::ControlRun,
-        def::{PlantDef, TagId},
+        def::PlantDef,
         number::to_u32,
         record::{ActionRecord, AlarmRecord, ChainHash},
     },
@@ -54,8 +54,8 @@ pub struct Restored {
     pub runs: Vec<ControlRun>,
     /// The last start or end of a procedure.
     pub procedure: Option<ActionRecord>,
-    /// The last values of the tags that are totals.
-    pub totals: Vec<(TagId, f64)>,
+    /// The last values of the tags that are totals, by their names.
+    pub totals: Vec<(String, f64)>,
     /// When the station before this one ended.
     pub off: Option<Timestamp>,
 }
@@ -79,12 +79,23 @@ impl Store {
                 .chain_hashes()
                 .inspect_err(|error| tracing::warn!(%error, "not compared with the audit log"))
                 .ok();
-            let (batches, runs) = (store.latest_batches()?, store.latest_runs()?);
-            let off = store.extent().map(|(_, last)| last);
-            let totals = store.last_totals()?;
             let procedure = store.list(&sql::latest_procedure(), &[], action)?.pop();
-            Ok(Restored { events, recent, chain_hashes, batches, runs, procedure, totals, off })
+            Ok(Restored { events, recent, chain_hashes, procedure, ..store.restore_followed()? })
         })
+    }
+
+    /// What a plant goes on from in what it follows: batches, control runs and totals.
+    pub(super) fn restore_followed(&self) -> Result<Restored, HistoryError> {
+        let (batches, runs) = (self.latest_batches()?, self.latest_runs()?);
+        let off = self.extent().map(|(_, last)| last);
+        Ok(Restored { batches, runs, totals: self.last_totals()?, off, ..Restored::default() })
+    }
+
+    /// Goes on with another definition of the plant.
+    pub(super) fn redefine(&mut self, def: &Arc<PlantDef>) -> Result<(), HistoryError> {
+        self.def = Arc::clone(def);
+        self.register_tags().map_err(engine)?;
+        self.check_tags()
     }
 
     /// Opens or creates the store.
@@ -213,13 +224,16 @@ impl Store {
         }
         let other = store.adopt_tags(now).map_err(|error| failure(path, error))?;
         store.register_tags().map_err(failed)?;
-        if store.ids.contains(&None) {
-            let words = "the file has 65536 tags, no more are possible: start a new one";
-            return Err(Failure::Obstacle(HistoryError::Engine(words.into())));
-        }
+        store.check_tags().map_err(Failure::Obstacle)?;
         let missing = store.adopt_files().map_err(|error| failure(path, error))?;
         store.read_last_commit().map_err(failed)?;
         Ok((store, joined([&other, &missing])))
+    }
+
+    /// Has every tag a number?
+    fn check_tags(&self) -> Result<(), HistoryError> {
+        let words = "the file has 65536 tags, no more are possible: start a new one";
+        if self.ids.contains(&None) { Err(HistoryError::Engine(words.into())) } else { Ok(()) }
     }
 
     fn migrate(&self) -> duckdb::Result<()> {

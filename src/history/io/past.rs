@@ -92,7 +92,7 @@ impl Store {
 
     /// The last values of the tags that are totals, of those that have one in the last [`TOTALS_DAYS`]. A good one has a row
     /// an hour; but it may have had none in the runs of the station that came last.
-    pub(super) fn last_totals(&self) -> Result<Vec<(TagId, f64)>, HistoryError> {
+    pub(super) fn last_totals(&self) -> Result<Vec<(String, f64)>, HistoryError> {
         let Some((_, last)) = self.extent() else { return Ok(Vec::new()) };
         let mut missing: Vec<TagId> = self.def.tags.iter().filter(|tag| tag.is_total()).map(|tag| tag.id).collect();
         let (mut found, mut end) = (Vec::new(), after(last).unwrap_or(last));
@@ -108,7 +108,7 @@ impl Store {
             missing.retain(|tag| found.iter().all(|(known, _)| known != tag));
             end = begin;
         }
-        Ok(found)
+        Ok(found.into_iter().map(|(tag, value)| (self.def.tag(tag).name.clone(), value)).collect())
     }
 
     /// The latest sample of each tag until an instant, of those that matter in a span.

@@ -84,12 +84,33 @@ impl AlarmManager {
     /// Restores the alarms from the journal after a restart: of each alarm at least the last event of every
     /// kind, oldest first. Alarm events that the plant no longer has are passed over.
     pub fn restore(&mut self, events: &[AlarmRecord]) {
-        let name = |alarm: &AlarmDef| (subject_name(&self.def, alarm.subject).to_owned(), alarm.message.clone());
-        let known: HashMap<(String, String), AlarmId> =
-            self.def.alarms.iter().map(|alarm| (name(alarm), alarm.id)).collect();
+        let def = self.def.clone();
+        let known = by_name(&def);
         for event in events {
-            if let Some(id) = known.get(&(event.subject.to_string(), event.message.to_string())) {
+            if let Some(id) = known.get(&(&*event.subject, &*event.message)) {
                 self.apply(*id, event);
+            }
+        }
+    }
+
+    /// Goes on under another definition: each alarm of a name stands as it did. Where its condition is another, its delay and
+    /// what it looks back on begin again.
+    pub fn redefine(&mut self, def: &Arc<PlantDef>) {
+        let AlarmManager { ran, evaluated_at, first_out, edges, silenced, .. } = *self;
+        let begun = AlarmManager { ran, evaluated_at, first_out, edges, silenced, ..AlarmManager::new(def.clone()) };
+        let mut before = std::mem::replace(self, begun);
+        let known = by_name(&before.def);
+        let reference =
+            |def: &PlantDef, alarm: &AlarmDef| alarm.condition.reference().map(|tag| def.tag(tag).name.clone());
+        for alarm in &def.alarms {
+            let Some(was) = known.get(&name_of(def, alarm)) else { continue };
+            let (place, from, was) = (alarm.id.index(), was.index(), before.def.alarm(*was));
+            self.machines[place] = std::mem::take(&mut before.machines[from]);
+            if alarm.condition == was.condition && reference(def, alarm) == reference(&before.def, was) {
+                self.memories[place] = std::mem::take(&mut before.memories[from]);
+                self.unknown[place] = before.unknown[from];
+            } else {
+                self.machines[place].pending_since = None;
             }
         }
     }
@@ -265,6 +286,15 @@ impl AlarmManager {
             AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.message, alarm.priority, event);
         AlarmRecord { value, limit: alarm.condition.limit(), ..record }
     }
+}
+
+/// The alarms of a plant by subject and message, as the journal knows them.
+fn by_name(def: &PlantDef) -> HashMap<(&str, &str), AlarmId> {
+    def.alarms.iter().map(|alarm| (name_of(def, alarm), alarm.id)).collect()
+}
+
+fn name_of<'a>(def: &'a PlantDef, alarm: &'a AlarmDef) -> (&'a str, &'a str) {
+    (subject_name(def, alarm.subject), &alarm.message)
 }
 
 /// Is what enables it false for certain?

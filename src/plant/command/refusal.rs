@@ -145,6 +145,9 @@ pub enum NotConfirmed {
     /// The station stopped before the result.
     #[error("{}", t!("the station stopped; it may have taken effect"))]
     StationStopped,
+    /// The plant file was reloaded before the result, and with it the line started again.
+    #[error("{}", t!("the plant file was reloaded; it may have taken effect"))]
+    Reloaded,
     /// The terminal lost the station before the outcome.
     #[error("{}", t!("connection to the station lost; it may have taken effect"))]
     ConnectionLost,

@@ -66,8 +66,12 @@ struct Open {
 }
 
 impl RunTracker {
-    /// Goes on counting after the last run of the history. One that the station before this one left at work is interrupted.
+    /// Goes on counting after the last run of the history, unless it does already. One that the station before this one left at
+    /// work is interrupted.
     pub fn restore(&mut self, latest: Option<ControlRun>) -> Option<ControlRun> {
+        if self.is_ready() {
+            return None;
+        }
         self.last_number = Some(latest.as_ref().map_or(0, |latest| latest.number));
         let latest = latest?;
         let interrupted = latest.is_running().then(|| {

@@ -68,6 +68,11 @@ impl ProcedureRun {
         ProcedureRun { step: None, since: at, state, ..ProcedureRun::new(by, from, started) }
     }
 
+    /// The same, where its steps mean nothing any more.
+    pub(in crate::plant) fn without_step(&self) -> ProcedureRun {
+        ProcedureRun { step: None, safe: Vec::new(), measuring: Vec::new(), ..self.clone() }
+    }
+
     /// The next things to do; empty while it waits, and once it has ended. Each step comes up once, so that who asks again
     /// until nothing is to be done comes to an end.
     pub(in crate::plant) fn next(&mut self, def: &ProcedureDef, view: &View) -> Vec<Instruction> {

@@ -12,9 +12,12 @@ use crate::plant::{
 };
 
 impl Plant {
-    /// Lets the totals go on from their last stored values, or from 0. Without a call of this they have no value.
-    pub fn restore_totals(&mut self, stored: &[(TagId, f64)]) {
-        self.image.restore_totals(stored);
+    /// Lets the totals go on from their last stored values, by the names of their tags, or from 0. Without a call of this they
+    /// have no value.
+    pub fn restore_totals(&mut self, stored: &[(String, f64)]) {
+        let named = |(name, value): &(String, f64)| Some((self.def.tag_named(name)?, *value));
+        let stored: Vec<(TagId, f64)> = stored.iter().filter_map(named).collect();
+        self.image.restore_totals(&stored);
     }
 
     /// Goes on with the batches of the station before this one, which ended at `off`: `latest` are the last records of each

@@ -101,7 +101,7 @@ impl Plant {
         self.procedures[place] = Some(Arc::new(run));
     }
 
-    fn procedure_at_work(&self) -> Option<usize> {
+    pub(super) fn procedure_at_work(&self) -> Option<usize> {
         self.procedures.iter().position(|run| run.as_ref().is_some_and(|run| run.at_work()))
     }
 

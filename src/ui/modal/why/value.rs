@@ -109,6 +109,7 @@ fn because(
         Cause::Corrupt | Cause::Exception | Cause::Timeout | Cause::DeviceDown | Cause::Undefined => None,
         Cause::NotRead
         | Cause::StationOff
+        | Cause::Reloaded
         | Cause::NotAuthorised
         | Cause::Unreadable
         | Cause::NotStored
@@ -153,7 +154,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
             Some(t!("compare it with the device: the other master of this line has not read it").to_owned())
         }
         Cause::Undefined => Some(t!("see its inputs: a division by zero, or a number that is too large").to_owned()),
-        Cause::StationOff | Cause::Unreadable | Cause::NotStored | Cause::NotReadBack => None,
+        Cause::StationOff | Cause::Reloaded | Cause::Unreadable | Cause::NotStored | Cause::NotReadBack => None,
     }
 }
 

@@ -149,6 +149,7 @@ fn is_trouble(cause: Cause) -> bool {
         | Cause::DeviceDown
         | Cause::NotConnected
         | Cause::StationOff
+        | Cause::Reloaded
         | Cause::NotAuthorised
         | Cause::NotStored => false,
     }
