@@ -5,6 +5,7 @@ mod commands;
 mod delegate;
 mod login;
 mod audit_entries;
+mod redefine;
 mod user_admin;
 mod session_limit;
 mod session;
@@ -93,8 +94,8 @@ pub enum Effect {
     Save(Users),
     /// End the station.
     Stop,
-    /// Reload the plant file; the reply is sent when that is done.
-    Reload(u64),
+    /// Reload the plant file, and a users file of another digest; the reply is sent once they are checked.
+    Reload(u64, Option<String>),
     /// Write a backup into this folder, then call [`AccessControl::on_history_job_done`].
     Backup(u64, String),
     /// Import this file into the history, then the same.
@@ -293,7 +294,7 @@ impl AccessControl {
             SessionRequest::Reload => {
                 let mut effects = self.record_and_reply(requester, "reload", &self.plant_name(), None, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
-                effects.push(Effect::Reload(ticket));
+                effects.push(Effect::Reload(ticket, self.users_digest()));
                 effects
             }
             request @ (SessionRequest::FirstSupervisor { .. }
@@ -336,7 +337,7 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         let Some(session) = self.sessions.get(&requester.terminal) else { return Vec::new() };
-        // What becomes of a stop or a reload is seen by the stop and the start of the station behind it.
+        // What becomes of a stop or a reload has an entry of the station behind it.
         let outcome = if new.is_some() { "done" } else { "permitted" };
         let record = ActionRecord { new, ..record(session, action, target, outcome, at) };
         vec![Effect::Record(record), requester.done()]

@@ -14,6 +14,6 @@ pub mod io;
 pub use control::{AccessControl, Effect, Peer};
 pub(crate) use rate_limit::RateLimit;
 pub use session_request::{
-    Credentials, Durability, LoggedInUser, Secret, SessionRequest, SessionRow, SessionStatus, UserRow,
+    Completion, Credentials, Durability, LoggedInUser, Secret, SessionRequest, SessionRow, SessionStatus, UserRow,
 };
 pub use user::Users;

@@ -123,6 +123,22 @@ pub enum Durability {
     NotRecorded,
 }
 
+/// What became of a granted request.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Completion {
+    /// Whether that is on record.
+    pub durability: Durability,
+    /// What was done, where the request does not say it all.
+    pub summary: Option<Arc<str>>,
+}
+
+impl Completion {
+    /// So far on record, with a summary if there is one.
+    pub fn new(durability: Durability, summary: Option<String>) -> Completion {
+        Completion { durability, summary: summary.map(Into::into) }
+    }
+}
+
 /// Credentials for a tag that requires reauthentication.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Credentials {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use crate::{
-    access::{Credentials, Durability, SessionRequest, SessionStatus},
+    access::{Completion, Credentials, SessionRequest, SessionStatus},
     history::{Answer, HistoryError, Query},
     plant::{
         PlantDef, Snapshot,
@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// The number of this protocol; goes up with every change of a message.
-pub const PROTOCOL: u32 = 18;
+pub const PROTOCOL: u32 = 19;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Longest handshake, bytes.
@@ -118,7 +118,7 @@ pub enum ServerMessage {
         /// Of the request.
         ticket: u64,
         /// Done, or why not.
-        answer: Result<Durability, String>,
+        answer: Result<Completion, String>,
     },
     /// A command did not reach the plant.
     Undelivered {

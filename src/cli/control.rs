@@ -54,12 +54,13 @@ async fn gone(station: &FoundStation) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Reloads the plant file of the station; a bad file changes nothing.
+/// Reloads the plant file of the station: what is as it was keeps running; a bad file changes nothing.
 pub fn reload(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let session = client::attach(args.plant.as_deref(), &args.login).await?;
-        let durability = session.request(SessionRequest::Reload).await.map_err(CliError::Usage)?;
-        say(&format!("reloaded{}", client::recorded_words(durability == Durability::Recorded)));
+        let done = session.complete(SessionRequest::Reload).await.map_err(CliError::Usage)?;
+        let recorded = client::recorded_words(done.durability == Durability::Recorded);
+        say(&format!("reloaded{recorded}: {}", done.summary.as_deref().unwrap_or("done")));
         Ok(())
     })
 }

@@ -109,7 +109,7 @@ enum Command {
     Audit(audit::Args),
     /// Stop the running station
     Stop(control::Args),
-    /// Reload the plant file of the running station; a file with errors changes nothing
+    /// Reload the plant file of the running station: what has not changed keeps running; a file with errors changes nothing
     Reload(control::Args),
     /// Print the systemd unit that runs stations on a panel PC
     SystemdUnit,

@@ -4,17 +4,23 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
     signal::unix::{SignalKind, signal},
-    sync::{mpsc, watch},
+    sync::{mpsc, oneshot, watch},
     task::JoinHandle,
 };
 
 use crate::{
-    access::io::{users, users_beside},
+    access::{
+        Users,
+        io::{users, users_beside},
+    },
     attach::io::{find, serve},
     bus::io::{clock::Clock, transport::Connector},
     plant::{PlantDef, Snapshot, record::ChainHash},
     profile::PlantFile,
-    station::{LifecycleRequest, event_log, io as station},
+    station::{
+        LifecycleRequest, event_log,
+        io::{self as station, Reloaded},
+    },
     ui,
 };
 
@@ -29,8 +35,8 @@ const ANSWER: Duration = Duration::from_millis(200);
 /// Why a station that is one process with its terminal is not reloaded.
 const LEAVE: &str = "quit this terminal and start it again";
 
-/// A plant that is checked, and the file that its settings can be saved into.
-type Plant = (PlantDef, Option<PlantFile>);
+/// What is said of files that are as they were.
+const UNCHANGED: &str = "nothing has changed: everything keeps running";
 
 /// Arguments of `run`.
 #[derive(Debug, clap::Args)]
@@ -49,62 +55,49 @@ pub struct Args {
 
 /// Runs the station until a stop request; prints changes to standard output.
 pub fn main(args: Args) -> Result<(), CliError> {
-    let plant = load_with_file(&args.plant, &args.station)?;
-    let _log = log::start(args.station.log.as_deref(), Some(&history_file(&plant.0, &args.station)))?;
+    let (def, file) = load_with_file(&args.plant, &args.station)?;
+    let def = Arc::new(def);
+    let _log = log::start(args.station.log.as_deref(), Some(&history_file(&def, &args.station)))?;
     in_runtime(async {
-        let over = over(Clock::real(), args.duration);
-        tokio::pin!(over);
-        let mut plant = plant;
-        let mut listener = listen(&plant.0)?;
-        loop {
-            let def = Arc::new(plant.0);
-            // Each station begins with what the system clock says then.
-            let clock = Clock::real();
-            let station = start(&def, clock, history_file(&def, &args.station), plant.1)?;
-            let mut serving = Serving::new(listener, station);
-            let lines = if def.lines.len() == 1 { "line" } else { "lines" };
-            say(&format!("{}: {} tags on {} {lines}", def.title, def.tags.len(), def.lines.len()));
-            let snapshots = serving.station.acceptor().snapshots.clone();
-            init::ready(&def.title);
-            let ended = tokio::select! {
-                ended = follow(snapshots.clone(), clock, None) => ended.map(|_| None),
-                () = &mut over => Ok(None),
-                next = handle_lifecycle(&mut serving.station.lifecycle, checked(&args)) => Ok(next),
-            };
-            let last = snapshots.borrow().clone();
-            drop(snapshots);
-            match &ended {
-                Ok(Some(_)) => init::reloading(),
-                Ok(None) | Err(_) => init::stopping(),
-            }
-            let (socket, last_entry) = serving.stop().await?;
-            say_anchor(last_entry);
-            // A plant goes by the name of its file, so the socket stays the same.
-            listener = socket;
-            match ended? {
-                Some(next) => {
-                    say("plant file reloaded");
-                    plant = next;
-                }
-                None => {
-                    if args.print {
-                        status::tag_lines(&last).iter().for_each(|line| say(line));
-                    }
-                    say("stopped");
-                    return Ok(());
-                }
-            }
+        let listener = listen(&def)?;
+        let clock = Clock::real();
+        let mut station = start(&def, clock, history_file(&def, &args.station), file)?;
+        let mut lifecycle = station.take_lifecycle();
+        let mut serving = Serving::new(listener, station);
+        say_plant(&def);
+        let snapshots = serving.station.acceptor().snapshots.clone();
+        init::ready(&def.title);
+        let ended = tokio::select! {
+            ended = follow(snapshots.clone(), clock, args.duration) => ended.map(drop),
+            () = handle_lifecycle(&mut serving.station, &mut lifecycle, checked(&args)) => Ok(()),
+        };
+        init::stopping();
+        let last = snapshots.borrow().clone();
+        drop(snapshots);
+        say_anchor(serving.stop().await?);
+        ended?;
+        if args.print {
+            status::tag_lines(&last).iter().for_each(|line| say(line));
         }
+        say("stopped");
+        Ok(())
     })
 }
 
-/// Loads the plant file again, with all that its station would start with: what is refused now changes nothing.
-fn checked(args: &Args) -> impl Fn() -> Result<Plant, CliError> + Clone + Send + 'static + use<> {
+/// `Water tank: 42 tags on 2 lines`.
+fn say_plant(def: &PlantDef) {
+    let lines = if def.lines.len() == 1 { "line" } else { "lines" };
+    say(&format!("{}: {} tags on {} {lines}", def.title, def.tags.len(), def.lines.len()));
+}
+
+/// Loads plant file and users file again, with all that a station would start with: what is refused now changes nothing.
+fn checked(args: &Args) -> impl Fn() -> Result<(Reloaded, Users), CliError> + Clone + Send + 'static + use<> {
     let (plant, station) = (args.plant.clone(), args.station.clone());
     move || {
-        let loaded = load_with_file(&plant, &station)?;
-        users::read(&users_beside(&history_file(&loaded.0, &station))).map_err(CliError::Users)?;
-        Ok(loaded)
+        let (def, file) = load_with_file(&plant, &station)?;
+        let users = users::read(&users_beside(&history_file(&def, &station))).map_err(CliError::Users)?;
+        let connectors = connectors(&def);
+        Ok((Reloaded { def: Arc::new(def), connectors, file, users: None }, users))
     }
 }
 
@@ -121,12 +114,14 @@ pub fn with_terminal(plant: &str, args: &StationArgs, terminal: &TerminalArgs) -
         }
         let _log = log::start(args.log.as_deref(), Some(&history_file(&def, args)))?;
         let listener = listen(&def)?;
-        let station = start(&def, Clock::real(), history_file(&def, args), file)?;
+        let mut station = start(&def, Clock::real(), history_file(&def, args), file)?;
+        let mut lifecycle = station.take_lifecycle();
         let mut serving = Serving::new(listener, station);
         let session = serving.station.session(&paths::operator());
+        let refuse = || Err(CliError::Usage(LEAVE.to_owned()));
         let result = tokio::select! {
             result = ui::io::run(session, terminal.options(ui::Leaving::Station)) => result,
-            _ = handle_lifecycle(&mut serving.station.lifecycle, || Err(CliError::Usage(LEAVE.to_owned()))) => Ok(()),
+            () = handle_lifecycle(&mut serving.station, &mut lifecycle, refuse) => Ok(()),
         };
         serving.stop().await?;
         Ok(result?)
@@ -139,42 +134,60 @@ fn listen(def: &PlantDef) -> Result<serve::Listener, CliError> {
     serve::listen(&path).map_err(CliError::from)
 }
 
-/// Waits until a terminal stops the station (`None`) or reloads its plant file (`Some`, already checked). A file with errors
-/// is refused, and the station goes on as it is.
+/// Reloads the files of the station whenever a terminal wants it, until one stops the station. A file with errors is refused, and
+/// the station goes on as it is.
 async fn handle_lifecycle(
+    station: &mut station::Station,
     lifecycle: &mut mpsc::Receiver<LifecycleRequest>,
-    load: impl Fn() -> Result<Plant, CliError> + Clone + Send + 'static,
-) -> Option<Plant> {
-    loop {
-        let LifecycleRequest::Reload(reply) = lifecycle.recv().await? else { break };
-        let loaded = tokio::select! {
-            loaded = loaded(load.clone()) => loaded,
-            // The disk of the plant file may hang: the station can be stopped all the same.
-            () = stopped(lifecycle) => break,
-        };
-        match loaded {
-            Ok(plant) => {
+    load: impl Fn() -> Result<(Reloaded, Users), CliError> + Clone + Send + 'static,
+) {
+    while let Some((digest, reply, loaded)) = next_reload(lifecycle, load.clone()).await {
+        let new = loaded.map(|(new, users)| Reloaded { users: Some((digest, users)), ..new });
+        let prepared = match new.and_then(|new| station.prepare_reload(new)) {
+            Ok(Some(prepared)) => prepared,
+            refused_or_unchanged => {
                 // A terminal that has left needs no answer.
-                let _ = reply.send(Ok(()));
-                tokio::time::sleep(ANSWER).await;
-                return Some(plant);
+                let _ = reply.send(refused_or_unchanged.map(|_| UNCHANGED.to_owned()));
+                continue;
             }
-            Err(why) => drop(reply.send(Err(why))),
+        };
+        let _ = reply.send(Ok(prepared.summary.clone()));
+        init::reloading();
+        tokio::select! {
+            () = station.end_what_changes(&prepared) => {}
+            () = stopped(lifecycle) => break,
         }
+        say(&format!("plant file reloaded: {}", prepared.summary));
+        station.reload(prepared).await;
+        say_plant(station.def());
+        init::ready(&station.def().title);
     }
     tokio::time::sleep(ANSWER).await;
-    None
 }
 
-/// Waits for the end of the station while a plant file is loaded.
+/// Waits for the next reload and loads what it is about: the digest of the users, who gets the reply, and what was loaded.
+/// `None`: the station is to end.
+async fn next_reload<T: Send + 'static>(
+    lifecycle: &mut mpsc::Receiver<LifecycleRequest>,
+    load: impl FnOnce() -> Result<T, CliError> + Send + 'static,
+) -> Option<(Option<String>, oneshot::Sender<Result<String, String>>, Result<T, String>)> {
+    let LifecycleRequest::Reload(digest, reply) = lifecycle.recv().await? else { return None };
+    tokio::select! {
+        loaded = loaded(load) => Some((digest, reply, loaded)),
+        // The disk of the plant file may hang: the station can be stopped all the same.
+        () = stopped(lifecycle) => None,
+    }
+}
+
+/// Waits for the end of the station while it reloads its files.
 async fn stopped(lifecycle: &mut mpsc::Receiver<LifecycleRequest>) {
-    while let Some(LifecycleRequest::Reload(reply)) = lifecycle.recv().await {
+    while let Some(LifecycleRequest::Reload(_, reply)) = lifecycle.recv().await {
         drop(reply.send(Err("the plant file is already being loaded".to_owned())));
     }
 }
 
 /// Loads a plant file beside the station: however long it takes, and even if it fails badly. `Err` says why in words.
-async fn loaded(load: impl FnOnce() -> Result<Plant, CliError> + Send + 'static) -> Result<Plant, String> {
+async fn loaded<T: Send + 'static>(load: impl FnOnce() -> Result<T, CliError> + Send + 'static) -> Result<T, String> {
     // Drawing many errors takes its time as well.
     let loaded = tokio::task::spawn_blocking(|| load().map_err(|error| error.to_string())).await;
     loaded.unwrap_or_else(|_| Err("the plant file cannot be read, see the log".to_owned()))
@@ -197,11 +210,12 @@ impl Serving {
         Serving { station, socket }
     }
 
-    /// Ends the station and closes its sessions. Gives the socket back, and the last entry of the audit log.
-    async fn stop(self) -> Result<(serve::Listener, Option<ChainHash>), CliError> {
+    /// Ends the station and closes its sessions, then its socket: the last record is on disk. Gives the last entry of the audit
+    /// log.
+    async fn stop(self) -> Result<Option<ChainHash>, CliError> {
         let last = self.station.stop().await;
         let socket = self.socket.await;
-        Ok((socket.map_err(|error| CliError::Failed(format!("the socket ended badly: {error}")))?, last))
+        socket.map_err(|error| CliError::Failed(format!("the socket ended badly: {error}"))).map(|_| last)
     }
 }
 
@@ -223,8 +237,13 @@ fn start(
     {
         say(&format!("cannot make {}: {error}", folder.display()));
     }
-    let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
+    let connectors = connectors(def);
     Ok(station::start_guarded(station::Options { def: def.clone(), clock, history, connectors, file })?)
+}
+
+/// How each line is opened.
+fn connectors(def: &PlantDef) -> Vec<Connector> {
+    def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect()
 }
 
 /// Prints what changes until the time is over, a signal comes, or the station ends; gives the last snapshot. Feeds the
@@ -256,7 +275,10 @@ pub async fn follow(
                 }
                 let after = snapshots.borrow_and_update().clone();
                 watchdog.see(&after);
-                print(&after, event_log::changes(&before, &after));
+                // Under another definition nothing of before has its place.
+                let is_same_plant = Arc::ptr_eq(&before.def, &after.def);
+                let lines = if is_same_plant { event_log::changes(&before, &after) } else { event_log::first(&after) };
+                print(&after, lines);
                 let hour = after.at.as_second().div_euclid(3_600);
                 if after.history.audit.is_some() && anchored.replace(hour) != Some(hour) {
                     say_anchor(after.history.audit);
@@ -303,14 +325,13 @@ pub async fn signalled() {
 
 #[cfg(test)]
 mod tests {
-    use tokio::sync::oneshot;
-
     use super::*;
 
     #[tokio::test]
     async fn an_unreadable_plant_file_leaves_the_station_as_it_is() {
-        assert!(loaded(|| panic!("a mistake in the loader")).await.is_err_and(|why| why.contains("see the log")));
-        let why = loaded(|| Err(CliError::Usage("no such plant".to_owned()))).await.err();
+        let panicked = loaded::<()>(|| panic!("a mistake in the loader")).await;
+        assert!(panicked.is_err_and(|why| why.contains("see the log")));
+        let why = loaded::<()>(|| Err(CliError::Usage("no such plant".to_owned()))).await.err();
         assert_eq!(why.as_deref(), Some("no such plant"));
     }
 
@@ -323,25 +344,21 @@ mod tests {
         let load = move || {
             begun.send(()).expect("the test waits");
             let _ = ends.lock().expect("one loader").recv();
-            Err(CliError::Usage("refused".to_owned()))
+            Err::<(), _>(CliError::Usage("refused".to_owned()))
         };
         let (sender, mut lifecycle) = mpsc::channel(4);
         let (reply, _answer) = oneshot::channel();
         let (second, refused) = oneshot::channel();
         let terminals = async {
-            sender.send(LifecycleRequest::Reload(reply)).await.expect("the station listens");
+            sender.send(LifecycleRequest::Reload(None, reply)).await.expect("the station listens");
             while begins.try_recv().is_err() {
                 tokio::task::yield_now().await;
             }
-            sender.send(LifecycleRequest::Reload(second)).await.expect("the station listens");
+            sender.send(LifecycleRequest::Reload(None, second)).await.expect("the station listens");
             assert!(refused.await.is_ok_and(|answer| answer.is_err_and(|why| why.contains("already being loaded"))));
             sender.send(LifecycleRequest::Stop).await.expect("the station listens");
-            while sender.capacity() < sender.max_capacity() {
-                tokio::task::yield_now().await;
-            }
-            tokio::time::advance(ANSWER).await;
         };
-        let (next, ()) = tokio::join!(handle_lifecycle(&mut lifecycle, load), terminals);
+        let (next, ()) = tokio::join!(next_reload(&mut lifecycle, load), terminals);
         assert!(next.is_none());
     }
 
@@ -352,7 +369,7 @@ mod tests {
         let loading = loaded(move || {
             begun.send(()).expect("the test waits");
             ends.recv().expect("the test ends it");
-            Err(CliError::Usage("refused".to_owned()))
+            Err::<(), _>(CliError::Usage("refused".to_owned()))
         });
         // On the only thread of this test: it could not end what it waits for if the loader ran on it.
         let other = async {

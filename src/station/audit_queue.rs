@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     access::{
-        Durability,
+        Completion, Durability,
         io::recorder::{Handle, Message, Recorded, WriteGroup},
     },
     history::alarm_state::LatestEvents,
@@ -31,15 +31,15 @@ const BACKLOG_MAX: usize = 1_000;
 const REPLIES_MAX: usize = 64;
 
 /// Where the result of a request goes.
-pub(crate) type ReplySender = oneshot::Sender<Result<Durability, String>>;
+pub(crate) type ReplySender = oneshot::Sender<Result<Completion, String>>;
 
 /// A message of the session server. Their order matters.
 #[derive(Debug)]
 pub(crate) enum AuditMessage {
     /// Append this entry.
     Entry(ActionRecord),
-    /// Send this result once everything before it is on disk, or say that it is not.
-    Reply(ReplySender, Result<(), String>),
+    /// Send this result, its summary if it has one, once everything before it is on disk, or say that it is not.
+    Reply(ReplySender, Result<Option<String>, String>),
     /// So many entries did not fit into the queue.
     Lost(u64),
 }
@@ -49,14 +49,14 @@ pub(crate) enum AuditMessage {
 struct Reply {
     wait: Wait,
     sender: ReplySender,
-    result: Result<(), String>,
+    result: Result<Option<String>, String>,
 }
 
 impl Reply {
     fn send(self, disk: RecorderProgress) {
         let durability = if self.wait.is_recorded(disk) { Durability::Recorded } else { Durability::NotRecorded };
         // A terminal that has gone needs no reply.
-        let _ = self.sender.send(self.result.map(|()| durability));
+        let _ = self.sender.send(self.result.map(|summary| Completion::new(durability, summary)));
     }
 }
 
@@ -114,9 +114,9 @@ impl AuditQueue {
         let _ = self.put(entries, Vec::new());
     }
 
-    /// See [`RecordedFiles::plant_file`].
-    pub fn plant_file(&mut self, file: &PlantFile, at: Timestamp) -> Option<ActionRecord> {
-        self.files.plant_file(file, at)
+    /// What was recorded last of the files of plant and users.
+    pub fn files(&mut self) -> &mut RecordedFiles {
+        &mut self.files
     }
 
     /// Sends actions and alarm events to disk; the recorder passes the actions on to the history. Returns actions that do not
@@ -158,7 +158,7 @@ impl AuditQueue {
     }
 
     /// Sends a result once everything that was put before it is on disk; see [`AuditQueue::send_due`].
-    pub fn reply(&mut self, sender: ReplySender, result: Result<(), String>) {
+    pub fn reply(&mut self, sender: ReplySender, result: Result<Option<String>, String>) {
         self.replies.push_back(Reply { wait: self.barrier.wait(self.began.elapsed()), sender, result });
         let _ = self.send_due();
     }

@@ -37,9 +37,14 @@ impl RecordedFiles {
         let version = concat!("sightglass ", env!("CARGO_PKG_VERSION"));
         let start = ActionRecord { new: Some(version.into()), ..entry(at, "start station", plant, "done") };
         let changed = file.and_then(|file| self.plant_file(file, at));
-        let found = |change| with_change(entry(at, USERS_FILE, "users", "done: found"), change);
-        let users = users.and_then(|users| replace(&mut self.users, users)).map(found);
+        let users = users.and_then(|users| self.users_file(users, at));
         [start].into_iter().chain(changed).chain(users).collect()
+    }
+
+    /// The entry of users that were found in their file; `None` if they are the last ones recorded.
+    pub fn users_file(&mut self, digest: String, at: Timestamp) -> Option<ActionRecord> {
+        let change = replace(&mut self.users, digest)?;
+        Some(with_change(entry(at, USERS_FILE, "users", "done: found"), change))
     }
 
     /// The entry of a plant file; `None` if it is the last one recorded.
@@ -78,6 +83,11 @@ pub(super) fn report_exported(file: &str, sha256: &str, is_new: bool, at: Timest
 pub(super) fn report_deleted(file: &str, sha256: &str, is_deleted: bool, at: Timestamp) -> ActionRecord {
     let outcome = if is_deleted { "done" } else { "failed: left alone" };
     ActionRecord { old: Some(sha256.into()), ..entry(at, "delete report", file, outcome) }
+}
+
+/// The plant goes on as its file says now.
+pub(super) fn reloaded(plant: &str, summary: &str, at: Timestamp) -> ActionRecord {
+    entry(at, "reload", plant, &format!("done: {summary}"))
 }
 
 /// The last entry of a station.

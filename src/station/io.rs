@@ -1,7 +1,10 @@
 //! Starts the tasks of a station and stops them in order.
 
 mod delivery;
+mod lines;
+mod outlet;
 mod process_load;
+mod reload;
 pub(crate) mod report_files;
 mod requests;
 pub mod reports;
@@ -18,15 +21,17 @@ use crate::{
         AccessControl, Peer, Users,
         io::{audit_log::Opened, own_user, recorder, users, users_beside},
     },
-    bus::io::{clock::Clock, live_reads::LiveRequest, transport::Connector},
+    bus::io::{clock::Clock, transport::Connector},
     history::{
         HistoryError,
-        io::{JobRequest, QueryRequest, thread as history},
+        io::{
+            JobRequest, QueryRequest,
+            thread::{self as history, HistoryInput},
+        },
     },
-    north::io::task::{self as north, NorthTask},
     plant::{
         Plant, PlantDef,
-        command::{BusRequest, Command, CommandId, CommandKind, CommandStatus},
+        command::{Command, CommandId, CommandKind, CommandStatus},
         event::Event,
         record::ChainHash,
         snapshot::HistoryStatus,
@@ -35,27 +40,27 @@ use crate::{
     profile::PlantFile,
 };
 
-use self::reports::ReportTask;
+pub use self::reload::{PreparedReload, Reloaded};
+use self::{lines::Line, outlet::Outlet, reports::ReportTask};
 use super::{
-    audit_queue::AuditQueue,
+    audit_queue::{AuditMessage, AuditQueue},
     past::Past,
-    plant_task::{KEPT_FOR_STOPS, Persistence, PlantTask, RecordObserver},
+    plant_task::{self, Inputs, Persistence, PlantTask, RecordObserver},
     session::Session,
     session_acceptor::SessionAcceptor,
     session_server::{self, Outputs, SessionServer},
-    sets, supervisor,
+    sets,
 };
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
 const EVENTS: usize = 256;
-/// Requests waiting for one link; a full queue refuses the command.
-const REQUESTS: usize = 16 + KEPT_FOR_STOPS;
 /// Commands waiting for the plant; a full queue refuses the command.
 const COMMANDS_MAX: usize = 64;
-/// Live reads waiting for one line; a full queue refuses the query.
-const LIVE_MAX: usize = 16;
 /// At the end the safe state of a procedure is waited for so long: a write that gets no answer takes some timeouts.
 const SAFE_STATE_MAX: Duration = Duration::from_secs(10);
+/// Said of the users file where the audit log knows of users.
+pub(super) const USERS_MISSING: &str = "the users file is missing although users existed: restore it from a backup";
+
 /// What a station is started with.
 #[derive(Debug)]
 pub struct Options {
@@ -77,7 +82,7 @@ pub struct Station {
     acceptor: SessionAcceptor,
     /// Bypasses access control: for a scripted operator.
     pub commands: mpsc::Sender<CommandStatus>,
-    /// What terminals request of the station as a whole.
+    /// What terminals request of the station as a whole; to be taken by its owner.
     pub lifecycle: mpsc::Receiver<session_server::LifecycleRequest>,
     /// `None` for a drill, which keeps nothing.
     history: Option<history::Handle>,
@@ -85,8 +90,31 @@ pub struct Station {
     audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
     /// Login is not required.
     open: bool,
+    def: Arc<PlantDef>,
+    run: u64,
+    clock: Clock,
+    /// By [`LineId`](crate::plant::def::LineId).
+    lines: Vec<Line>,
+    north: Option<Outlet>,
+    reports: Option<Outlet>,
+    senders: Senders,
     stop: watch::Sender<bool>,
     tasks: Vec<JoinHandle<()>>,
+}
+
+/// What tasks that start later send to.
+#[derive(Debug)]
+struct Senders {
+    /// To the plant, which ends when no sender is left.
+    events: mpsc::Sender<Event>,
+    /// To the audit log, by the plant.
+    audit: mpsc::Sender<AuditMessage>,
+    /// To the history, and how it stands; `None` for a drill.
+    store: Option<(mpsc::Sender<HistoryInput>, watch::Receiver<HistoryStatus>)>,
+    queries: mpsc::Sender<(u32, QueryRequest)>,
+    history_file: PathBuf,
+    plant: mpsc::Sender<plant_task::Reload>,
+    sessions: mpsc::Sender<session_server::Reload>,
 }
 
 /// Starts history, links and plant; lines are polled whether or not the store opens. No login: root and the
@@ -151,8 +179,7 @@ fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
     }
     let no_users = Users::default().digest();
     let had_users = log.users_file.as_ref().is_some_and(|recorded| **recorded != *no_users);
-    let words = "the users file is missing although users existed: restore it from a backup";
-    (had_users && access.users_digest() == Some(no_users)).then(|| FaultState::Occurred(words.into()))
+    (had_users && access.users_digest() == Some(no_users)).then(|| FaultState::Occurred(USERS_MISSING.into()))
 }
 
 /// A station that keeps nothing, for virtual time, where no other thread may take part. Queries to the history
@@ -182,52 +209,19 @@ struct Threads {
     audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
 }
 
-/// A plant ends with its last line; one without any when it is stopped.
-async fn until_stopped(events: mpsc::Sender<Event>, mut stopped: watch::Receiver<bool>) {
-    // A station that is gone has stopped.
-    let _ = stopped.wait_for(|stop| *stop).await;
-    drop(events);
-}
-
-/// The tasks of the lines, and by [`LineId`](crate::plant::def::LineId) where they take requests and live reads.
-#[derive(Default)]
-struct Lines {
-    tasks: Vec<JoinHandle<()>>,
-    links: Vec<mpsc::Sender<BusRequest>>,
-    live: Vec<mpsc::Sender<LiveRequest>>,
-}
-
-/// Starts a task for each line.
+/// A task for each line.
 fn start_lines(
     def: &Arc<PlantDef>,
     clock: Clock,
     connectors: Vec<Connector>,
     events: &mpsc::Sender<Event>,
-    stopped: &watch::Receiver<bool>,
-) -> Lines {
-    let Lines { mut tasks, mut links, mut live } = Lines::default();
-    for (line, connector) in def.lines.iter().zip(connectors) {
-        let (requests, request_queue) = mpsc::channel(REQUESTS);
-        let (live_reads, live_queue) = mpsc::channel(LIVE_MAX);
-        links.push(requests);
-        live.push(live_reads);
-        let (events, stopped) = (events.clone(), stopped.clone());
-        tasks.push(tokio::spawn(supervisor::run(
-            def.clone(),
-            line.id,
-            clock,
-            connector,
-            events,
-            request_queue,
-            live_queue,
-            stopped,
-            Vec::new(),
-        )));
-    }
-    if def.lines.is_empty() {
-        tasks.push(tokio::spawn(until_stopped(events.clone(), stopped.clone())));
-    }
-    Lines { tasks, links, live }
+) -> Vec<Line> {
+    let started = def.lines.iter().zip(connectors).map(|(line, connector)| {
+        let mut started = Line::default();
+        started.start(def, line.id, clock, connector, events);
+        started
+    });
+    started.collect()
 }
 
 // Everything that a station is made of, each once.
@@ -246,55 +240,77 @@ fn assemble(
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
-    let Lines { mut tasks, links, live } = start_lines(&def, clock, connectors, &events, &stopped);
+    let lines = start_lines(&def, clock, connectors, &events);
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));
-    let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots.clone());
+    let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
     let store = persistence.records.clone().map(|records| (records, persistence.store.clone()));
+    let links = lines.iter().map(|line| line.requests.clone()).collect();
     let plant_task = PlantTask::new(plant, clock, links, file, persistence, publish);
-    let (audit, audit_messages) = mpsc::channel(COMMANDS_MAX);
-    tasks.push(tokio::spawn(plant_task.run(event_queue, command_queue, audit_messages)));
+    let (audit, messages) = mpsc::channel(COMMANDS_MAX);
+    let (to_plant, reloads) = mpsc::channel(1);
+    let inputs = Inputs { events: event_queue, commands: command_queue, messages, reloads };
+    let mut tasks = vec![tokio::spawn(plant_task.run(inputs))];
     if store.is_some() {
         tasks.push(tokio::spawn(process_load::run(clock, events.clone(), stopped.clone())));
-    }
-    if let (Some((_, history)), Some(mqtt)) = (&store, &def.north.mqtt) {
-        let (snapshots, queries, events) = (snapshots.clone(), queries.clone(), events.clone());
-        let requests = requests::start(mqtt, clock, &acceptor, &history_file, stopped.clone());
-        let (def, mqtt, history, history_file) = (def.clone(), mqtt.clone(), history.clone(), history_file.clone());
-        let task = NorthTask { def, mqtt, clock, snapshots, queries, history, events, history_file, requests };
-        tasks.push(tokio::spawn(north::run(task, stopped.clone())));
-    }
-    if let Some((records, status)) = store.filter(|_| !def.report.automatic.is_empty()) {
-        let (def, queries, audit) = (def.clone(), queries.clone(), audit.clone());
-        let task = ReportTask { def, clock, queries, records, audit, events, status };
-        tasks.push(tokio::spawn(reports::run(task, stopped.clone())));
     }
     let (lifecycle_sender, lifecycle) = mpsc::channel(session_server::LIFECYCLE_REQUESTS_MAX);
     let outputs = Outputs {
         commands: commands.clone(),
-        queries,
-        live,
+        queries: queries.clone(),
+        live: lines.iter().map(|line| line.live.clone()).collect(),
         history_jobs,
-        history: history_file,
+        history: history_file.clone(),
         plant: def.name.clone(),
-        audit,
+        audit: audit.clone(),
         lifecycle: lifecycle_sender,
     };
     let open = guarded.is_none();
     let (access, users) = guarded.map_or_else(
-        || (AccessControl::new(def, Some(own_user().into())), None),
+        || (AccessControl::new(def.clone(), Some(own_user().into())), None),
         |(access, users)| (access, Some(users)),
     );
     let server = SessionServer::new(access.in_run(run), clock, outputs, users);
-    tasks.push(tokio::spawn(server.run(attach_requests, requests, stopped)));
-    Station { acceptor, commands, lifecycle, history, audit_writer, open, stop, tasks }
+    let (to_sessions, reloads) = mpsc::channel(1);
+    tasks.push(tokio::spawn(server.run(attach_requests, requests, reloads, stopped)));
+    let senders = Senders { events, audit, store, queries, history_file, plant: to_plant, sessions: to_sessions };
+    let (north, reports) = (None, None);
+    let mut station = Station {
+        acceptor,
+        commands,
+        lifecycle,
+        history,
+        audit_writer,
+        open,
+        def,
+        run,
+        clock,
+        lines,
+        north,
+        reports,
+        senders,
+        stop,
+        tasks,
+    };
+    station.start_outlets(false);
+    station
 }
 
 impl Station {
     /// Opens sessions.
     pub fn acceptor(&self) -> &SessionAcceptor {
         &self.acceptor
+    }
+
+    /// The plant as it is defined now.
+    pub fn def(&self) -> &Arc<PlantDef> {
+        &self.def
+    }
+
+    /// Takes out what terminals request of the station as a whole: it is reloaded while its owner waits for more.
+    pub fn take_lifecycle(&mut self) -> mpsc::Receiver<session_server::LifecycleRequest> {
+        std::mem::replace(&mut self.lifecycle, mpsc::channel(1).1)
     }
 
     /// Attaches a terminal of this very process.
@@ -327,17 +343,25 @@ impl Station {
     /// entry of the audit log.
     pub async fn stop(self) -> Option<ChainHash> {
         self.abort_procedure().await;
-        let Station { acceptor, commands, lifecycle, history, audit_writer, open: _, stop, tasks } = self;
         // The links may have ended already.
-        let _ = stop.send(true);
-        drop((acceptor, commands, lifecycle));
-        for task in tasks {
+        self.lines.iter().for_each(Line::stop);
+        let outlets = [self.north, self.reports];
+        outlets.iter().flatten().for_each(Outlet::stop);
+        let _ = self.stop.send(true);
+        drop((self.acceptor, self.commands, self.lifecycle, self.senders));
+        for mut line in self.lines {
+            line.ended().await;
+        }
+        for outlet in outlets.into_iter().flatten() {
+            outlet.end().await;
+        }
+        for task in self.tasks {
             if let Err(error) = task.await {
                 tracing::error!(%error, "a task of the station failed");
             }
         }
         // The last records are on their way; each thread ends when it has stored them, the audit log before the history.
-        let history = history?;
+        let (history, audit_writer) = (self.history?, self.audit_writer);
         let ended = move || {
             // A panic of the thread has already been reported by the panic hook.
             let last = audit_writer.and_then(|audit_writer| audit_writer.join().ok().flatten());

@@ -4,6 +4,10 @@
 //! blocks. Shutdown runs downstream: the links stop, the plant ends when all senders are dropped, the history
 //! thread drains, flushes and ends.
 //!
+//! A reload ends only what its plant file has otherwise. The task of a line that is as it was, with its devices and tags and
+//! their ids, is left alone; the plant [goes on](crate::plant::Plant::redefine) under its new definition with the values, alarms
+//! and totals of what is as it was; the history takes the definition in between two records.
+//!
 //! # When a resource fails
 //!
 //! Polling and alarms go on in every row, at the start as in the middle. Faults of history, disk, audit log, alarm-state
@@ -17,7 +21,7 @@
 //! | history: removed or replaced | noticed at the next commit, a new file is begun | acknowledged |
 //! | disk nearly full | alarm before the first failure | space is free again |
 //! | audit log, alarm-state file | what is done is shown as "not recorded" | retried each second; then recorded |
-//! | users file: damaged, missing | login is disabled; for a missing one only the station's own user makes the first Supervisor | restored, and the station restarted |
+//! | users file: damaged, missing | login is disabled; for a missing one only the station's own user makes the first Supervisor | restored, and the station reloaded |
 //! | system clock: set | followed at once, recorded; ages, delays and shelvings do not move | acknowledged |
 //! | memory, CPU: too many queries | three at a time, two of one terminal, 20 s each, on connections of their own; a full queue of samples is counted as lost | the queue empties |
 //! | line: cable, port | its values become bad, the port is opened again with backoff; a line alarm | answers come |

@@ -18,6 +18,8 @@ pub struct Past {
     restored: Option<oneshot::Receiver<Restored>>,
     /// The state of the alarms comes from the journal.
     pub from_journal: bool,
+    /// The station has just started, else it goes on under another definition of its plant.
+    pub at_start: bool,
     /// Alarm events since the start.
     early: Vec<AlarmRecord>,
 }
@@ -25,7 +27,12 @@ pub struct Past {
 impl Past {
     /// Everything is still to come.
     pub fn new(restored: Option<oneshot::Receiver<Restored>>, from_journal: bool) -> Past {
-        Past { restored, from_journal, early: Vec::new() }
+        Past { restored, from_journal, at_start: true, early: Vec::new() }
+    }
+
+    /// Only what the plant did not follow before is still to come.
+    pub fn of_new_definition(restored: oneshot::Receiver<Restored>) -> Past {
+        Past { at_start: false, ..Past::new(Some(restored), false) }
     }
 
     /// An event of an alarm, before the past is known.

@@ -1,6 +1,7 @@
 //! The loop around the reducer of facts: events, commands and ticks in; requests, records and snapshots out.
 
 mod files;
+mod reload;
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
@@ -12,6 +13,7 @@ use tokio::{
 };
 
 use self::files::{Saving, filed, saved};
+pub(super) use self::reload::{Inputs, NewPlant, Reload};
 use super::{
     audit_queue::{AuditMessage, AuditQueue, RecorderFaults},
     entries,
@@ -19,10 +21,13 @@ use super::{
     sets,
 };
 use crate::{
-    access::Durability,
+    access::{Completion, Durability},
     bus::io::clock::Clock,
     history::{
-        io::{open::Restored, thread::offer},
+        io::{
+            open::Restored,
+            thread::{HistoryInput, offer},
+        },
         words::joined,
     },
     plant::{
@@ -55,7 +60,7 @@ pub type RecordObserver = Box<dyn Fn(&[Record]) + Send>;
 
 /// Where records, actions and parameter sets are stored.
 pub(super) struct Persistence {
-    pub records: Option<mpsc::Sender<Vec<Record>>>,
+    pub records: Option<mpsc::Sender<HistoryInput>>,
     pub store: watch::Receiver<HistoryStatus>,
     /// What is still to come from the history; `None` once it is known.
     pub past: Option<Past>,
@@ -96,12 +101,7 @@ impl PlantTask {
     }
 
     /// Runs until the links have stopped.
-    pub async fn run(
-        mut self,
-        events: mpsc::Receiver<Event>,
-        commands: mpsc::Receiver<CommandStatus>,
-        mut messages: mpsc::Receiver<AuditMessage>,
-    ) {
+    pub async fn run(mut self, mut inputs: Inputs) {
         self.file_sets(SetWork::Read);
         if self.persistence.past.is_none() {
             // There is no history that they could go on from.
@@ -111,21 +111,16 @@ impl PlantTask {
             // Events wait in their queue; the lines are polled meanwhile.
             self.await_history(past::WAIT_MAX).await;
         }
-        self.follow(events, commands, &mut messages).await;
+        self.follow(&mut inputs).await;
         if self.persistence.past.is_some() {
             // A station that ends as soon as it has started completes its history all the same.
             self.await_history(HISTORY_MAX).await;
         }
-        self.end(messages).await;
+        self.end(inputs.messages).await;
     }
 
     /// Applies what comes and publishes snapshots, until the links have stopped.
-    async fn follow(
-        &mut self,
-        mut events: mpsc::Receiver<Event>,
-        mut commands: mpsc::Receiver<CommandStatus>,
-        messages: &mut mpsc::Receiver<AuditMessage>,
-    ) {
+    async fn follow(&mut self, inputs: &mut Inputs) {
         let mut tick = tokio::time::interval(self.clock.real_span(Duration::from_secs(1)).max(TICK_MIN));
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
         // Changed since the last snapshot, and when the next one may go out.
@@ -140,11 +135,15 @@ impl PlantTask {
                     (changed, next) = (false, Instant::now() + SNAPSHOT_EVERY);
                     continue;
                 }
-                Some(status) = commands.recv() => {
+                Some(reload) = inputs.reloads.recv() => {
+                    self.reload(reload, inputs);
+                    next = Instant::now();
+                }
+                Some(status) = inputs.commands.recv() => {
                     self.on_command(status);
                     next = Instant::now();
                 }
-                Some(message) = messages.recv() => {
+                Some(message) = inputs.messages.recv() => {
                     self.handle_audit_message(message);
                     continue;
                 }
@@ -158,7 +157,7 @@ impl PlantTask {
                 }
                 // Before the events: however many there are, values age and commands expire.
                 _ = tick.tick() => self.on_tick(),
-                event = events.recv() => {
+                event = inputs.events.recv() => {
                     // The links have stopped: nothing can become true any more.
                     let Some(event) = event else { break };
                     let effects = self.plant.on_event(event);
@@ -232,6 +231,7 @@ impl PlantTask {
     /// Restores alarm states and metrics from the history.
     fn restore_history(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
+        let at_start = past.at_start;
         let Restored { events, recent, chain_hashes, batches, mut runs, procedure, totals, off } = past.join(restored);
         let behind = self.clock.behind_utc();
         let off = off.map(|off| off.checked_sub(behind).unwrap_or(off));
@@ -250,7 +250,9 @@ impl PlantTask {
             self.plant.restore(&events);
             self.send_to_audit_log(Vec::new(), events);
         }
-        self.plant.restore_alarm_counts(&recent.active, &recent.events, &recent.watched, self.clock.now());
+        if at_start {
+            self.plant.restore_alarm_counts(&recent.active, &recent.events, &recent.watched, self.clock.now());
+        }
     }
 
     fn handle_audit_message(&mut self, message: AuditMessage) {
@@ -258,7 +260,9 @@ impl PlantTask {
             (AuditMessage::Entry(action), _) => self.dispatch(vec![Record::Action(action)]),
             (AuditMessage::Reply(sender, result), Some(audit)) => audit.reply(sender, result),
             // A terminal that has left needs no answer.
-            (AuditMessage::Reply(reply, answer), None) => drop(reply.send(answer.map(|()| Durability::NotRecorded))),
+            (AuditMessage::Reply(reply, answer), None) => {
+                drop(reply.send(answer.map(|summary| Completion::new(Durability::NotRecorded, summary))));
+            }
             (AuditMessage::Lost(count), Some(audit)) => audit.count_lost(count),
             (AuditMessage::Lost(_), None) => {}
         }

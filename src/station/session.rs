@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
 
 use crate::{
-    access::{Credentials, Durability, SessionRequest, SessionStatus},
+    access::{Completion, Credentials, Durability, SessionRequest, SessionStatus},
     history::io::QueryRequest,
     plant::{
         Snapshot,
@@ -40,7 +40,7 @@ pub enum Request {
     /// A query to the history.
     Ask(QueryRequest),
     /// A session request.
-    SessionRequest(SessionRequest, oneshot::Sender<Result<Durability, String>>),
+    SessionRequest(SessionRequest, oneshot::Sender<Result<Completion, String>>),
     /// For the audit log: requests from outside that were refused before one became a command. Never over a socket.
     RecordRefusal {
         /// What was requested.
@@ -77,6 +77,11 @@ impl Session {
 
     /// Sends a request and waits for the reply.
     pub async fn request(&self, request: SessionRequest) -> Result<Durability, String> {
+        self.complete(request).await.map(|completion| completion.durability)
+    }
+
+    /// The same, with what was done in words.
+    pub async fn complete(&self, request: SessionRequest) -> Result<Completion, String> {
         let (reply, answer) = oneshot::channel();
         self.send(Request::SessionRequest(request, reply))?;
         answer.await.unwrap_or_else(|_| Err("the station has stopped".to_owned()))

@@ -1,5 +1,7 @@
 //! The task between terminals and plant: owns the sessions and routes what access control permits.
 
+mod reload;
+
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
@@ -16,7 +18,7 @@ use super::{
     session_acceptor::AttachRequest,
 };
 use crate::{
-    access::{AccessControl, Durability, Effect, SessionStatus},
+    access::{AccessControl, Completion, Durability, Effect, SessionStatus},
     bus::io::{clock::Clock, live_reads::LiveRequest},
     history::{
         Answer, HistoryError, Query,
@@ -24,6 +26,8 @@ use crate::{
     },
     plant::command::CommandStatus,
 };
+
+pub(super) use reload::{NewPlant, NewUsers, Reload};
 
 /// Requests for the station as a whole that may wait.
 pub const LIFECYCLE_REQUESTS_MAX: usize = 4;
@@ -37,8 +41,9 @@ const LAST_REFUSALS_MAX: Duration = Duration::from_secs(1);
 pub enum LifecycleRequest {
     /// To end.
     Stop,
-    /// Reload the plant file; the result goes to the sender.
-    Reload(oneshot::Sender<Result<(), String>>),
+    /// Reload the plant file, and the users file if its users have another digest than this; what follows, in words, goes to
+    /// the sender.
+    Reload(Option<String>, oneshot::Sender<Result<String, String>>),
 }
 
 /// Where the server sends.
@@ -81,9 +86,9 @@ pub struct SessionServer {
     terminals: BTreeMap<u32, watch::Sender<Arc<SessionStatus>>>,
     /// The session of requests from outside.
     delegate: Option<u32>,
-    tickets: BTreeMap<u64, oneshot::Sender<Result<Durability, String>>>,
+    tickets: BTreeMap<u64, oneshot::Sender<Result<Completion, String>>>,
     /// Reloads whose outcome is awaited, with their tickets.
-    reloads: JoinSet<(u64, Result<(), String>)>,
+    reloads: JoinSet<(u64, Result<String, String>)>,
     /// The same of backups and imports.
     history_jobs: JoinSet<(u64, Result<String, String>)>,
     last_ticket: u64,
@@ -115,6 +120,7 @@ impl SessionServer {
         mut self,
         mut attach_requests: mpsc::Receiver<AttachRequest>,
         mut requests: mpsc::Receiver<(u32, Request)>,
+        mut reloaded: mpsc::Receiver<Reload>,
         mut stopped: watch::Receiver<bool>,
     ) {
         let mut tick = tokio::time::interval(TICK);
@@ -122,7 +128,7 @@ impl SessionServer {
         loop {
             tokio::select! {
                 biased;
-                _ = stopped.wait_for(|stopped| *stopped) => break,
+                () = has_stopped(&mut stopped) => break,
                 Some(request) = attach_requests.recv() => {
                     self.terminals.insert(request.terminal, request.status);
                     let (terminal, peer, now) = (request.terminal, request.peer, self.clock.now());
@@ -142,12 +148,16 @@ impl SessionServer {
                     };
                     self.apply_effects(effects);
                 }
-                Some(Ok((ticket, answer))) = self.reloads.join_next() => self.reply(ticket, answer, EntryDelivery::Sent),
+                Some(Ok((ticket, answer))) = self.reloads.join_next() => {
+                    self.reply(ticket, answer.map(Some), EntryDelivery::Sent);
+                }
                 Some(Ok((ticket, done))) = self.history_jobs.join_next() => {
                     let effects = self.access.on_history_job_done(ticket, done, self.clock.now());
                     self.apply_effects(effects);
                 }
                 Some((terminal, request)) = requests.recv() => self.on_session_message(terminal, request),
+                // Behind what was asked of the plant as it was.
+                Some(reload) = reloaded.recv() => self.reload(reload, &mut requests).await,
                 _ = tick.tick() => {
                     let gone: Vec<u32> =
                         self.terminals.iter().filter(|(_, end)| end.is_closed()).map(|(id, _)| *id).collect();
@@ -172,9 +182,7 @@ impl SessionServer {
 
     /// Completes what the audit log must have: nothing else is begun any more.
     async fn end(mut self, mut requests: mpsc::Receiver<(u32, Request)>) {
-        if let Some(delegate) = self.delegate.and_then(|terminal| self.terminals.get(&terminal)) {
-            // A task that hangs does not keep the station from ending.
-            let _ = tokio::time::timeout(LAST_REFUSALS_MAX, delegate.closed()).await;
+        if self.delegate_left().await {
             while let Ok((terminal, request)) = requests.try_recv() {
                 if matches!(request, Request::RecordRefusal { .. }) {
                     self.on_session_message(terminal, request);
@@ -187,6 +195,14 @@ impl SessionServer {
             effects.retain(|effect| matches!(effect, Effect::Record(_) | Effect::Reply(..)));
             self.apply_effects(effects);
         }
+    }
+
+    /// Waits until requests from outside have handed over their last refusals, if there are any.
+    async fn delegate_left(&self) -> bool {
+        let Some(delegate) = self.delegate.and_then(|terminal| self.terminals.get(&terminal)) else { return false };
+        // A task that hangs does not keep the station from going on.
+        let _ = tokio::time::timeout(LAST_REFUSALS_MAX, delegate.closed()).await;
+        true
     }
 
     fn on_session_message(&mut self, terminal: u32, request: Request) {
@@ -289,11 +305,11 @@ impl SessionServer {
                 Effect::Job(job, work) => self.jobs.put(job, work),
                 Effect::Save(users) => self.jobs.save(users),
                 Effect::Stop => self.send_lifecycle(LifecycleRequest::Stop),
-                Effect::Reload(ticket) => {
+                Effect::Reload(ticket, users) => {
                     let (reply, answer) = oneshot::channel();
                     let ended = || Err("not reloaded: the station is stopping or too busy".to_owned());
                     self.reloads.spawn(async move { (ticket, answer.await.unwrap_or_else(|_| ended())) });
-                    self.send_lifecycle(LifecycleRequest::Reload(reply));
+                    self.send_lifecycle(LifecycleRequest::Reload(users, reply));
                 }
                 Effect::Backup(ticket, folder) => self.back_up(ticket, folder),
                 Effect::Import(ticket, file) => {
@@ -314,7 +330,7 @@ impl SessionServer {
             }
         }
         for (ticket, answer) in answers {
-            self.reply(ticket, answer, entry);
+            self.reply(ticket, answer.map(|()| None), entry);
         }
     }
 
@@ -328,7 +344,7 @@ impl SessionServer {
         });
     }
 
-    fn reply(&mut self, ticket: u64, answer: Result<(), String>, entry: EntryDelivery) {
+    fn reply(&mut self, ticket: u64, answer: Result<Option<String>, String>, entry: EntryDelivery) {
         let Some(reply) = self.tickets.remove(&ticket) else { return };
         // A terminal that has left needs no answer.
         let (reply, answer, durability) = match entry {
@@ -346,7 +362,7 @@ impl SessionServer {
                 }
             }
         };
-        let _ = reply.send(answer.map(|()| durability));
+        let _ = reply.send(answer.map(|summary| Completion::new(durability, summary)));
     }
 
     fn send_lifecycle(&mut self, request: LifecycleRequest) {
@@ -354,6 +370,11 @@ impl SessionServer {
             tracing::error!(%error, "a lifecycle request was lost");
         }
     }
+}
+
+async fn has_stopped(stopped: &mut watch::Receiver<bool>) {
+    // A station that is gone has stopped.
+    let _ = stopped.wait_for(|stopped| *stopped).await;
 }
 
 /// Waits for the outcome of a job, in words.

@@ -1,6 +1,8 @@
 //! A whole station with users: from the first Supervisor to the last line of the audit log.
 #![allow(clippy::unwrap_used)]
 
+mod reload;
+
 use std::{path::Path, sync::Arc};
 
 use super::io::{Options, start_guarded};

@@ -9,7 +9,7 @@ use std::{
 };
 
 use sightglass::{
-    access::{Durability, SessionRequest, SessionStatus},
+    access::{Completion, Durability, SessionRequest, SessionStatus},
     attach::{
         callers::TERMINALS_MAX,
         io::{
@@ -156,7 +156,9 @@ fn answer(request: Request, commands: &watch::Sender<Arc<Snapshot>>) {
             snapshot.commands.truncate(32);
         }),
         Request::Ask(query) => drop(query.reply.send(Err(HistoryError::EmptyPeriod))),
-        Request::SessionRequest(SessionRequest::Stop, reply) => drop(reply.send(Ok(Durability::Recorded))),
+        Request::SessionRequest(SessionRequest::Stop, reply) => {
+            drop(reply.send(Ok(Completion::new(Durability::Recorded, None))))
+        }
         Request::SessionRequest(_, reply) => drop(reply.send(Err("not yet".into()))),
         Request::RecordRefusal { .. } => {}
     }

@@ -197,9 +197,9 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
         let mut heard = Vec::new();
         while let Some(request) = asked.recv().await {
             match request {
-                station::LifecycleRequest::Reload(reply) => {
+                station::LifecycleRequest::Reload(_, reply) => {
                     heard.push("reload");
-                    reply.send(Ok(())).unwrap();
+                    reply.send(Ok(String::new())).unwrap();
                 }
                 station::LifecycleRequest::Stop => heard.push("stop"),
             }

@@ -26,6 +26,7 @@ use crate::{
         io::{
             alarm_file::{self, AlarmFile, RestoredAlarms},
             chain::CHAIN_HASHES_MAX,
+            thread::{HistoryInput, offer},
         },
         words::plain,
     },
@@ -97,7 +98,7 @@ pub struct Handle {
 
 /// Opens both files beside a history and starts the thread. A file that cannot be opened is trouble, and no reason not to
 /// start. `Err` only where the system gives no thread.
-pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> io::Result<Handle> {
+pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<HistoryInput>) -> io::Result<Handle> {
     let (groups, queue) = queue::sync_channel(WRITE_GROUPS_MAX);
     let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
     let mut opened = recorder.open();
@@ -119,7 +120,7 @@ struct Pending {
 struct Recorder {
     path: PathBuf,
     clock: Clock,
-    history: mpsc::Sender<Vec<Record>>,
+    history: mpsc::Sender<HistoryInput>,
     audit_log: Option<AuditLog>,
     alarms: AlarmFile,
     pending: Vec<Pending>,
@@ -146,7 +147,7 @@ struct Recorder {
 }
 
 impl Recorder {
-    fn new(history_file: &Path, clock: Clock, history: mpsc::Sender<Vec<Record>>) -> (Recorder, RestoredAlarms) {
+    fn new(history_file: &Path, clock: Clock, history: mpsc::Sender<HistoryInput>) -> (Recorder, RestoredAlarms) {
         let (alarms, found) = AlarmFile::open(&alarm_file::beside(history_file), clock.utc());
         let recorder = Recorder {
             path: audit_log::beside(history_file),
@@ -320,12 +321,7 @@ impl Recorder {
     }
 
     fn store(&mut self, actions: Vec<ActionRecord>) {
-        let records: Vec<Record> = actions.into_iter().map(Record::Action).collect();
-        if !records.is_empty()
-            && let Err(refused) = self.history.try_send(records)
-        {
-            self.lost += refused.into_inner().len() as u64;
-        }
+        self.lost += offer(&self.history, actions.into_iter().map(Record::Action).collect());
     }
 
     fn fail(&mut self, error: &io::Error) {

@@ -13,7 +13,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::{Durability, SessionStatus},
+    access::{Completion, SessionStatus},
     attach::{
         assembly::Assembly,
         command_id_map::{CommandIdMap, GONE},
@@ -39,7 +39,7 @@ const IN: usize = 4;
 /// A query or request that waits for its answer.
 enum Waiting {
     Ask(oneshot::Sender<Result<Answer, HistoryError>>),
-    SessionRequest(oneshot::Sender<Result<Durability, String>>),
+    SessionRequest(oneshot::Sender<Result<Completion, String>>),
 }
 
 impl Waiting {

@@ -74,9 +74,12 @@ pub(super) struct Connection {
 /// status says so at once, and it is sought again for as long as a handle of the session exists.
 pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     let origin = here();
-    let mut connection = open(path, &origin).await?;
-    let (status, assembly) =
-        timeout(HANDSHAKE_REPLY_MAX, first(&mut connection)).await.unwrap_or(Err(AttachError::Silent))?;
+    let begun = match begin(path, &origin).await {
+        // A station that reloads its plant file closes what has begun with the plant as it was.
+        Err(AttachError::Wire(WireError::Closed)) => begin(path, &origin).await,
+        begun => begun,
+    };
+    let (connection, status, assembly) = begun?;
     let HandshakeReply { run, terminal, .. } = connection.reply;
     let (publish, snapshots) = watch::channel(assembly.latest().clone());
     let (status_sender, status) = watch::channel(Arc::new(status));
@@ -86,6 +89,14 @@ pub async fn connect(path: &Path) -> Result<Session, AttachError> {
         ClientTask::new(path.to_owned(), origin, id_map, assembly, publish, status_sender).run(connection, requested),
     );
     Ok(Session { snapshots, status, requests, terminal })
+}
+
+/// Opens a connection and waits for what it begins with.
+async fn begin(path: &Path, origin: &TerminalOrigin) -> Result<(Connection, SessionStatus, Assembly), AttachError> {
+    let mut connection = open(path, origin).await?;
+    let (status, assembly) =
+        timeout(HANDSHAKE_REPLY_MAX, first(&mut connection)).await.unwrap_or(Err(AttachError::Silent))?;
+    Ok((connection, status, assembly))
 }
 
 /// Sends the handshake and waits for the reply.

@@ -41,6 +41,8 @@ pub const ANSWER_STUCK_MAX: Duration = Duration::from_secs(30);
 const IN_FLIGHT_MAX: usize = 16;
 /// Queries of one terminal that are before the history, or answered and not taken yet.
 const ANSWERS_MAX: usize = 4;
+/// So long have replies that are on their way to a terminal which is sent away.
+const LAST_REPLIES_MAX: Duration = Duration::from_secs(2);
 /// How long a new terminal waits for its first status.
 const STATUS_WAIT_MAX: Duration = Duration::from_secs(2);
 
@@ -61,9 +63,10 @@ where
     let in_flight = Arc::new(Semaphore::new(IN_FLIGHT_MAX));
     let asked = Arc::new(Semaphore::new(ANSWERS_MAX));
     let (queries, tickets) = (JoinSet::new(), HashMap::new());
-    let inbound = Inbound { session: session.clone(), def: def.clone(), replies, in_flight, asked, queries, tickets };
+    let (own, places) = (session.clone(), in_flight.clone());
+    let inbound = Inbound { session: own, def: def.clone(), replies, in_flight, asked, queries, tickets };
     let sent_reports = vec![None; def.lines.len()];
-    let outbound = Outbound { write, session, snapshots, def, sent_reports };
+    let outbound = Outbound { write, session, snapshots, def, sent_reports, places };
     tokio::select! {
         Err(ended) = inbound.run(read) => ended,
         Err(ended) = outbound.run(run, answered) => ended,
@@ -192,14 +195,39 @@ struct Outbound<W> {
     def: Arc<PlantDef>,
     /// The line reports that the terminal has, by line.
     sent_reports: Vec<Option<Arc<LineReport>>>,
+    /// All of them are free when no reply is on its way.
+    places: Arc<Semaphore>,
 }
 
 impl<W: AsyncWrite + Unpin> Outbound<W> {
-    /// Sends the handshake reply, the status, then snapshots, never faster than the terminal reads.
+    /// Speaks until either side ends. Who is sent away, because the plant file is reloaded, gets the replies that are on their
+    /// way.
     async fn run(
         mut self,
         run: u64,
         mut answered: mpsc::Receiver<Reply>,
+    ) -> Result<std::convert::Infallible, ConnectionEnd> {
+        let Err(ended) = self.speak(run, &mut answered).await;
+        if matches!(ended, ConnectionEnd::SentAway | ConnectionEnd::OtherPlant) {
+            let last = async {
+                while self.places.available_permits() < IN_FLIGHT_MAX
+                    && let Some((message, _places)) = answered.recv().await
+                {
+                    self.send(&message).await?;
+                }
+                Ok::<(), ConnectionEnd>(())
+            };
+            // A terminal that has left needs no reply.
+            let _ = timeout(LAST_REPLIES_MAX, last).await;
+        }
+        Err(ended)
+    }
+
+    /// Sends the handshake reply, the status, then snapshots, never faster than the terminal reads.
+    async fn speak(
+        &mut self,
+        run: u64,
+        answered: &mut mpsc::Receiver<Reply>,
     ) -> Result<std::convert::Infallible, ConnectionEnd> {
         match timeout(STATUS_WAIT_MAX, self.session.status.changed()).await {
             Ok(Ok(())) => {}
@@ -285,82 +313,4 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)]
-mod tests {
-    use jiff::Timestamp;
-    use tokio::{
-        io::{AsyncWriteExt, DuplexStream},
-        sync::watch,
-        task::JoinHandle,
-    };
-
-    use super::*;
-    use crate::{access::Peer, attach::io::shared::SnapshotSender, plant::fixture, station::SessionAcceptor};
-
-    /// A terminal that is served: what it writes to, and what the station is asked.
-    fn serving() -> (DuplexStream, mpsc::Receiver<(u32, Request)>, JoinHandle<ConnectionEnd>) {
-        let (publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
-        let (sender, shared) = SnapshotSender::new(snapshots.borrow().clone());
-        let (acceptor, attach_requests, requests) = SessionAcceptor::new(snapshots);
-        let session = acceptor.attach(Peer { from: "test".into(), unix_user: None, in_process: false });
-        let (near, far) = tokio::io::duplex(REQUEST_BYTES_MAX);
-        let (read, write) = tokio::io::split(near);
-        let served = tokio::spawn(async move {
-            let _station = (publish, sender, attach_requests);
-            serve(read, write, session, shared).await
-        });
-        (far, requests, served)
-    }
-
-    async fn say(far: &mut DuplexStream, asked: &ClientMessage) {
-        far.write_all(&protocol::encode(asked, REQUEST_BYTES_MAX).unwrap()).await.unwrap();
-    }
-
-    fn query(ticket: u64) -> ClientMessage {
-        let (from, to) = (Timestamp::UNIX_EPOCH, Timestamp::from_second(9).unwrap());
-        ClientMessage::Ask { ticket, query: Query::Journal { from, to, limit: 1 } }
-    }
-
-    async fn next_query(requests: &mut mpsc::Receiver<(u32, Request)>) -> QueryRequest {
-        let Some((_, Request::Ask(query))) = requests.recv().await else { panic!("no query") };
-        query
-    }
-
-    async fn is_cancelled(query: &mut QueryRequest) -> bool {
-        timeout(Duration::from_secs(60), query.reply.closed()).await.is_ok()
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn queries_of_a_terminal_that_has_left_are_cancelled() {
-        let (mut far, mut requests, served) = serving();
-        say(&mut far, &query(1)).await;
-        let mut query = next_query(&mut requests).await;
-        drop(far);
-        assert!(is_cancelled(&mut query).await, "the history is still working on it");
-        assert!(matches!(served.await.unwrap(), ConnectionEnd::Wire(_)));
-    }
-
-    #[tokio::test(start_paused = true)]
-    async fn a_cancelled_query_makes_room_for_another() {
-        let (mut far, mut requests, _served) = serving();
-        let last = ANSWERS_MAX as u64 + 1;
-        for ticket in 1..=last {
-            say(&mut far, &query(ticket)).await;
-        }
-        let mut asked = Vec::new();
-        for _ in 1..last {
-            asked.push(next_query(&mut requests).await);
-        }
-        assert!(
-            timeout(Duration::from_secs(60), requests.recv()).await.is_err(),
-            "more than a terminal may ask at a time"
-        );
-        // One that was never asked, and one that is being answered.
-        say(&mut far, &ClientMessage::Cancel { ticket: 99 }).await;
-        say(&mut far, &ClientMessage::Cancel { ticket: 2 }).await;
-        assert!(is_cancelled(&mut asked[1]).await, "the history is still working on it");
-        assert!(!asked[0].reply.is_closed() && !asked[2].reply.is_closed(), "others are not touched");
-        let mut next = next_query(&mut requests).await;
-        assert!(!is_cancelled(&mut next).await);
-    }
-}
+mod tests;

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::plant::alarm::AlarmCommand;
 use crate::{
+    access::Durability,
     attach::check,
     plant::{
         command::CommandKind,
@@ -116,8 +117,8 @@ fn a_message_is_neither_longer_nor_shorter_than_it_says() {
     assert_eq!(length([0, 0, 1, 0], REQUEST_BYTES_MAX), Ok(65_536));
     assert_eq!(length([1, 0, 1, 0], REQUEST_BYTES_MAX), Err(ProtocolError::TooLong { bytes: 65_537, max: 65_536 }));
     assert!(length([0xFF; 4], SERVER_MESSAGE_BYTES_MAX).is_err());
-    let mut bytes =
-        body(encode(&ServerMessage::RequestDone { ticket: 2, answer: Ok(Durability::Recorded) }, 100).unwrap());
+    let answer = Ok(Completion { durability: Durability::Recorded, summary: None });
+    let mut bytes = body(encode(&ServerMessage::RequestDone { ticket: 2, answer }, 100).unwrap());
     bytes.push(0);
     assert!(decode::<ServerMessage>(&bytes, "message").is_err(), "something is left over");
     assert!(decode::<ServerMessage>(&bytes[..2], "message").is_err(), "something is missing");

@@ -40,6 +40,17 @@ const COMMIT_MAX: Duration = Duration::from_secs(2);
 /// Real time between two attempts to interrupt: one that comes between two statements has no effect.
 const INTERRUPT_EVERY: Duration = Duration::from_millis(10);
 
+/// Queries on their way, each with the number of its terminal.
+pub type Queries = mpsc::Receiver<(u32, QueryRequest)>;
+
+/// What the writer hands over.
+pub struct HandedOver {
+    /// The store to clone connections from, none before it is closed.
+    pub store: Option<Store>,
+    /// With another definition of the plant: the queries that know it. Those before it are dropped.
+    pub queries: Option<Queries>,
+}
+
 /// How a query is answered: [`Store::answer`], except in tests.
 pub type Answerer = Arc<dyn Fn(&Store, &Query, Timestamp) -> Result<Answer, HistoryError> + Send + Sync>;
 
@@ -54,8 +65,8 @@ pub enum WriterRequest {
 
 /// The reading side of a store.
 pub struct Reader {
-    /// A store to clone connections from after every opening, `None` before it is closed. Ends with the writer.
-    pub stores: mpsc::Receiver<Option<Store>>,
+    /// A store after every opening. Ends with the writer.
+    pub stores: mpsc::Receiver<HandedOver>,
     /// To the writer.
     pub writer: mpsc::Sender<WriterRequest>,
     /// Plant time.
@@ -66,7 +77,7 @@ pub struct Reader {
 
 impl Reader {
     /// Answers until the writer has ended; what cannot be answered any more is dropped with its reply.
-    pub async fn run(mut self, mut queries: mpsc::Receiver<(u32, QueryRequest)>) {
+    pub async fn run(mut self, mut queries: Queries) {
         let mut store: Option<Store> = None;
         // Queries wait until the first opening has ended, well or not.
         let mut tried = false;
@@ -95,7 +106,13 @@ impl Reader {
                     // Queries to the old store end now: its file closes with their connections.
                     opened = watch::channel(()).0;
                     let Some(handed) = handed else { break };
-                    (store, tried) = (handed, true);
+                    // Another definition is no opening.
+                    tried |= handed.store.is_some() || handed.queries.is_none();
+                    store = handed.store;
+                    if let Some(others) = handed.queries {
+                        queries = others;
+                        waiting.clear();
+                    }
                 }
                 Some(ended) = running.join_next_with_id() => {
                     terminals.remove(&ended.map_or_else(|panic| panic.id(), |(id, ())| id));

@@ -13,7 +13,7 @@ use super::{
     archiver::Archiver,
     files,
     open::{Opened, Restored},
-    reader::{Answerer, QUERIES_IN_WORK_MAX, Reader, WriterRequest},
+    reader::{Answerer, QUERIES_IN_WORK_MAX, Queries, Reader, WriterRequest},
     store::Store,
     writer::Writer,
 };
@@ -36,11 +36,37 @@ const JOBS_MAX: usize = 2;
 /// Real time between two commits: what a power failure may cost.
 pub(super) const COMMIT_EVERY: Duration = Duration::from_secs(1);
 
+/// What the thread takes in, in this order.
+#[derive(Debug)]
+pub enum HistoryInput {
+    /// To be stored.
+    Records(Vec<Record>),
+    /// The plant has another definition: what follows has its ids.
+    Definition(Definition),
+}
+
+impl From<Vec<Record>> for HistoryInput {
+    fn from(records: Vec<Record>) -> HistoryInput {
+        HistoryInput::Records(records)
+    }
+}
+
+/// Another definition of the plant.
+#[derive(Debug)]
+pub struct Definition {
+    /// The definition.
+    pub def: Arc<PlantDef>,
+    /// The queries that know it; `None` where its ids are those of before.
+    pub queries: Option<Queries>,
+    /// Gets what the plant goes on from in what it did not follow before.
+    pub restored: Option<oneshot::Sender<Restored>>,
+}
+
 /// The station's end of the history thread.
 #[derive(Debug)]
 pub struct Handle {
     /// Records to store. When the last sender is dropped the thread stores what it has and ends.
-    pub records: mpsc::Sender<Vec<Record>>,
+    pub records: mpsc::Sender<HistoryInput>,
     /// Queries, each with the number of its terminal; those that can no longer be answered are dropped with their reply.
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// Backups to be written, files to be imported.
@@ -65,13 +91,14 @@ impl Handle {
 
 /// Puts records into the queue, as far as it has room; alarms and operator actions never wait behind samples, which have no
 /// more room when the queue is nearly full. Returns how many records are lost.
-pub fn offer(queue: &mpsc::Sender<Vec<Record>>, mut records: Vec<Record>) -> u64 {
+pub fn offer(queue: &mpsc::Sender<HistoryInput>, mut records: Vec<Record>) -> u64 {
     let all = records.len();
     if queue.capacity() <= KEPT_FOR_EVENTS {
         records.retain(|record| !matches!(record, Record::Sample(..)));
     }
     let kept = records.len();
-    if kept == 0 || queue.try_send(records).is_ok() { (all - kept) as u64 } else { all as u64 }
+    let taken = kept == 0 || queue.try_send(HistoryInput::Records(records)).is_ok();
+    if taken { (all - kept) as u64 } else { all as u64 }
 }
 
 /// Starts the threads, which open the store while the station already polls. [`HistoryError::Foreign`] for a file that is
@@ -118,7 +145,7 @@ pub async fn record_in_virtual_time(
     def: Arc<PlantDef>,
     clock: Clock,
     commit_every: Duration,
-    records: mpsc::Receiver<Vec<Record>>,
+    records: mpsc::Receiver<HistoryInput>,
 ) -> Result<HistoryStatus, HistoryError> {
     files::refuse_foreign(path)?;
     let mut writer = Writer::new(path.to_owned(), def, clock.utc());
@@ -174,12 +201,12 @@ async fn run(
     writer: &mut Writer,
     clock: Clock,
     commit_every: Duration,
-    mut records: mpsc::Receiver<Vec<Record>>,
+    mut records: mpsc::Receiver<HistoryInput>,
     mut requests: mpsc::Receiver<WriterRequest>,
     mut jobs: mpsc::Receiver<JobRequest>,
     outputs: &mut Outputs,
 ) -> Option<Opening> {
-    let mut opening = None;
+    let (mut opening, mut restoring) = (None, None);
     let mut archiver = Archiver::new(commit_every);
     let mut tick = tokio::time::interval(commit_every);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -187,6 +214,7 @@ async fn run(
         if opening.is_none() && writer.wants_store() {
             opening = Some(spawn_blocking(writer.opener(clock.utc())));
         }
+        restore_followed(writer, &mut restoring);
         tokio::select! {
             // In this order: a query sees the records before it.
             biased;
@@ -203,16 +231,21 @@ async fn run(
                 writer.opened(result, clock.utc());
                 outputs.publish(writer);
             }
-            batch = records.recv() => {
-                let Some(batch) = batch else {
+            input = records.recv() => match input {
+                None => {
                     archiver.stop().await;
                     return opening;
-                };
-                if writer.accept(batch) {
+                }
+                Some(HistoryInput::Records(batch)) => if writer.accept(batch) {
                     writer.commit(clock.utc());
                     outputs.publish(writer);
+                },
+                Some(HistoryInput::Definition(Definition { def, queries, restored })) => {
+                    writer.redefine(def, queries, clock.utc());
+                    restoring = restored.or(restoring);
+                    outputs.publish(writer);
                 }
-            }
+            },
             // One that comes while the store is being opened waits for it, as queries do.
             Some(request) = jobs.recv(), if opening.is_none() => archiver.take_up(request),
             Some(request) = requests.recv() => match request {
@@ -229,6 +262,17 @@ async fn run(
             }
         }
     }
+}
+
+/// Reads beside the thread what a plant goes on from under another definition, as soon as there is a store.
+fn restore_followed(writer: &Writer, restoring: &mut Option<oneshot::Sender<Restored>>) {
+    let Some(store) = restoring.as_ref().and_then(|_| writer.store().ok()?.try_clone().ok()) else { return };
+    let Some(sender) = restoring.take() else { return };
+    spawn_blocking(move || match store.restore_followed() {
+        // A station that has ended restores nothing.
+        Ok(restored) => drop(sender.send(restored)),
+        Err(error) => tracing::error!(?error, "batches, runs and totals that are new do not go on from the history"),
+    });
 }
 
 /// The store on its way, opened on a thread of its own: records are taken in meanwhile.

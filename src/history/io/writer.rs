@@ -1,5 +1,7 @@
 //! What the history thread does, without the thread: gathers records, commits, retries, keeps the status.
 
+mod redefine;
+
 use std::{
     path::PathBuf,
     sync::{Arc, Weak},
@@ -13,6 +15,7 @@ use super::{
     archiver::ArchiveOutcome,
     files,
     open::{Opened, Restored},
+    reader::{HandedOver, Queries},
     store::Store,
 };
 use crate::{
@@ -42,8 +45,8 @@ pub struct Writer {
     store: Option<Store>,
     /// What the station restores from the store, until it is taken.
     restored: Option<Restored>,
-    /// Where each store goes that is opened, and `None` before one is closed.
-    reader: Option<mpsc::Sender<Option<Store>>>,
+    /// Where each store goes that is opened, and none before one is closed.
+    reader: Option<mpsc::Sender<HandedOver>>,
     /// The store that was closed: readers may still have connections to it.
     closed: Weak<()>,
     path: PathBuf,
@@ -138,6 +141,7 @@ impl Writer {
                 self.damaged = trouble.or(self.damaged.take());
                 (self.store, self.was_open, self.attempts) = (Some(store), true, 0);
                 (self.failing, self.unchecked) = (None, None);
+                self.redefine_store();
                 // The first checkpoint soon: a block that it cannot read is found while little depends on it.
                 self.commits = CHECKPOINT_EVERY - CHECKPOINT_FIRST;
                 self.hand_over();
@@ -217,7 +221,7 @@ impl Writer {
     }
 
     /// The stores that queries are answered from: this one, and each that is opened after it.
-    pub fn stores(&mut self) -> mpsc::Receiver<Option<Store>> {
+    pub fn stores(&mut self) -> mpsc::Receiver<HandedOver> {
         let (reader, stores) = mpsc::channel(STORES_MAX);
         self.reader = Some(reader);
         if self.store.is_some() {
@@ -231,12 +235,17 @@ impl Writer {
         self.reader = None;
     }
 
-    fn hand_over(&mut self) {
-        let Some(reader) = &self.reader else { return };
-        let handed = self.store.as_ref().and_then(|store| {
-            store.try_clone().inspect_err(|error| tracing::error!(%error, "queries cannot be answered")).ok()
-        });
-        if reader.try_send(handed).is_err() {
+    fn hand_over(&self) {
+        self.send_to_reader(HandedOver { store: self.clone_for_reader(), queries: None });
+    }
+
+    fn clone_for_reader(&self) -> Option<Store> {
+        let clone = self.store.as_ref()?.try_clone();
+        clone.inspect_err(|error| tracing::error!(%error, "queries cannot be answered")).ok()
+    }
+
+    fn send_to_reader(&self, handed: HandedOver) {
+        if self.reader.as_ref().is_some_and(|reader| reader.try_send(handed).is_err()) {
             tracing::error!("the reader of the history does not accept the store");
         }
     }

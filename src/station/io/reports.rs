@@ -21,7 +21,11 @@ use crate::{
     bus::io::clock::Clock,
     history::{
         Answer, HistoryError, MadeReports, Query,
-        io::{QueryRequest, reader::STATION, thread::offer},
+        io::{
+            QueryRequest,
+            reader::STATION,
+            thread::{HistoryInput, offer},
+        },
     },
     plant::{
         PlantDef,
@@ -60,7 +64,7 @@ pub(crate) struct ReportTask {
     /// To the history.
     pub queries: mpsc::Sender<(u32, QueryRequest)>,
     /// To the history.
-    pub records: mpsc::Sender<Vec<Record>>,
+    pub records: mpsc::Sender<HistoryInput>,
     /// To the audit log.
     pub audit: mpsc::Sender<AuditMessage>,
     /// To the plant: its alarm.
@@ -272,7 +276,7 @@ impl Maker {
         let file = entry.target.clone();
         let (reply, recorded) = oneshot::channel();
         if self.task.audit.try_send(AuditMessage::Entry(entry)).is_err()
-            || self.task.audit.try_send(AuditMessage::Reply(reply, Ok(()))).is_err()
+            || self.task.audit.try_send(AuditMessage::Reply(reply, Ok(None))).is_err()
         {
             tracing::error!(file = &*file, "the audit log has no room for a report");
             return;

@@ -12,7 +12,7 @@ use std::{
 use rumqttc::AsyncClient;
 use tokio::{
     sync::{mpsc, watch},
-    task::spawn_blocking,
+    task::{JoinHandle, spawn_blocking},
     time::{MissedTickBehavior, interval},
 };
 
@@ -44,14 +44,15 @@ const ANSWERS_MAX: usize = 64;
 /// How often overdue outcomes and lost messages are looked for.
 const TICK: Duration = Duration::from_secs(1);
 
-/// Takes requests from outside where the plant file names a user for them. Nothing is subscribed to otherwise.
+/// Takes requests from outside where the plant file names a user for them, in a task that ends with its last refusals on record.
+/// Nothing is subscribed to otherwise.
 pub(crate) fn start(
     mqtt: &MqttDef,
     clock: Clock,
     acceptor: &SessionAcceptor,
     history: &std::path::Path,
     stopped: watch::Receiver<bool>,
-) -> Option<RequestChannels> {
+) -> Option<(RequestChannels, JoinHandle<()>)> {
     let user = mqtt.commands_as.as_ref()?;
     let from = format!("MQTT {}:{} as {}, {}", mqtt.host, mqtt.port, mqtt.client_id, request::filter(mqtt));
     let session = acceptor.attach_as(user, &from);
@@ -67,8 +68,8 @@ pub(crate) fn start(
     let file = request_file::beside(history);
     let requests = Requests::new(mqtt.clone(), request_file::read(&file), now);
     let task = RequestTask { requests, clock, session, lost, answers, publish, file };
-    tokio::spawn(task.run(received, stopped));
-    Some(RequestChannels { inbox, clients, status, answers: answer_status })
+    let task = tokio::spawn(task.run(received, stopped));
+    Some((RequestChannels { inbox, clients, status, answers: answer_status }, task))
 }
 
 struct RequestTask {

@@ -91,9 +91,10 @@ impl PlantTask {
         let result = match done {
             Ok((file, result)) => {
                 let now = self.clock.utc();
-                let changed = self.persistence.audit.as_mut().and_then(|audit| audit.plant_file(&file, now));
+                let changed = self.persistence.audit.as_mut().and_then(|audit| audit.files().plant_file(&file, now));
                 self.send_to_audit_log(changed.into_iter().collect(), Vec::new());
-                self.file = Some(file);
+                // A file that was reloaded meanwhile is the newer one.
+                self.file.get_or_insert(file);
                 result
             }
             Err(error) => {

@@ -26,7 +26,7 @@ struct Station {
     snapshots: watch::Receiver<Arc<Snapshot>>,
     task: JoinHandle<()>,
     recorder: std::thread::JoinHandle<Option<ChainHash>>,
-    _blocked: mpsc::Receiver<Vec<Record>>,
+    _blocked: mpsc::Receiver<HistoryInput>,
     messages: mpsc::Sender<AuditMessage>,
     _requests: mpsc::Receiver<BusRequest>,
 }
@@ -43,7 +43,7 @@ impl Station {
         let def = Arc::new(def);
         let plant = Plant::new(def.clone(), clock.now(), 1.0);
         let (records, blocked) = mpsc::channel(1);
-        records.try_send(Vec::new()).unwrap();
+        records.try_send(Vec::new().into()).unwrap();
         let recorder = recorder::start(history, clock, records.clone()).unwrap();
         let (_, store) = watch::channel(HistoryStatus::default());
         let audit = Some(AuditQueue::new(&recorder));
@@ -52,9 +52,10 @@ impl Station {
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
         let (events, event_queue) = mpsc::channel(8);
         let (commands, command_queue) = mpsc::channel(8);
-        let (messages, message_queue) = mpsc::channel(8);
+        let ((messages, message_queue), (_, reloads)) = (mpsc::channel(8), mpsc::channel(1));
         let task = PlantTask::new(plant, clock, vec![request], None, persistence, publish);
-        let task = tokio::spawn(task.run(event_queue, command_queue, message_queue));
+        let inputs = Inputs { events: event_queue, commands: command_queue, messages: message_queue, reloads };
+        let task = tokio::spawn(task.run(inputs));
         let recorder = recorder.join;
         let station =
             Station { events, commands, snapshots, task, recorder, _blocked: blocked, messages, _requests: requests };
@@ -166,18 +167,18 @@ async fn a_login_is_reported_as_not_recorded_without_a_disk() {
     let answer = |messages: &mpsc::Sender<AuditMessage>| {
         let (reply, answer) = tokio::sync::oneshot::channel();
         messages.try_send(AuditMessage::Entry(entries::stopped("login", jiff::Timestamp::UNIX_EPOCH))).unwrap();
-        messages.try_send(AuditMessage::Reply(reply, Ok(()))).unwrap();
-        answer
+        messages.try_send(AuditMessage::Reply(reply, Ok(None))).unwrap();
+        async { answer.await.unwrap().map(|completion| completion.durability) }
     };
     let unwritten = |snapshot: &Arc<Snapshot>| {
         let trouble = snapshot.history.trouble.as_ref();
         trouble.is_some_and(|trouble| trouble.contains("the state of the alarms cannot be written"))
     };
     station.snapshots.wait_for(unwritten).await.unwrap();
-    assert_eq!(answer(&station.messages).await.unwrap(), Ok(Durability::NotRecorded));
+    assert_eq!(answer(&station.messages).await, Ok(Durability::NotRecorded));
     fs::remove_dir(&obstacle).unwrap();
     // A slow disk may need more than one.
-    let recorded = async { while answer(&station.messages).await.unwrap() != Ok(Durability::Recorded) {} };
+    let recorded = async { while answer(&station.messages).await != Ok(Durability::Recorded) {} };
     tokio::time::timeout(Duration::from_secs(60), recorded).await.unwrap();
     station.stop().await;
 }

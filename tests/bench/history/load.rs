@@ -145,7 +145,8 @@ pub fn record(handle: &history::Handle, clock: Clock, counts: &Counts) {
         let first = (number % u64::from(BATCHES)) as u16 * each;
         let value = |id: u16| 60.0 + 10.0 * (number as f64 / 3e4 + f64::from(id)).sin();
         let sample = |id| Record::Sample(TagId(id), Sample::good((value(id) * 10.0).round() / 10.0, at));
-        if handle.records.try_send((first..first + each).map(sample).collect()).is_err() {
+        let batch: Vec<Record> = (first..first + each).map(sample).collect();
+        if handle.records.try_send(batch.into()).is_err() {
             counts.refused.fetch_add(u64::from(each), Ordering::Relaxed);
         }
     }

@@ -50,9 +50,9 @@ fn group(actions: &[&str], events: &[AlarmEvent]) -> WriteGroup {
 }
 
 /// What went to the history.
-fn stored(rows: &mut mpsc::Receiver<Vec<Record>>) -> Vec<ActionRecord> {
+fn stored(rows: &mut mpsc::Receiver<HistoryInput>) -> Vec<ActionRecord> {
     let mut kept = Vec::new();
-    while let Ok(group) = rows.try_recv() {
+    while let Ok(HistoryInput::Records(group)) = rows.try_recv() {
         kept.extend(group.into_iter().map(|record| match record {
             Record::Action(record) => record,
             other => panic!("{other:?}"),

@@ -169,7 +169,7 @@ fn a_history_in_use_is_named_waited_for_and_caught_up() {
     let mut lines = BufReader::new(holder.stdout.take().unwrap()).lines().map_while(Result::ok);
     assert!(lines.any(|line| line.contains("ready")));
     let handle = thread::start(&db, def(), Clock::starting_at(sec(10), 1.0)).unwrap();
-    handle.records.blocking_send(vec![good(PV, 10, 27.0)]).unwrap();
+    handle.records.blocking_send(vec![good(PV, 10, 27.0)].into()).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let mut status = handle.status.clone();
     let waiting = runtime.block_on(status.wait_for(|status| status.failing.is_some() && status.waiting == 1));

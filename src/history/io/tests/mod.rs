@@ -18,6 +18,7 @@ mod alarm_metrics;
 mod pieces;
 mod procedures;
 mod reading;
+mod redefine;
 mod runs;
 mod steps;
 mod totals;
@@ -304,7 +305,8 @@ fn a_stop_ends_every_curve_and_a_run_answers_queries() {
     let clock = Clock::starting_at(sec(10), 1.0);
     let mut handle = thread::start(&db, def(), clock).unwrap();
     assert_eq!(handle.restored.take().unwrap().blocking_recv().unwrap().events, []);
-    handle.records.blocking_send(vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmEvent::Raised))]).unwrap();
+    let records = vec![good(PV, 5, 27.0), Record::Alarm(step(6, "high", AlarmEvent::Raised))];
+    handle.records.blocking_send(records.into()).unwrap();
     let (reply, answer) = tokio::sync::oneshot::channel();
     let period = Period::free(sec(0), sec(10));
     handle.queries.blocking_send((1, QueryRequest { query: Query::Report { period }, reply })).unwrap();
@@ -343,7 +345,7 @@ fn operator_steps_of_alarms_are_committed_at_once() {
     let mut status = handle.status.clone();
     for n in 1..=20 {
         let acknowledged = AlarmRecord { by: Some("anna".into()), ..step(n, "high", AlarmEvent::Acknowledged) };
-        handle.records.blocking_send(vec![Record::Alarm(acknowledged)]).unwrap();
+        handle.records.blocking_send(vec![Record::Alarm(acknowledged)].into()).unwrap();
         runtime.block_on(status.wait_for(|status| status.rows == n as u64)).unwrap();
     }
     handle.stop();

@@ -120,7 +120,7 @@ fn a_damaged_block_costs_the_period_of_its_rows_and_is_named() {
         status.trouble.as_ref().is_some_and(|words| words.contains("cannot be read"))
     };
     runtime.block_on(status.wait_for(reported)).unwrap();
-    handle.records.blocking_send(vec![good_at(rows + 5)]).unwrap();
+    handle.records.blocking_send(vec![good_at(rows + 5)].into()).unwrap();
     runtime.block_on(status.wait_for(|status| status.rows == 1)).unwrap();
     handle.stop();
 }

@@ -9,8 +9,8 @@ use crate::history::{
     QUERY_TIME_MAX,
     io::{
         read::ROWS_MAX,
-        reader::{Answerer, QUERIES_IN_WORK_MAX, QUERIES_OF_ONE_MAX, Reader, WriterRequest},
-        thread::COMMIT_EVERY,
+        reader::{Answerer, HandedOver, QUERIES_IN_WORK_MAX, QUERIES_OF_ONE_MAX, Reader, WriterRequest},
+        thread::{COMMIT_EVERY, HistoryInput},
     },
 };
 
@@ -44,7 +44,7 @@ fn records_are_committed_while_a_query_runs() {
         begun.recv().unwrap();
         answers.push(answer);
     }
-    handle.records.blocking_send(vec![good(PV, 5, 27.0)]).unwrap();
+    handle.records.blocking_send(vec![good(PV, 5, 27.0)].into()).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
     let mut status = handle.status.clone();
     let committed =
@@ -112,13 +112,17 @@ fn alarms_and_actions_fit_when_samples_fill_the_queue() {
     assert_eq!(thread::offer(&queue, vec![Record::Action(action(sent))]), 0);
     assert_eq!(thread::offer(&queue, vec![]), 0);
     drop(queue);
-    let batches: Vec<_> = std::iter::from_fn(|| waiting.blocking_recv()).skip(sent as usize - 1).collect();
+    let records = || match waiting.blocking_recv()? {
+        HistoryInput::Records(records) => Some(records),
+        HistoryInput::Definition(other) => panic!("{other:?}"),
+    };
+    let batches: Vec<_> = std::iter::from_fn(records).skip(sent as usize - 1).collect();
     assert_eq!(batches, [vec![alarm], vec![Record::Action(action(sent))]]);
 }
 
 /// A reader by itself: where stores are handed over, and where queries go.
 struct Alone {
-    stores: mpsc::Sender<Option<Store>>,
+    stores: mpsc::Sender<HandedOver>,
     queries: mpsc::Sender<(u32, QueryRequest)>,
     requests: mpsc::Receiver<WriterRequest>,
 }
@@ -131,12 +135,18 @@ fn alone(answer: Answerer) -> Alone {
     Alone { stores, queries, requests }
 }
 
+impl Alone {
+    async fn hand_over(&self, store: Option<Store>) {
+        self.stores.send(HandedOver { store, queries: None }).await.unwrap();
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_query_that_takes_too_long_is_ended_and_says_so() {
     let (_folder, db) = folder();
     let (answer, begun, ended) = endless();
     let reader = alone(answer);
-    reader.stores.send(Some(open(&db, 0))).await.unwrap();
+    reader.hand_over(Some(open(&db, 0))).await;
     let (query, answer) = query();
     reader.queries.send((1, query)).await.unwrap();
     tokio::task::spawn_blocking(move || begun.recv().unwrap()).await.unwrap();
@@ -163,19 +173,33 @@ async fn without_a_store_a_query_is_answered_with_the_reason() {
         reader.queries.send((1, query)).await.unwrap();
         answer.await.unwrap()
     };
-    reader.stores.send(None).await.unwrap();
+    reader.hand_over(None).await;
     assert_eq!(ask().await, Err(HistoryError::NotOpen));
-    reader.stores.send(Some(open(&db, 0))).await.unwrap();
+    reader.hand_over(Some(open(&db, 0))).await;
     assert_eq!(ask().await, Ok(Answer::Journal(vec![])));
-    reader.stores.send(None).await.unwrap();
+    reader.hand_over(None).await;
     assert_eq!(ask().await, Err(HistoryError::NotOpen));
+}
+
+#[tokio::test]
+async fn queries_of_a_definition_before_are_not_answered_by_the_next() {
+    let (_folder, db) = folder();
+    let reader = alone(Arc::new(Store::answer));
+    let (sender, others) = mpsc::channel(4);
+    let (early, early_answer) = query();
+    let (query, answer) = query();
+    reader.queries.send((1, early)).await.unwrap();
+    sender.send((1, query)).await.unwrap();
+    reader.stores.send(HandedOver { store: Some(open(&db, 0)), queries: Some(others) }).await.unwrap();
+    assert!(early_answer.await.is_err(), "its ids mean something else now");
+    assert_eq!(answer.await.unwrap(), Ok(Answer::Journal(vec![])));
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_report_waits_for_the_commit_but_not_for_ever() {
     let (_folder, db) = folder();
     let mut reader = alone(Arc::new(Store::answer));
-    reader.stores.send(Some(open(&db, 0))).await.unwrap();
+    reader.hand_over(Some(open(&db, 0))).await;
     for answers in [true, false] {
         let (reply, mut answer) = oneshot::channel();
         let period = Period::free(sec(0), sec(10));
@@ -194,16 +218,16 @@ fn a_store_reopens_after_the_last_query_to_the_old_one() {
     let (_folder, db) = folder();
     let mut writer = Writer::open(db, def(), sec(0)).unwrap();
     let mut stores = writer.stores();
-    let asked = stores.try_recv().unwrap().unwrap();
+    let asked = stores.try_recv().unwrap().store.unwrap();
     writer.close();
-    assert!(stores.try_recv().unwrap().is_none(), "taken back");
+    assert!(stores.try_recv().unwrap().store.is_none(), "taken back");
     assert!(matches!(writer.store(), Err(HistoryError::NotOpen)));
     assert!(!writer.wants_store());
     drop(asked);
     assert!(writer.wants_store());
     let opened = writer.opener(sec(2))();
     writer.opened(opened, sec(2));
-    let fresh = stores.try_recv().unwrap().unwrap();
+    let fresh = stores.try_recv().unwrap().store.unwrap();
     assert_eq!(fresh.restore(), Ok(vec![]));
     writer.accept(vec![good(PV, 3, 27.0)]);
     writer.commit(sec(3));

@@ -9,7 +9,7 @@ use tokio::task::JoinHandle;
 
 use super::*;
 use crate::{
-    access::Durability,
+    access::{Completion, Durability},
     history::io::store::Store,
     plant::{
         def::TagId,
@@ -40,7 +40,7 @@ struct Running {
     _stop: watch::Sender<bool>,
     _status: watch::Sender<HistoryStatus>,
     queries: mpsc::Receiver<(u32, QueryRequest)>,
-    records: mpsc::Receiver<Vec<Record>>,
+    records: mpsc::Receiver<HistoryInput>,
     audit: mpsc::Receiver<AuditMessage>,
     events: mpsc::Receiver<Event>,
     /// Messages until it is killed.
@@ -103,7 +103,7 @@ impl Stand {
         loop {
             tokio::select! {
                 biased;
-                Some(records) = running.records.recv() => {
+                Some(HistoryInput::Records(records)) = running.records.recv() => {
                     if running.dies() { break }
                     running.store.append(&records).unwrap();
                     let of_report = |record| if let Record::Report(report) = record { Some(report) } else { None };
@@ -113,7 +113,10 @@ impl Stand {
                     if running.dies() { break }
                     match message {
                         AuditMessage::Entry(action) => self.audited.push(action),
-                        AuditMessage::Reply(reply, _) => drop(reply.send(Ok(Durability::Recorded))),
+                        AuditMessage::Reply(reply, _) => {
+                            let completed = Completion { durability: Durability::Recorded, summary: None };
+                            drop(reply.send(Ok(completed)));
+                        }
                         AuditMessage::Lost(_) => {}
                     }
                 }
