@@ -32,6 +32,7 @@
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
 //! | `settings` | settings of a line: tried out, saved into the plant file; commands made before a reload |
 //! | `exact` | counters of 64 bits from a slave to every screen, file and write: all digits; writes to all units of a line |
+//! | `reload` | a plant file reloaded: what is as it was keeps its connections, values and curves |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `guarded` | a station whose users must log in, for `rights` and `users` |
 //! | `pty` | the program in a pseudo-terminal, for `terminal` and `endings` |
@@ -68,6 +69,7 @@ mod outstanding;
 mod peers;
 mod users;
 mod pty;
+mod reload;
 mod reports;
 mod rights;
 mod settings;

@@ -123,6 +123,15 @@ impl Place {
         }
     }
 
+    /// Reloads the plant file with another text in the place of one.
+    fn reload(&self, text: &str, other: &str) {
+        let plant = fs::read_to_string(self.path("tank.toml")).unwrap();
+        assert!(plant.contains(text));
+        fs::write(self.path("tank.toml"), plant.replacen(text, other, 1)).unwrap();
+        let output = sightglass().arg("reload").env("XDG_RUNTIME_DIR", &self.sockets).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+
     /// Waits until all that was stored before a moment is sent. The numbers do not say it: a deadband keeps values back.
     fn wait_until_sent(&self, moment: Timestamp) {
         self.wait_until("all of before is sent", |status| {
@@ -327,4 +336,34 @@ fn what_the_broker_may_not_take_is_not_skipped() {
     let all: BTreeSet<Row> = received(&subscriber.said).into_iter().collect();
     let stored: Vec<Row> = place.stored().into_iter().filter(|(_, at, _)| *at < complete).collect();
     assert!(stored.len() > 50 && stored.iter().all(|row| all.contains(row)), "{} stored", stored.len());
+}
+
+#[test]
+fn data_out_goes_on_through_a_reload_of_the_plant_file() {
+    if !have_mosquitto() {
+        return;
+    }
+    let place = Place::new("");
+    let _broker = place.broker("allow_anonymous true\n");
+    let mut subscriber = place.subscriber();
+    let mut station = place.station();
+    subscriber.expect(r#"status {"state":"online"}"#);
+    let before = place.wait_until("samples arrive", |status| sent(status) > 20);
+    place.reload("title = \"", "title = \"Other ");
+    place.wait_until("it goes on", |status| sent(status) > sent(&before) + 20);
+    place.catch_up(&mut subscriber, "another title");
+    assert!(!subscriber.said.iter().any(|line| line.contains("offline")), "the connection is the same");
+
+    // Other tags: another connection, and nothing is missing.
+    place.reload("fast = \"1s\"", "fast = \"900ms\"");
+    subscriber.wait_for(r#"status {"state":"offline"}"#);
+    subscriber.wait_for(r#"status {"state":"online"}"#);
+    let complete = Timestamp::now();
+    place.wait_until_sent(complete);
+    station.signal("TERM");
+    assert_eq!(station.end(), Some(0), "{}", station.said.join("\n"));
+    place.catch_up(&mut subscriber, "the end");
+    let all: BTreeSet<Row> = received(&subscriber.said).into_iter().collect();
+    let stored: Vec<Row> = place.stored().into_iter().filter(|(_, at, _)| *at < complete).collect();
+    assert!(stored.len() > 40 && stored.iter().all(|row| all.contains(row)), "{} stored", stored.len());
 }
