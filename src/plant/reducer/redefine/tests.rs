@@ -73,7 +73,8 @@ fn without_sv() -> PlantDef {
 }
 
 fn read(plant: &mut Plant, second: i64, device: DeviceId, values: &[(TagId, f64)]) -> Effects {
-    let (values, texts, response_time) = (values.to_vec(), Vec::new(), Duration::from_millis(12));
+    let values = values.iter().map(|(tag, value)| (*tag, (*value).into())).collect();
+    let (texts, response_time) = (Vec::new(), Duration::from_millis(12));
     plant.on_event(Event::Read { at: at(second), device, values, texts, response_time, exchange: None })
 }
 
@@ -93,7 +94,7 @@ fn plant() -> Plant {
 
 fn command(plant: &mut Plant, number: u32, kind: CommandKind) -> Effects {
     let note = Some("why".into());
-    let expected_value = kind.written().and_then(|(tag, _)| plant.snapshot().sample(tag).value);
+    let expected_value = kind.written().and_then(|(tag, _)| plant.snapshot().sample(tag).exact());
     let id = CommandId { terminal: 1, number };
     let command = Command { note, expected_value, ..Command::new(plant.run, id, kind) };
     plant.on_command(CommandStatus::new(command, "anna", at(3)), at(3))
@@ -236,20 +237,20 @@ fn a_value_that_was_reloaded_says_what_is_wrong_now() {
 #[test]
 fn a_write_under_way_ends_where_its_line_goes_on() {
     let mut plant = plant();
-    let write = command(&mut plant, 1, CommandKind::Write { tag: SV, value: 61.0 });
+    let write = command(&mut plant, 1, CommandKind::Write { tag: SV, value: 61.0.into() });
     assert!(matches!(write.bus[..], [(L1, BusRequest::Write(_))]));
     let mut other = def();
     other.lines[L2.index()].timeout += Duration::from_secs(1);
     assert_eq!(redefine(&mut plant, 4, other.clone()).ended, Effects::default());
-    let wrote = plant.on_event(Event::Wrote { at: at(5), id: WriteId(1), result: WriteResult::ReadBack(610.0) });
+    let wrote = plant.on_event(Event::Wrote { at: at(5), id: WriteId(1), result: WriteResult::ReadBack(610.0.into()) });
     assert_eq!(actions(&wrote), ["anna write TIC-1.SV verified"]);
 
-    command(&mut plant, 2, CommandKind::Write { tag: SV, value: 62.0 });
+    command(&mut plant, 2, CommandKind::Write { tag: SV, value: 62.0.into() });
     other.lines[L1.index()].timeout += Duration::from_secs(1);
     let ended = redefine(&mut plant, 6, other).ended;
     let why = "not confirmed: the plant file was reloaded; it may have taken effect";
     assert_eq!(actions(&ended), [format!("anna write TIC-1.SV {why}")]);
-    let late = plant.on_event(Event::Wrote { at: at(7), id: WriteId(2), result: WriteResult::ReadBack(620.0) });
+    let late = plant.on_event(Event::Wrote { at: at(7), id: WriteId(2), result: WriteResult::ReadBack(620.0.into()) });
     assert_eq!(actions(&late), [] as [&str; 0], "once");
 }
 
@@ -271,7 +272,7 @@ fn totals_and_batches_go_on_under_other_ids() {
 fn a_procedure_goes_on_only_where_its_lines_do() {
     let start = |plant: &mut Plant| {
         command(plant, 1, CommandKind::StartProcedure(ProcedureId(0)));
-        plant.on_event(Event::Wrote { at: at(3), id: WriteId(1), result: WriteResult::ReadBack(0.0) });
+        plant.on_event(Event::Wrote { at: at(3), id: WriteId(1), result: WriteResult::ReadBack(0.0.into()) });
     };
     let state = |plant: &Plant| plant.snapshot().procedures[0].as_ref().map(|run| run.state.clone());
     let mut first = plant();
