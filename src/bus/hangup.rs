@@ -78,6 +78,11 @@ impl Hangups {
         self.suspects.is_empty().then(|| std::mem::take(&mut self.together)).filter(|together| 0 < *together)
     }
 
+    /// Blocks have other names; those without one are no longer asked for.
+    pub fn rename(&mut self, renamed: impl Fn(Block) -> Option<Block>) {
+        self.suspects = std::mem::take(&mut self.suspects).into_iter().filter_map(renamed).collect();
+    }
+
     /// The plan has changed: what is read no more is no suspect.
     pub fn keep(&mut self, blocks: &[Block]) {
         self.suspects.retain(|suspect| blocks.contains(suspect));

@@ -58,7 +58,7 @@ impl InFlight {
         }
     }
 
-    /// A unit may be another one.
+    /// A unit may be another one: what was found of it no longer holds.
     pub fn forget(&mut self, unit: u8) {
         self.units.remove(&unit);
     }

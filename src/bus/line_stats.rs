@@ -17,6 +17,7 @@ use crate::plant::{
     event::{Fault, LineCounters},
     line_finding::{LineFinding, OtherMasterHeard},
     line_report::{LineReport, PollReport},
+    redefinition::Renamed,
     request_stats::{RequestStats, Spread},
     traffic::{Frame, Frames},
 };
@@ -92,6 +93,20 @@ impl LineStats {
             self.polls.get(place).cloned()
         };
         self.polls = new.iter().map(|block| kept(block).unwrap_or_default()).collect();
+    }
+
+    /// The line goes on under another definition: what of it is as it was keeps its stats. A plan follows.
+    pub fn redefine(&mut self, def: &PlantDef, line: LineId, renamed: &Renamed) {
+        let LineStats { mut devices, mut seen, .. } = LineStats::new(def, line, &[]);
+        for (id, stats) in &mut devices {
+            let was = self.devices.iter().find(|(was, _)| renamed.device(*was) == Some(*id));
+            was.into_iter().for_each(|(_, was)| *stats = was.clone());
+        }
+        for (id, time) in &mut seen {
+            let was = self.seen.iter().find(|(was, _)| renamed.device(*was) == Some(*id));
+            was.into_iter().for_each(|(_, was)| *time = was.clone());
+        }
+        (self.devices, self.seen) = (devices, seen);
     }
 
     /// A request for a poll has ended after so many tries; `index` is `None` if the plan has changed meanwhile.

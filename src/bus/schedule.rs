@@ -109,6 +109,13 @@ impl Schedule {
         self.patience = patience;
     }
 
+    /// Devices have other ids; those without one are asked no more. A plan follows.
+    pub fn rename(&mut self, renamed: impl Fn(DeviceId) -> Option<DeviceId>) {
+        let rename = |device: &mut DeviceId| renamed(*device).map(|now| *device = now).is_some();
+        self.devices.retain_mut(|health| rename(&mut health.device));
+        self.polls.retain_mut(|poll| rename(poll.device_mut()));
+    }
+
     /// The plan has changed: blocks that stay keep their grid and counts, devices their health; new blocks are due now.
     pub fn replan(&mut self, blocks: &[Block], now: Timestamp) {
         let mut old: Vec<Option<ScheduledPoll>> = std::mem::take(&mut self.polls).into_iter().map(Some).collect();
@@ -121,7 +128,8 @@ impl Schedule {
             });
             let kept =
                 old.iter_mut().find(|old| old.as_ref().is_some_and(|old| old.is_of(block))).and_then(Option::take);
-            self.polls.push(kept.unwrap_or_else(|| ScheduledPoll::new(block, place, self.origin, now)).at(place));
+            self.polls
+                .push(kept.unwrap_or_else(|| ScheduledPoll::new(block, place, self.origin, now)).at(place, block));
         }
         (0..self.devices.len()).for_each(|place| self.choose_probe(place));
     }
@@ -298,6 +306,12 @@ impl Schedule {
     /// A block that is read once could not be: it is due again soon, later each time; one that is read on request is not.
     pub fn reschedule(&mut self, index: usize, now: Timestamp) {
         self.polls[index].reschedule(now);
+        self.requeue(index);
+    }
+
+    /// The block is due now; its grid stays.
+    pub fn due(&mut self, index: usize, now: Timestamp) {
+        self.polls[index].due(now);
         self.requeue(index);
     }
 

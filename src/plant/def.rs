@@ -196,6 +196,12 @@ pub struct DeviceDef {
 }
 
 impl DeviceDef {
+    /// Is the same asked of it as of another, in the same way?
+    pub fn is_asked_as(&self, other: &DeviceDef) -> bool {
+        let of = |device: &DeviceDef| (device.unit, device.limits, device.gap, device.write_gap, device.response_time);
+        of(self) == of(other) && self.functions == other.functions
+    }
+
     /// Unit 1 of which nothing is known: it gets what every device must take.
     pub fn new(id: DeviceId, name: &str, line: LineId) -> DeviceDef {
         DeviceDef {

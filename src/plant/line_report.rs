@@ -9,9 +9,10 @@ use super::{
     admission::Admission,
     device_time::DeviceTime,
     event::LineCounters,
-    id::{DeviceId, TagId},
+    id::{DeviceId, LineId, TagId},
     line::LineDef,
     line_finding::{LineFinding, OtherMasterHeard},
+    redefinition::Renamed,
     request_stats::{RequestStats, Spread},
     tag::{Poll, PollClass, Table},
     traffic::Frames,
@@ -74,6 +75,20 @@ impl LineReport {
             frames: Frames::default(),
             settings,
         }
+    }
+
+    /// The same under other ids, without what has none any more, until the line reports again.
+    pub fn renamed(&self, line: LineId, renamed: &Renamed) -> LineReport {
+        let admission = Admission { line, dead: Vec::new(), warnings: Vec::new(), ..self.admission.clone() };
+        let mut report = LineReport { admission, findings: Vec::new(), ..self.clone() };
+        report.settings.id = line;
+        report.polls.retain_mut(|poll| renamed.rename(&mut poll.device, &mut poll.tags));
+        report.refused = self.refused.iter().filter_map(|tag| renamed.tag(*tag)).collect();
+        let rename = |device: &mut DeviceId| renamed.device(*device).map(|now| *device = now).is_some();
+        report.retries.retain_mut(|(device, _)| rename(device));
+        report.devices.retain_mut(|(device, _)| rename(device));
+        report.device_times.retain_mut(|(device, _)| rename(device));
+        report
     }
 
     /// What the periodic reads take.

@@ -154,6 +154,11 @@ impl Plant {
         &self.def
     }
 
+    /// Every line as it stands.
+    pub fn lines(&self) -> &[LineStatus] {
+        &self.lines
+    }
+
     /// Applies an event.
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {

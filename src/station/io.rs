@@ -32,7 +32,9 @@ use crate::{
     plant::{
         Plant, PlantDef,
         command::{Command, CommandId, CommandKind, CommandStatus},
+        def::DeviceId,
         event::Event,
+        line_finding::DeviceFinding,
         record::ChainHash,
         snapshot::HistoryStatus,
         station::{FaultState, STATION, StationFault},
@@ -44,6 +46,7 @@ pub use self::reload::{PreparedReload, Reloaded};
 use self::{lines::Line, outlet::Outlet, reports::ReportTask};
 use super::{
     audit_queue::{AuditMessage, AuditQueue},
+    found::FoundFile,
     past::Past,
     plant_task::{self, Inputs, Persistence, PlantTask, RecordObserver},
     session::Session,
@@ -149,7 +152,7 @@ fn begin(
     guarded: Option<(AccessControl, PathBuf)>,
 ) -> Result<Station, HistoryError> {
     let Options { def, clock, history: path, connectors, file } = options;
-    let sets = sets::folder(&path, &def.name);
+    let (sets, found) = (sets::folder(&path, &def.name), FoundFile::open(&path));
     let mut history = history::start(&path, def.clone(), clock)?;
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
@@ -166,8 +169,8 @@ fn begin(
     }
     audit_queue.put_start(&def.name, file.as_ref(), users, clock.utc());
     let past = Some(Past::new(history.restored.take(), from_journal));
-    let persistence =
-        Persistence { records: Some(records), store, past, audit: Some(audit_queue), sets: Some(sets), observer };
+    let (records, audit) = (Some(records), Some(audit_queue));
+    let persistence = Persistence { records, store, past, audit, sets: Some(sets), found: Some(found), observer };
     let threads = Threads { queries, jobs, history: Some(history), audit_writer: Some(recorder.join) };
     Ok(assemble(def, clock, connectors, plant, file, persistence, threads, guarded))
 }
@@ -194,8 +197,15 @@ pub fn start_transient(
     let (_, store) = watch::channel(HistoryStatus::default());
     let (queries, _) = mpsc::channel(1);
     let (jobs, _) = mpsc::channel(1);
-    let persistence =
-        Persistence { records: None, store, past: None, audit: None, sets: None, observer: Some(observer) };
+    let persistence = Persistence {
+        records: None,
+        store,
+        past: None,
+        audit: None,
+        sets: None,
+        found: None,
+        observer: Some(observer),
+    };
     let threads = Threads { queries, jobs: (jobs, PathBuf::new()), history: None, audit_writer: None };
     assemble(def, clock, connectors, plant, None, persistence, threads, None)
 }
@@ -215,10 +225,11 @@ fn start_lines(
     clock: Clock,
     connectors: Vec<Connector>,
     events: &mpsc::Sender<Event>,
+    found: &[(DeviceId, DeviceFinding)],
 ) -> Vec<Line> {
     let started = def.lines.iter().zip(connectors).map(|(line, connector)| {
         let mut started = Line::default();
-        started.start(def, line.id, clock, connector, events);
+        started.start(def, line.id, clock, connector, events, found);
         started
     });
     started.collect()
@@ -240,7 +251,8 @@ fn assemble(
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
-    let lines = start_lines(&def, clock, connectors, &events);
+    let found = persistence.found.as_ref().map(|found| found.of(&def)).unwrap_or_default();
+    let lines = start_lines(&def, clock, connectors, &events, &found);
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));

@@ -34,6 +34,7 @@ pub mod session;
 mod audit_queue;
 mod durability;
 mod entries;
+mod found;
 mod session_acceptor;
 mod session_server;
 mod past;

@@ -17,6 +17,7 @@ pub(super) use self::reload::{Inputs, NewPlant, Reload};
 use super::{
     audit_queue::{AuditMessage, AuditQueue, RecorderFaults},
     entries,
+    found::FoundFile,
     past::{self, Past},
     sets,
 };
@@ -68,6 +69,8 @@ pub(super) struct Persistence {
     pub audit: Option<AuditQueue>,
     /// The folder of parameter sets.
     pub sets: Option<PathBuf>,
+    /// What was found of devices.
+    pub found: Option<FoundFile>,
     pub observer: Option<RecordObserver>,
 }
 
@@ -179,6 +182,13 @@ impl PlantTask {
         self.apply_effects(effects);
         self.check_clock();
         self.send_due_replies();
+        self.keep_found();
+    }
+
+    fn keep_found(&mut self) {
+        if let Some(found) = &mut self.persistence.found {
+            found.update(self.plant.def(), self.plant.lines());
+        }
     }
 
     /// Waits for the history, but no longer than this.
@@ -206,6 +216,12 @@ impl PlantTask {
                 Ok(done) => self.on_filed(done),
                 Err(_) => tracing::error!("the folder of the parameter sets does not respond: task abandoned"),
             }
+        }
+        self.keep_found();
+        if let Some(found) = self.persistence.found.take()
+            && timeout(FILES_MAX, found.written()).await.is_err()
+        {
+            tracing::error!("the folder of the history does not respond: what was found of devices is not kept");
         }
         let ended = self.plant.on_stop();
         self.dispatch(ended.records);

@@ -22,7 +22,6 @@ use crate::{
     },
     plant::{
         PlantDef,
-        command::BusRequest,
         def::{DeviceId, LineId},
         event::{Event, Fault, LineState, WriteResult},
         line_finding::DeviceFinding,
@@ -37,17 +36,17 @@ const STEADY: Duration = Duration::from_secs(60);
 #[allow(clippy::too_many_arguments)]
 /// Runs a line until the station stops. Requests wait in their queue while it is down: it is up again within seconds.
 pub(super) async fn run(
-    def: Arc<PlantDef>,
-    line: LineId,
+    mut def: Arc<PlantDef>,
+    mut line: LineId,
     clock: Clock,
     mut connector: Connector,
     events: mpsc::Sender<Event>,
-    requests: mpsc::Receiver<BusRequest>,
+    mut requests: Requests,
     live: mpsc::Receiver<LiveRequest>,
     mut stopped: watch::Receiver<bool>,
     found: Vec<(DeviceId, DeviceFinding)>,
 ) {
-    let (mut backoff, mut requests, mut live) = (Backoff::for_ports(), Requests::new(requests), LiveReads::new(live));
+    let (mut backoff, mut live) = (Backoff::for_ports(), LiveReads::new(live));
     loop {
         let started = Instant::now();
         let stop = stopped.clone();
@@ -65,6 +64,7 @@ pub(super) async fn run(
         if STEADY < started.elapsed() {
             backoff.reset();
         }
+        (def, line) = requests.take_definition().unwrap_or((def, line));
         let retry_at = clock.now() + backoff.fail().mul_f64(clock.speed());
         tracing::error!(line = def.line(line).name, "a line task has panicked and is restarted");
         let state = LineState::Waiting { why: "internal error, see the log".to_owned(), retry_at };
@@ -93,7 +93,7 @@ mod tests {
 
     use super::*;
     use crate::plant::{
-        command::{WriteId, WriteJob},
+        command::{BusRequest, WriteId, WriteJob},
         def::TagId,
         fixture,
     };
@@ -112,7 +112,7 @@ mod tests {
             clock,
             Connector::Memory(streams),
             sender,
-            queue,
+            Requests::new(queue),
             mpsc::channel(1).1,
             stopped,
             Vec::new(),

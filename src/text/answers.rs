@@ -69,6 +69,7 @@ fn line_words() -> &'static [&'static str] {
         "no answer to {count} requests over this connection",
         "cancelled by an urgent stop",
         "the line was closed",
+        "the plant file was reloaded",
         "the line is not connected",
         "{place}: no connection within {seconds} s",
         "{place}: refused (is the device on, is the TCP port right?)",

@@ -152,12 +152,17 @@ impl Station {
         let (done, said) = self.call(&["stop"]);
         assert!(done, "{said}");
         assert_eq!(self.process.end(), Some(0));
-        let db = duckdb::Connection::open(self.folder.join("h.duckdb")).unwrap();
-        let rows = "SELECT s.quality FROM sample s JOIN tag t ON t.id = s.tag WHERE t.name = ? ORDER BY s.utc";
-        let mut rows = db.prepare(rows).unwrap();
-        let rows = rows.query_map([tag], |row| row.get::<_, u8>(0)).unwrap();
-        rows.map(|code| Quality::from_code(code.unwrap()).unwrap()).collect()
+        stored(&self.folder.join("h.duckdb"), tag)
     }
+}
+
+/// The qualities that a history holds of a tag, in their order.
+fn stored(history: &Path, tag: &str) -> Vec<Quality> {
+    let db = duckdb::Connection::open(history).unwrap();
+    let rows = "SELECT s.quality FROM sample s JOIN tag t ON t.id = s.tag WHERE t.name = ? ORDER BY s.utc";
+    let mut rows = db.prepare(rows).unwrap();
+    let rows = rows.query_map([tag], |row| row.get::<_, u8>(0)).unwrap();
+    rows.map(|code| Quality::from_code(code.unwrap()).unwrap()).collect()
 }
 
 const ALL: [&str; 4] = ["DA.R1", "DA.R2", "DB.R1", "DB.R2"];
@@ -199,6 +204,51 @@ async fn a_changed_line_leaves_the_other_as_it_is() {
     let count = |what: &str| log.lines().filter(|line| line.contains(what)).count();
     let reloaded = count("done: line A keeps running, line B starts again");
     assert_eq!((count("\"start station\""), reloaded, count("\"plant file\"")), (1, 1, 2), "{log}");
+}
+
+/// Another period is for the tags that have it: the connection and what is read once stay.
+#[tokio::test(flavor = "multi_thread")]
+async fn another_period_closes_no_connection() {
+    let (folder, slaves) = (folder(), [true, true].map(Slave::start));
+    let ports = slaves.each_ref().map(|slave| slave.port);
+    let text = plant(ports, "Both", 1_000);
+    let mut station = Station::start(folder.path(), &text).await;
+    let before = station.until("all values", |now| is_good(now, &ALL)).await;
+    let at = text.find("name = \"DB\"").unwrap();
+    let (head, of_b) = text.split_at(at);
+    let (done, said) = station.reload(&format!("{head}{}", of_b.replace("200ms", "150ms")));
+    assert!(done && said.contains("line A keeps running, line B keeps its connection"), "{said}");
+    let after = station.until("another run", |now| now.run != before.run).await;
+    assert_eq!(sample(&after, "DB.R2"), sample(&before, "DB.R2"), "not read again");
+    station.until("B is read", |now| after.at < sample(now, "DB.R1").at).await;
+    assert_eq!(slaves.each_ref().map(Slave::connections), [1, 1]);
+    assert_eq!(station.stop("DB.R1"), [NOT_READ, Quality::Good, OFF]);
+}
+
+/// Behind a line that goes or comes every line, device and tag has another id.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_line_that_goes_and_comes_leaves_the_other_as_it_is() {
+    let (folder, slaves) = (folder(), [true, true].map(Slave::start));
+    let ports = slaves.each_ref().map(|slave| slave.port);
+    let text = plant(ports, "Both", 1_000);
+    let mut station = Station::start(folder.path(), &text).await;
+    let before = station.until("all values", |now| is_good(now, &ALL)).await;
+    let lines: Vec<usize> = text.match_indices("[[line]]").map(|(at, _)| at).collect();
+    let (done, said) = station.reload(&format!("{}{}", &text[..lines[0]], &text[lines[1]..]));
+    assert!(done && said.contains("line B keeps running, line A ends"), "{said}");
+    let alone = station.until("another run", |now| now.run != before.run).await;
+    assert_eq!(sample(&alone, "DB.R2"), sample(&before, "DB.R2"), "not read again");
+    station.until("B is read", |now| alone.at < sample(now, "DB.R1").at).await;
+    let (done, said) = station.reload(&text);
+    assert!(done && said.contains("line A starts, line B keeps running"), "{said}");
+    let after = station.until("both", |now| now.run != alone.run && is_good(now, &ALL)).await;
+    assert_eq!(sample(&after, "DB.R2"), sample(&before, "DB.R2"));
+    station.until("B is read", |now| after.at < sample(now, "DB.R1").at).await;
+    assert_eq!(slaves.each_ref().map(Slave::connections), [2, 1]);
+    let (history, [a, b]) = (folder.path().join("h.duckdb"), ["DA.R2", "DB.R1"]);
+    assert_eq!(station.stop(b), [NOT_READ, Quality::Good, OFF]);
+    let of_a = stored(&history, a);
+    assert_eq!(of_a, [NOT_READ, Quality::Good, RELOADED, NOT_READ, Quality::Good, OFF]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

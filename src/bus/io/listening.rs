@@ -9,7 +9,7 @@ use super::{
     clock::Clock,
     hearing::Hearing,
     live_reads::LiveReads,
-    requests::{Closed, Requests},
+    requests::{Interrupt, Requests},
     tap::Tap,
     transport::Connector,
 };
@@ -73,8 +73,9 @@ enum Exit {
     Shutdown,
 }
 
-impl From<Closed> for Exit {
-    fn from(Closed: Closed) -> Exit {
+impl From<Interrupt> for Exit {
+    /// One that only listens is started again under another definition.
+    fn from(_: Interrupt) -> Exit {
         Exit::Shutdown
     }
 }

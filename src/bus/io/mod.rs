@@ -14,6 +14,7 @@ pub mod wire;
 pub mod link;
 pub mod testing;
 pub mod live_reads;
+pub mod redefine;
 pub mod requests;
 pub mod task;
 pub mod listening;

@@ -1,15 +1,17 @@
 //! The requests to one line: in which order they are served, and which writes among them have not ended.
 
-use std::{collections::VecDeque, pin::pin, time::Duration};
+use std::{collections::VecDeque, pin::pin, sync::Arc, time::Duration};
 
 use tokio::{
     sync::mpsc::{self, error::TryRecvError},
     time::Instant,
 };
 
+use super::redefine::Redefine;
 use crate::plant::{
+    PlantDef,
     command::{BusRequest, WriteId, WriteJob},
-    def::TagId,
+    def::{LineId, TagId},
 };
 
 /// A stop waits no longer than this (real time) for what is on the wire: a device that answers at all has mostly answered by
@@ -29,29 +31,73 @@ pub struct Requests {
     waiting: VecDeque<BusRequest>,
     /// Writes that were handed out and have not ended.
     started: Vec<WriteId>,
+    /// Other definitions of the line, and the one that it is to go on under next.
+    redefines: mpsc::Receiver<Redefine>,
+    redefine: Option<Redefine>,
+    /// The last that it went on under.
+    definition: Option<(Arc<PlantDef>, LineId)>,
 }
 
-/// The station is ending.
+/// Why no request comes.
 #[derive(Debug)]
-pub struct Closed;
+pub enum Interrupt {
+    /// The station is ending.
+    Closed,
+    /// The line goes on under another definition, see [`Requests::take_redefine`].
+    Redefined,
+}
 
 impl Requests {
     /// All of `queue`.
     pub fn new(queue: mpsc::Receiver<BusRequest>) -> Requests {
-        Requests { queue, priority: VecDeque::new(), waiting: VecDeque::new(), started: Vec::new() }
+        Requests {
+            queue,
+            priority: VecDeque::new(),
+            waiting: VecDeque::new(),
+            started: Vec::new(),
+            redefines: mpsc::channel(1).1,
+            redefine: None,
+            definition: None,
+        }
+    }
+
+    /// The same, interrupted by other definitions of the line.
+    pub fn redefined_by(self, redefines: mpsc::Receiver<Redefine>) -> Requests {
+        Requests { redefines, ..self }
+    }
+
+    /// What the line is to go on under, once it has been interrupted for that.
+    pub fn take_redefine(&mut self) -> Option<Redefine> {
+        self.redefine.take()
+    }
+
+    /// Goes on with the requests of another definition; those of before mean other tags.
+    pub fn go_on(&mut self, def: &Arc<PlantDef>, line: LineId, queue: mpsc::Receiver<BusRequest>) {
+        self.queue = queue;
+        self.priority.clear();
+        self.waiting.clear();
+        self.started.clear();
+        self.definition = Some((def.clone(), line));
+    }
+
+    /// The definition that the line is to be started again under, if that is another one now.
+    pub fn take_definition(&mut self) -> Option<(Arc<PlantDef>, LineId)> {
+        self.definition.take()
     }
 
     /// The next request as they come; may be dropped before there is one.
-    pub async fn recv(&mut self) -> Result<BusRequest, Closed> {
+    pub async fn recv(&mut self) -> Result<BusRequest, Interrupt> {
+        self.check_redefine()?;
         let request = match self.priority.pop_front() {
             Some(first) => first,
-            None => self.queue.recv().await.ok_or(Closed)?,
+            None => self.receive().await?,
         };
         Ok(self.mark_started(request))
     }
 
     /// The next request, if one has come.
-    pub fn try_recv(&mut self) -> Result<Option<BusRequest>, Closed> {
+    pub fn try_recv(&mut self) -> Result<Option<BusRequest>, Interrupt> {
+        self.check_redefine()?;
         let request = match self.priority.pop_front() {
             Some(first) => Some(first),
             None => self.try_queue()?,
@@ -60,7 +106,8 @@ impl Requests {
     }
 
     /// The request to serve now: a stop before all others, writes last and only if they `may_write`.
-    pub fn next(&mut self, may_write: bool) -> Result<Option<BusRequest>, Closed> {
+    pub fn next(&mut self, may_write: bool) -> Result<Option<BusRequest>, Interrupt> {
+        self.check_redefine()?;
         self.receive_queued()?;
         let is_write = |request: &BusRequest| matches!(request, BusRequest::Write(_));
         let request = self.priority.pop_front().or_else(|| {
@@ -118,8 +165,9 @@ impl Requests {
 
     /// Waits for what ends the opening of a port: that it be closed, or opened with other settings. All else waits until it is
     /// open. May be dropped before there is one.
-    pub async fn recv_end_of_opening(&mut self) -> Result<BusRequest, Closed> {
+    pub async fn recv_end_of_opening(&mut self) -> Result<BusRequest, Interrupt> {
         let ends = |request: &BusRequest| matches!(request, BusRequest::Connect(false) | BusRequest::Configure(_));
+        self.check_redefine()?;
         loop {
             let place = self.priority.iter().position(ends);
             if let Some(request) = place.and_then(|place| self.priority.remove(place)) {
@@ -128,7 +176,7 @@ impl Requests {
             if PRIORITY_MAX <= self.priority.len() {
                 return std::future::pending().await;
             }
-            let request = self.queue.recv().await.ok_or(Closed)?;
+            let request = self.receive().await?;
             self.enqueue(request);
         }
     }
@@ -160,7 +208,7 @@ impl Requests {
     }
 
     /// Looks through the queue for what goes first.
-    fn receive_queued(&mut self) -> Result<(), Closed> {
+    fn receive_queued(&mut self) -> Result<(), Interrupt> {
         while !self.has_stop() && self.priority.len() < PRIORITY_MAX {
             let Some(request) = self.try_queue()? else { break };
             self.enqueue(request);
@@ -168,11 +216,28 @@ impl Requests {
         Ok(())
     }
 
-    fn try_queue(&mut self) -> Result<Option<BusRequest>, Closed> {
+    /// The next of the queue, unless another definition comes.
+    async fn receive(&mut self) -> Result<BusRequest, Interrupt> {
+        tokio::select! {
+            biased;
+            Some(redefine) = self.redefines.recv() => {
+                self.redefine = Some(redefine);
+                Err(Interrupt::Redefined)
+            }
+            request = self.queue.recv() => request.ok_or(Interrupt::Closed),
+        }
+    }
+
+    fn check_redefine(&mut self) -> Result<(), Interrupt> {
+        self.redefine = self.redefine.take().or_else(|| self.redefines.try_recv().ok());
+        if self.redefine.is_some() { Err(Interrupt::Redefined) } else { Ok(()) }
+    }
+
+    fn try_queue(&mut self) -> Result<Option<BusRequest>, Interrupt> {
         match self.queue.try_recv() {
             Ok(request) => Ok(Some(request)),
             Err(TryRecvError::Empty) => Ok(None),
-            Err(TryRecvError::Disconnected) => Err(Closed),
+            Err(TryRecvError::Disconnected) => Err(Interrupt::Closed),
         }
     }
 

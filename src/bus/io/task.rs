@@ -10,6 +10,7 @@ mod opening;
 mod poll;
 mod read;
 mod recheck;
+mod redefine;
 mod test;
 mod wait;
 mod write;
@@ -26,7 +27,7 @@ use super::{
     link::Link,
     live_reads::LiveReads,
     memory::LineMemory,
-    requests::{Closed, Requests},
+    requests::{Interrupt, Requests},
     transport::Connector,
 };
 use crate::{

@@ -6,6 +6,7 @@ mod listening;
 mod live;
 mod oddities;
 mod recalled;
+mod redefined;
 mod silent;
 mod slave;
 mod slow;

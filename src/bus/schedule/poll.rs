@@ -199,8 +199,12 @@ impl ScheduledPoll {
         (self.block, self.period) == (key(block), period_of(block))
     }
 
-    pub fn at(self, place: usize) -> ScheduledPoll {
-        ScheduledPoll { place, ..self }
+    pub fn at(self, place: usize, block: &Block) -> ScheduledPoll {
+        ScheduledPoll { place, class: block.class, once: block.poll == Poll::Once, ..self }
+    }
+
+    pub fn device_mut(&mut self) -> &mut DeviceId {
+        &mut self.block.0
     }
 
     /// When it wants to be read next.

@@ -11,13 +11,14 @@ use super::{Effects, Plant};
 use crate::plant::{
     PlantDef,
     command::{CommandKind, NotConfirmed},
-    def::{DeviceDef, LineDef, ProcedureId},
+    def::{DeviceDef, LineDef, LineId, ProcedureId},
     interlock::ActuatorTracker,
     line::Transport,
     number::to_u16,
     procedure::{ProcedureEnd, ProcedureRun},
     record::Record,
-    redefinition::Redefinition,
+    redefinition::{Redefinition, Renamed},
+    snapshot::LineStatus,
 };
 
 /// What follows from another definition.
@@ -117,11 +118,19 @@ impl Plant {
 
     /// Lines that keep running, devices that are asked where they were, and the last request for each tag.
     fn redefine_devices(&mut self, change: &Redefinition, def: &PlantDef) {
-        let kept = |line: &LineDef| change.keeps_line(line.id).then_some(line.id.index());
-        let lines = def.lines.iter().map(kept);
+        let lines = def.lines.iter().map(|line| change.port(line.id).map(LineId::index));
         self.line_minutes =
             lines.clone().map(|was| was.map(|was| take(&mut self.line_minutes[was])).unwrap_or_default()).collect();
-        self.lines = lines.map(|was| was.map(|was| take(&mut self.lines[was])).unwrap_or_default()).collect();
+        let renamed = |line: &LineDef| {
+            let was = change.port(line.id)?;
+            let status = self.lines[was.index()].clone();
+            Some(if change.keeps_line(line.id) {
+                status
+            } else {
+                renamed_status(status, line.id, &Renamed::new((&self.def, was), (def, line.id)))
+            })
+        };
+        self.lines = def.lines.iter().map(|line| renamed(line).unwrap_or_default()).collect();
         let was = |device: &DeviceDef| change.device(device.id).map(|was| was.index());
         let devices = def.devices.iter().map(was);
         let programs = devices.clone().map(|was| was.map(|was| self.programs[was]).unwrap_or_default());
@@ -136,4 +145,12 @@ impl Plant {
         let frame = |id| change.source(id).and_then(|was| self.source_frames[was.index()].clone());
         self.source_frames = Arc::new(def.tags.iter().map(|tag| frame(tag.id)).collect());
     }
+}
+
+/// The status of a line under other ids.
+fn renamed_status(status: LineStatus, line: LineId, renamed: &Renamed) -> LineStatus {
+    let report = status.report.as_ref().map(|report| Arc::new(report.renamed(line, renamed)));
+    let before = status.settings_before.as_deref();
+    let settings_before = before.map(|before| Arc::new(LineDef { id: line, ..before.clone() }));
+    LineStatus { report, settings_before, ..status }
 }

@@ -1,12 +1,14 @@
 //! A reload: what is as it was keeps running, all else ends and starts again.
 //!
 //! ```text
-//!   prepare ──> lines that change end ──> sessions ──> plant ──> history      lines and outlets that changed start
-//!               (the others are polled)   go         goes on under the new definition
+//!   prepare ──> lines that change end ──> lines with other ──> sessions ──> plant ──> history      lines and outlets that
+//!               (the others are polled)   devices pause        go         goes on under the new    changed start or go on
+//!                                                                         definition
 //! ```
 
 use std::sync::Arc;
 
+use futures_util::future::join_all;
 use tokio::sync::{mpsc, oneshot};
 
 use super::{Line, Outlet, Station};
@@ -18,9 +20,14 @@ use crate::{
         reader::Queries,
         thread::{HistoryInput, QUERIES_MAX},
     },
-    plant::{PlantDef, def::LineId},
+    plant::{
+        PlantDef,
+        def::{DeviceId, LineId},
+        line_finding::DeviceFinding,
+    },
     profile::PlantFile,
     station::{
+        found::FoundFile,
         plant_task,
         session_server::{self, NewUsers},
     },
@@ -81,12 +88,15 @@ impl Station {
         }
         self.north.iter().filter(|_| !keeps_north(&before, def)).for_each(Outlet::stop);
         let ids = (0..).map(LineId);
-        let lines = self.lines.iter_mut().zip(ids).filter(|(_, id)| !before.keeps_line(def, *id));
-        let mut ending: Vec<&mut Line> = lines.map(|(line, _)| line).collect();
-        ending.iter().for_each(|line| line.stop());
-        for line in &mut ending {
+        let changed = self.lines.iter_mut().zip(ids).filter(|(_, id)| !before.keeps_line(def, *id));
+        let ports: Vec<LineId> = def.lines.iter().filter_map(|line| before.same_port(def, line.id)).collect();
+        let (pausing, ending): (Vec<_>, Vec<_>) = changed.partition(|(_, id)| ports.contains(id));
+        ending.iter().for_each(|(line, _)| line.stop());
+        for (line, _) in ending {
             line.ended().await;
         }
+        // These are polled until the others have ended.
+        join_all(pausing.into_iter().map(|(line, _)| line.pause())).await;
     }
 
     /// Goes on with what was read, once what changes has ended.
@@ -119,18 +129,30 @@ impl Station {
         let _ = self.senders.plant.send(plant_task::Reload { plant: for_plant, users, done }).await;
         let _ = plant_done.await;
         if changes {
+            let found = self.found().await;
             for ((line, def), connector) in self.lines.iter_mut().zip(&self.def.lines).zip(connectors) {
-                line.start(&self.def, def.id, self.clock, connector, &self.senders.events);
+                line.start(&self.def, def.id, self.clock, connector, &self.senders.events, &found);
             }
             self.start_outlets(keeps_north(&before, &self.def));
         }
     }
 
-    /// The lines of another definition: those that keep running, and others that are not started yet.
+    /// What is kept of what was found of devices.
+    async fn found(&self) -> Vec<(DeviceId, DeviceFinding)> {
+        let history = self.senders.history_file.clone();
+        let file = tokio::task::spawn_blocking(move || FoundFile::open(&history)).await;
+        file.map(|file| file.of(&self.def)).unwrap_or_default()
+    }
+
+    /// The lines of another definition: those that keep running, those that pause, and others that are not started yet.
     fn take_lines(&mut self, def: &PlantDef) {
         let mut before: Vec<Option<Line>> = self.lines.drain(..).map(Some).collect();
-        let mut kept =
-            |id: LineId| before.get_mut(id.index()).and_then(|line| line.take_if(|_| self.def.keeps_line(def, id)));
+        let mut kept = |id: LineId| {
+            if self.def.keeps_line(def, id) {
+                return before.get_mut(id.index())?.take();
+            }
+            before.get_mut(self.def.same_port(def, id)?.index())?.take()?.with_other_queues()
+        };
         self.lines = def.lines.iter().map(|line| line.id).map(&mut kept).map(Option::unwrap_or_default).collect();
     }
 

@@ -46,16 +46,21 @@ impl Task<'_> {
             match exit {
                 LinkExit::Shutdown => return Err(exit),
                 LinkExit::Reopen => backoff.reset(),
-                LinkExit::UsedUp => self.wait_until_due(&mut schedule).await?,
+                LinkExit::Redefined => self.redefine(None, &mut schedule).await?,
+                LinkExit::UsedUp => {
+                    let waited = self.wait_until_due(&mut schedule).await;
+                    self.unless_redefined(waited, &mut schedule).await?;
+                }
                 LinkExit::Diagnostic => {
                     self.publish_state(LineState::Testing).await?;
-                    self.run_diagnostic_alone().await?;
+                    let tested = self.run_diagnostic_alone().await;
+                    self.unless_redefined(tested, &mut schedule).await?;
                 }
                 LinkExit::Closed => {
                     self.end_diagnostic("the line was closed").await?;
                     self.publish_state(LineState::Disconnected).await?;
                     self.publish_report(None).await?;
-                    self.wait(None).await?;
+                    self.wait(None, &mut schedule).await?;
                 }
                 LinkExit::PortFailed(why) | LinkExit::Gone(why) => {
                     self.end_diagnostic(&why).await?;
@@ -63,7 +68,7 @@ impl Task<'_> {
                     let retry_at = self.clock.now() + backoff.fail();
                     self.publish_state(LineState::Waiting { why, retry_at }).await?;
                     self.publish_report(None).await?;
-                    self.wait(Some(retry_at)).await?;
+                    self.wait(Some(retry_at), &mut schedule).await?;
                 }
             }
         }
@@ -96,14 +101,28 @@ impl Task<'_> {
     async fn serve(&mut self, opened: Opened, schedule: &mut Schedule) -> (u64, LinkExit) {
         let mut link = Link::new(opened, &self.settings, self.clock, self.memory.clone());
         schedule.set_patience(Patience::of(&self.settings, self.clock.speed()));
-        let on_line = self.def.devices.iter().filter(|device| device.line == self.line);
-        on_line
-            .for_each(|device| link.allow(device.unit, self.in_flight.limit(device.unit, device.limits.in_flight_max)));
+        self.allow_in_flight(&mut link);
         link.set_alone(!self.hangups.is_clear());
         (self.closed_at, self.opened_at, self.heard) = (self.clock.now(), self.clock.now(), false);
         self.timeouts_before = link.counters().timeouts;
-        let Err(exit) = self.serve_loop(&mut link, schedule).await;
+        let exit = loop {
+            let Err(exit) = self.serve_loop(&mut link, schedule).await;
+            match exit {
+                LinkExit::Redefined => match self.redefine(Some(&mut link), schedule).await {
+                    Ok(()) => {}
+                    Err(exit) => break exit,
+                },
+                exit => break exit,
+            }
+        };
         self.collect_stats(&mut link);
         (link.answers(), exit)
+    }
+
+    /// So many requests may be under way to each device.
+    pub(super) fn allow_in_flight(&self, link: &mut Link) {
+        for device in self.def.devices.iter().filter(|device| device.line == self.line) {
+            link.allow(device.unit, self.in_flight.limit(device.unit, device.limits.in_flight_max));
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Why the task of a line leaves its port.
 
-use super::Closed;
+use super::Interrupt;
 use crate::bus::io::link::LinkError;
 
 /// Why a port is left.
@@ -17,13 +17,18 @@ pub(super) enum LinkExit {
     Reopen,
     /// A diagnostic needs the port for itself.
     Diagnostic,
+    /// It is not left, but goes on under another definition.
+    Redefined,
     /// The station is ending.
     Shutdown,
 }
 
-impl From<Closed> for LinkExit {
-    fn from(Closed: Closed) -> LinkExit {
-        LinkExit::Shutdown
+impl From<Interrupt> for LinkExit {
+    fn from(interrupt: Interrupt) -> LinkExit {
+        match interrupt {
+            Interrupt::Closed => LinkExit::Shutdown,
+            Interrupt::Redefined => LinkExit::Redefined,
+        }
     }
 }
 

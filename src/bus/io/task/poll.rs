@@ -158,7 +158,7 @@ impl Task<'_> {
                 tracing::debug!(address = block.address, count = block.count, %code, "the block is split");
                 let mut blocks = self.blocks.clone();
                 blocks.splice(index..=index, parts);
-                self.use_plan(link, schedule, blocks, at);
+                self.use_plan(Some(link), schedule, blocks, at);
                 self.replan(link, schedule, at, false);
             }
             Err(fault) => {
@@ -261,14 +261,23 @@ impl Task<'_> {
     pub(super) fn plan_again(&mut self, link: &mut Link, schedule: &mut Schedule, at: Timestamp) {
         self.bisection.restart();
         let blocks = plan::blocks_with_unpolled(&self.def, self.line, &self.unreadable, &self.requested);
-        self.use_plan(link, schedule, blocks, at);
+        self.use_plan(Some(link), schedule, blocks, at);
     }
 
-    fn use_plan(&mut self, link: &mut Link, schedule: &mut Schedule, blocks: Vec<Block>, at: Timestamp) {
+    pub(super) fn use_plan(
+        &mut self,
+        link: Option<&mut Link>,
+        schedule: &mut Schedule,
+        blocks: Vec<Block>,
+        at: Timestamp,
+    ) {
         self.stats.replan(&self.blocks, &blocks);
         self.stats.admit(&self.def, &self.settings, &blocks);
         schedule.replan(&blocks, at);
-        link.expect(&blocks);
+        match link {
+            Some(link) => link.expect(&blocks),
+            None => self.memory.replies.expect(&blocks),
+        }
         self.hangups.keep(&blocks);
         self.blocks = blocks;
     }

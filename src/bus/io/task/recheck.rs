@@ -47,6 +47,13 @@ impl Recheck {
         self.first.insert(device);
     }
 
+    /// Devices have other ids; those without one are other devices.
+    pub fn rename(&mut self, renamed: impl Fn(DeviceId) -> Option<DeviceId>) {
+        for devices in [&mut self.recalled, &mut self.first] {
+            *devices = devices.iter().filter_map(|device| renamed(*device)).collect();
+        }
+    }
+
     pub fn is_due(&self, now: Timestamp) -> bool {
         self.at <= now || !self.first.is_empty()
     }
@@ -83,7 +90,7 @@ impl Task<'_> {
                 tracing::info!(unit = block.unit, address = block.address, count = block.count, "can be read now");
                 self.unreadable.forget(block.unit);
                 self.in_flight.forget(block.unit);
-                link.allow(block.unit, self.def.device(block.device).limits.in_flight_max);
+                self.allow_in_flight(link);
                 self.replan(link, schedule, ended, true);
                 Ok(())
             }

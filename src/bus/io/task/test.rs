@@ -83,22 +83,26 @@ impl Task<'_> {
         step: &Step,
         alone: bool,
     ) -> Result<Option<Result<StepResult, LinkError>>, LinkExit> {
-        {
+        let cut = {
             let mut result = pin!(testing::step(link, step));
             loop {
                 let request = tokio::select! {
                     biased;
                     _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
                     result = &mut result => return Ok(Some(result)),
-                    request = self.requests.recv() => request?,
+                    request = self.requests.recv() => request,
+                };
+                let request = match request {
+                    Ok(request) => request,
+                    Err(interrupt) => break Err(interrupt),
                 };
                 if !self.on_request_during_diagnostic(request, alone).await? {
-                    break;
+                    break Ok(());
                 }
             }
-        }
+        };
         link.abandon();
-        Ok(None)
+        cut.map(|()| None).map_err(LinkExit::from)
     }
 
     /// The diagnostic has the port for itself, opened with the serial parameters that each step wants.
@@ -124,9 +128,9 @@ impl Task<'_> {
                 },
             };
             settings = wanted;
-            let result = self.step_unless_cut(&mut link, &step, true).await?;
+            let result = self.step_unless_cut(&mut link, &step, true).await;
             self.collect_stats(&mut link);
-            let Some(result) = result else { break };
+            let Some(result) = result? else { break };
             match (result, &mut self.job) {
                 (Ok(result), Some(job)) => job.on_result(result),
                 (Err(LinkError::Gone(why)), _) => {

@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::{LinkExit, Task};
 use crate::{
-    bus::diagnostics::Job,
+    bus::{diagnostics::Job, io::requests::Interrupt, schedule::Schedule},
     plant::{
         command::BusRequest,
         event::{Fault, LineState, WriteResult},
@@ -13,14 +13,22 @@ use crate::{
 
 impl Task<'_> {
     /// Waits without a port until a moment, or until an operator opens the line; refuses writes meanwhile.
-    pub(super) async fn wait(&mut self, mut until: Option<Timestamp>) -> Result<(), LinkExit> {
+    pub(super) async fn wait(&mut self, mut until: Option<Timestamp>, schedule: &mut Schedule) -> Result<(), LinkExit> {
         loop {
             let clock = self.clock;
             let request = tokio::select! {
                 biased;
                 _ = self.stop.wait_for(|stop| *stop) => return Err(LinkExit::Shutdown),
-                request = self.requests.recv() => request?,
+                request = self.requests.recv() => request,
                 () = clock.sleep_until_if_any(until) => return Ok(()),
+            };
+            let request = match request {
+                Err(Interrupt::Redefined) => {
+                    self.redefine(None, schedule).await?;
+                    self.publish_report(None).await?;
+                    continue;
+                }
+                request => request?,
             };
             match request {
                 BusRequest::Write(job) => {
@@ -47,7 +55,8 @@ impl Task<'_> {
                     self.job = Some(job);
                     if alone {
                         self.publish_state(LineState::Testing).await?;
-                        self.run_diagnostic_alone().await?;
+                        let tested = self.run_diagnostic_alone().await;
+                        self.unless_redefined(tested, schedule).await?;
                         // A line that an operator has closed stays closed.
                         if until.is_some() {
                             return Ok(());

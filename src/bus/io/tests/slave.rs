@@ -16,6 +16,7 @@ use crate::{
             clock::Clock,
             listening,
             live_reads::{LiveReads, LiveRequest},
+            redefine::Redefine,
             requests::Requests,
             task,
             transport::Connector,
@@ -242,6 +243,7 @@ pub struct Line {
     pub since: Instant,
     pub task: tokio::task::JoinHandle<()>,
     pub stop: watch::Sender<bool>,
+    pub redefines: mpsc::Sender<Redefine>,
 }
 
 pub fn line(def: PlantDef) -> Line {
@@ -270,9 +272,11 @@ fn start(
     let (requests, queue) = mpsc::channel(4);
     let (live, live_queue) = mpsc::channel(4);
     let (stop, stopped) = watch::channel(false);
+    let (redefines, redefine_queue) = mpsc::channel(1);
     let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
     let task = tokio::spawn(async move {
-        let (mut requests, mut live) = (Requests::new(queue), LiveReads::new(live_queue));
+        let mut requests = Requests::new(queue).redefined_by(redefine_queue);
+        let mut live = LiveReads::new(live_queue);
         let def = Arc::new(def);
         match def.lines[0].listens {
             false => {
@@ -284,7 +288,7 @@ fn start(
             }
         }
     });
-    Line { events, requests, live, ports, since: Instant::now(), task, stop }
+    Line { events, requests, live, ports, since: Instant::now(), task, stop, redefines }
 }
 
 impl Line {

@@ -16,6 +16,7 @@ use crate::plant::{
     expr::{Compare, Expr},
     fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SILENT, SV, TIC},
     id::WriteId,
+    line_report::LineReport,
     procedure::ProcedureState,
     record::AlarmEvent,
     sample::{Cause, Sample},
@@ -155,6 +156,21 @@ fn a_removed_tag_ends_its_curve_and_no_other() {
         let was = before.def.tag_named(&tag.name).expect("it was there");
         assert_eq!(after.sample(tag.id), before.sample(was), "{}", tag.name);
     }
+}
+
+#[test]
+fn a_line_without_one_of_its_tags_keeps_its_port() {
+    let mut plant = plant();
+    let report = LineReport { refused: vec![SV, DP], ..LineReport::new(def().lines[0].clone()) };
+    plant.on_event(Event::Report { at: at(2), line: L1, report: Arc::new(report) });
+    let before = plant.snapshot();
+    assert_eq!(def().changed_lines(&without_sv()), "line L1 keeps its connection, line L2 keeps running");
+    redefine(&mut plant, 4, without_sv());
+    let after = plant.snapshot();
+    let states = |snapshot: &crate::plant::Snapshot| [L1, L2].map(|line| snapshot.line(line).state.clone());
+    assert_eq!((states(&after), &after.devices), (states(&before), &before.devices));
+    let refused = after.line(L1).report.as_ref().map(|report| report.refused.clone());
+    assert_eq!(refused, Some(vec![TagId(DP.0 - 1)]), "under its new id");
 }
 
 #[test]
