@@ -81,14 +81,14 @@ async fn a_wide_scan_misses_no_unit_behind_a_slow_gateway() {
 }
 
 #[tokio::test]
-async fn a_wide_scan_misses_no_unit_of_a_device_that_serves_one_connection_at_a_time() {
+async fn a_wide_scan_misses_no_unit_behind_one_served_connection() {
     for units in [UNITS, &[40]] {
         assert_eq!(scanned(line_to(units, Duration::ZERO, false).await).await, units);
     }
 }
 
 #[tokio::test]
-async fn a_device_that_answers_at_once_whenever_it_is_asked_is_not_called_deaf() {
+async fn a_unit_that_is_asked_late_and_answers_is_not_called_deaf() {
     let mut connection = open(&line_to(UNITS, Duration::ZERO, true).await).await.expect("it accepts");
     connection.opened -= 2 * DEAF_MAX;
     let read = Diagnostic::Read { unit: 3, table: crate::plant::tag::Table::Holding, address: 0, count: 1 };
