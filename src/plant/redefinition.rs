@@ -25,7 +25,7 @@ impl PlantDef {
     }
 
     /// The line here whose port a line of another definition goes on with: nothing of the line itself is other. One that only
-    /// listens is heard anew.
+    /// listens starts again.
     pub fn same_port(&self, other: &PlantDef, line: LineId) -> Option<LineId> {
         let now = other.line(line);
         let was = self.lines.iter().find(|was| was.name == now.name)?;

@@ -287,7 +287,6 @@ fn assemble(
     let (to_sessions, reloads) = mpsc::channel(1);
     tasks.push(tokio::spawn(server.run(attach_requests, requests, reloads, stopped)));
     let senders = Senders { events, audit, store, queries, history_file, plant: to_plant, sessions: to_sessions };
-    let (north, reports) = (None, None);
     let mut station = Station {
         acceptor,
         commands,
@@ -299,8 +298,8 @@ fn assemble(
         run,
         clock,
         lines,
-        north,
-        reports,
+        north: None,
+        reports: None,
         senders,
         stop,
         tasks,

@@ -70,6 +70,7 @@ fn line_words() -> &'static [&'static str] {
         "cancelled by an urgent stop",
         "the line was closed",
         "the plant file was reloaded",
+        "the users file was reloaded",
         "the line is not connected",
         "{place}: no connection within {seconds} s",
         "{place}: refused (is the device on, is the TCP port right?)",

@@ -232,7 +232,8 @@ async fn a_line_that_goes_and_comes_leaves_the_other_as_it_is() {
     let ports = slaves.each_ref().map(|slave| slave.port);
     let text = plant(ports, "Both", 1_000);
     let mut station = Station::start(folder.path(), &text).await;
-    let before = station.until("all values", |now| is_good(now, &ALL)).await;
+    let stored_all = |now: &Snapshot| is_good(now, &ALL) && now.history.committed_at.is_some();
+    let before = station.until("all values, and a history", stored_all).await;
     let lines: Vec<usize> = text.match_indices("[[line]]").map(|(at, _)| at).collect();
     let (done, said) = station.reload(&format!("{}{}", &text[..lines[0]], &text[lines[1]..]));
     assert!(done && said.contains("line B keeps running, line A ends"), "{said}");

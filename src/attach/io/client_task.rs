@@ -127,11 +127,18 @@ impl ClientTask {
                 }
             }
         };
-        tokio::select! {
+        let end = tokio::select! {
             end = conversation => end,
             error = receive_messages(read, inbound) => Disconnected::Gone(error.to_string()),
             error = send_messages(write, outbound) => Disconnected::Gone(error.to_string()),
+        };
+        // A reply that came just before the end counts.
+        while let Ok(message) = incoming.try_recv() {
+            if self.on_message(message).is_err() {
+                break;
+            }
         }
+        end
     }
 
     /// Handles a message of the station.

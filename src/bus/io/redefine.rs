@@ -10,7 +10,7 @@ use crate::plant::{PlantDef, command::BusRequest, def::LineId};
 /// Lets a line pause between two requests, so that nothing is said under ids of before once the plant has others.
 #[derive(Debug)]
 pub struct Redefine {
-    /// Told when it pauses. Dropped: it has failed.
+    /// Answered when it pauses. Dropped: it has failed.
     pub paused: oneshot::Sender<()>,
     /// What it goes on under. Dropped: as before.
     pub next: oneshot::Receiver<LineDefinition>,

@@ -36,7 +36,7 @@ pub(in crate::station) struct Reload {
     pub plant: Option<NewPlant>,
     /// The digest of the users that were taken from their file.
     pub users: Option<String>,
-    /// Told when the plant goes on with both.
+    /// Answered when the plant goes on with both.
     pub done: oneshot::Sender<()>,
 }
 

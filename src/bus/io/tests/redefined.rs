@@ -77,7 +77,7 @@ async fn other_ids_close_no_port_and_read_nothing_again() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_new_tag_is_read_at_once_and_a_changed_device_anew() {
+async fn a_new_tag_and_a_changed_device_are_read_at_once() {
     for mode in Mode::ALL {
         let def = plant(mode);
         let mut other = def.clone();
@@ -96,7 +96,7 @@ async fn a_new_tag_is_read_at_once_and_a_changed_device_anew() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_device_that_does_not_answer_is_not_asked_anew_for_another_one() {
+async fn a_silent_device_stays_given_up_under_another_definition() {
     for mode in Mode::ALL {
         let def = plant(mode);
         let mut other = def.clone();

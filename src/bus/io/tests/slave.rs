@@ -101,8 +101,9 @@ pub fn plant(mode: Mode) -> PlantDef {
         alignment: 1,
         in_flight_max: if mode == Mode::Tcp16 { 16 } else { 1 },
     };
-    def.devices =
-        (0..2).map(|n| DeviceDef { id: DeviceId(n), unit: n as u8 + 1, limits, ..def.devices[0].clone() }).collect();
+    let first = def.devices[0].clone();
+    let device = |id, unit| DeviceDef { id, name: format!("U{unit}"), unit, limits, ..first.clone() };
+    def.devices = (0..2).map(|n| device(DeviceId(n), n as u8 + 1)).collect();
     let every = Poll::Every(Duration::from_secs(1));
     let rows: Vec<(u16, Poll)> = [10, 11, 12, 13, 20, 21, 22, 23, 400]
         .into_iter()
