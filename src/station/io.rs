@@ -32,9 +32,7 @@ use crate::{
     plant::{
         Plant, PlantDef,
         command::{Command, CommandId, CommandKind, CommandStatus},
-        def::DeviceId,
         event::Event,
-        line_finding::DeviceFinding,
         record::ChainHash,
         snapshot::HistoryStatus,
         station::{FaultState, STATION, StationFault},
@@ -225,11 +223,12 @@ fn start_lines(
     clock: Clock,
     connectors: Vec<Connector>,
     events: &mpsc::Sender<Event>,
-    found: &[(DeviceId, DeviceFinding)],
+    found: Option<&FoundFile>,
 ) -> Vec<Line> {
+    let found = found.map(|found| found.of(def)).unwrap_or_default();
     let started = def.lines.iter().zip(connectors).map(|(line, connector)| {
         let mut started = Line::default();
-        started.start(def, line.id, clock, connector, events, found);
+        started.start(def, line.id, clock, connector, events, &found);
         started
     });
     started.collect()
@@ -251,8 +250,7 @@ fn assemble(
     let (stop, stopped) = watch::channel(false);
     let (events, event_queue) = mpsc::channel(EVENTS);
     let (commands, command_queue) = mpsc::channel(COMMANDS_MAX);
-    let found = persistence.found.as_ref().map(|found| found.of(&def)).unwrap_or_default();
-    let lines = start_lines(&def, clock, connectors, &events, &found);
+    let lines = start_lines(&def, clock, connectors, &events, persistence.found.as_ref());
     let first = plant.snapshot();
     let run = first.run;
     let (publish, snapshots) = watch::channel(Arc::new(first));

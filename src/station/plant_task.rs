@@ -185,12 +185,6 @@ impl PlantTask {
         self.keep_found();
     }
 
-    fn keep_found(&mut self) {
-        if let Some(found) = &mut self.persistence.found {
-            found.update(self.plant.def(), self.plant.lines());
-        }
-    }
-
     /// Waits for the history, but no longer than this.
     async fn await_history(&mut self, max: Duration) {
         if let Ok(restored) = timeout(max, Past::known(&mut self.persistence.past)).await {
@@ -217,12 +211,7 @@ impl PlantTask {
                 Err(_) => tracing::error!("the folder of the parameter sets does not respond: task abandoned"),
             }
         }
-        self.keep_found();
-        if let Some(found) = self.persistence.found.take()
-            && timeout(FILES_MAX, found.written()).await.is_err()
-        {
-            tracing::error!("the folder of the history does not respond: what was found of devices is not kept");
-        }
+        self.finish_found().await;
         let ended = self.plant.on_stop();
         self.dispatch(ended.records);
         let stopped = entries::stopped(&self.plant.def().name, self.clock.utc());

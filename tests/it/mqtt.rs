@@ -128,8 +128,16 @@ impl Place {
         let plant = fs::read_to_string(self.path("tank.toml")).unwrap();
         assert!(plant.contains(text));
         fs::write(self.path("tank.toml"), plant.replacen(text, other, 1)).unwrap();
-        let output = sightglass().arg("reload").env("XDG_RUNTIME_DIR", &self.sockets).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let end = Instant::now() + TIMEOUT;
+        loop {
+            let output = sightglass().arg("reload").env("XDG_RUNTIME_DIR", &self.sockets).output().unwrap();
+            let said = String::from_utf8_lossy(&output.stderr);
+            if output.status.success() {
+                return;
+            }
+            // Whoever asks for the status again and again is asked to wait.
+            assert!(said.contains("attached recently") && Instant::now() < end, "{said}");
+        }
     }
 
     /// Waits until all that was stored before a moment is sent. The numbers do not say it: a deadband keeps values back.

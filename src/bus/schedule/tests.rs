@@ -179,17 +179,6 @@ fn units_that_never_answer_are_all_given_up_within_seconds() {
 }
 
 #[test]
-fn a_try_of_which_nothing_is_reported_is_not_made_again_at_once() {
-    let mut schedule = Schedule::new(&[block(0, every(1000))], at(0));
-    schedule.answered(None, DeviceId(0), Some(Duration::from_millis(10)), at(0));
-    schedule.done(0, at(0), at(300));
-    schedule.failed(Some(0), DeviceId(0), Failure::Silence, (at(0), Duration::from_millis(300)), at(300));
-    assert_eq!(schedule.next(at(300)), Next::Run(0));
-    schedule.done(0, at(300), at(300));
-    assert_eq!(schedule.next(at(300)), Next::WaitUntil(at(1300)));
-}
-
-#[test]
 fn a_device_at_rest_is_not_asked() {
     let mut schedule = Schedule::new(&[block(0, every(100))], at(0));
     schedule.hold_off(DeviceId(0), at(700));

@@ -1,8 +1,8 @@
-//! Saves settings into the plant file and parameter sets into their folder, on threads of their own.
+//! Saves settings into the plant file, parameter sets into their folder and what was found of devices, on threads of their own.
 
-use tokio::task::JoinHandle;
+use tokio::{task::JoinHandle, time::timeout};
 
-use super::PlantTask;
+use super::{FILES_MAX, PlantTask};
 use crate::{
     plant::{SetWork, command::CommandId, def::LineDef},
     profile::PlantFile,
@@ -40,6 +40,23 @@ pub(super) async fn filed(filing: &mut Option<JoinHandle<sets::Done>>) -> Result
 }
 
 impl PlantTask {
+    /// Has what was found of devices written down beside the loop, if it is news.
+    pub(super) fn keep_found(&mut self) {
+        if let Some(found) = &mut self.persistence.found {
+            found.update(self.plant.def(), self.plant.lines());
+        }
+    }
+
+    /// The same at the end.
+    pub(super) async fn finish_found(&mut self) {
+        self.keep_found();
+        if let Some(found) = self.persistence.found.take()
+            && timeout(FILES_MAX, found.written()).await.is_err()
+        {
+            tracing::error!("the folder of the history does not respond: what was found of devices is not kept");
+        }
+    }
+
     /// Has the folder of parameter sets worked on beside the loop, one work at a time.
     pub(super) fn file_sets(&mut self, work: SetWork) {
         let refused = match (&self.persistence.sets, &self.filing) {

@@ -46,3 +46,14 @@ fn a_block_that_has_died_costs_a_twentieth_of_the_line() {
     let dead = tries.iter().filter(|at| 10_000 <= **at).count();
     assert!((8..=22).contains(&dead), "{dead} timeouts of a second in 300 s");
 }
+
+#[test]
+fn a_try_of_which_nothing_is_reported_is_not_made_again_at_once() {
+    let mut schedule = Schedule::new(&[block(0, every(1000))], at(0));
+    schedule.answered(None, DeviceId(0), Some(Duration::from_millis(10)), at(0));
+    schedule.done(0, at(0), at(300));
+    schedule.failed(Some(0), DeviceId(0), Failure::Silence, (at(0), Duration::from_millis(300)), at(300));
+    assert_eq!(schedule.next(at(300)), Next::Run(0));
+    schedule.done(0, at(300), at(300));
+    assert_eq!(schedule.next(at(300)), Next::WaitUntil(at(1300)));
+}
