@@ -78,6 +78,14 @@ impl Hangups {
         self.suspects.is_empty().then(|| std::mem::take(&mut self.together)).filter(|together| 0 < *together)
     }
 
+    /// A block was not answered on a connection that has not ended in all the time: it does not end connections.
+    pub fn outlived(&mut self, block: &Block) {
+        self.suspects.retain(|suspect| suspect != block);
+        if self.suspects.is_empty() {
+            self.together = 0;
+        }
+    }
+
     /// Blocks have other names; those without one are no longer asked for.
     pub fn rename(&mut self, renamed: impl Fn(Block) -> Option<Block>) {
         self.suspects = std::mem::take(&mut self.suspects).into_iter().filter_map(renamed).collect();

@@ -181,6 +181,10 @@ impl Task<'_> {
         (began, took): (Timestamp, Duration),
     ) -> Result<(), LinkExit> {
         let at = self.clock.now();
+        if fault == Fault::Timeout {
+            self.hangups.outlived(block);
+            link.set_alone(!self.hangups.is_clear());
+        }
         // It has answered, and is left alone until nothing more can come.
         if let Some(settles_in) = link.settles_in(block.unit).filter(|_| fault == Fault::OutOfSync) {
             schedule.hold_off(block.device, at + self.clock.plant_span(settles_in));

@@ -253,3 +253,26 @@ async fn a_strange_transaction_is_named() {
     };
     line.until(&def, named).await;
 }
+
+/// A gateway that closes each connection after a while, with a unit behind it that never answers: of the other nothing is lost.
+#[tokio::test(start_paused = true)]
+async fn a_dead_unit_is_not_why_a_gateway_closes_its_connections() {
+    for mode in [Mode::Tcp, Mode::Tcp16, Mode::RtuOverTcp] {
+        let def = plant(mode);
+        let mut line = line(def.clone());
+        for _ in 0..100 {
+            let mut since = None;
+            line.plug(mode, move |_, message| {
+                let since = *since.get_or_insert_with(tokio::time::Instant::now);
+                match message[0] {
+                    _ if Duration::from_secs(6) <= since.elapsed() => SlaveAction::HangUp,
+                    2 => SlaveAction::Silent,
+                    _ => SlaveAction::Answer,
+                }
+            });
+        }
+        let (reads, faults, lost) = reads_until(&mut line, &def, 120).await;
+        assert!(100 < reads[&12], "{mode:?}: {reads:?}");
+        assert_eq!((faults, lost), (vec![], 0), "{mode:?}");
+    }
+}
