@@ -142,21 +142,31 @@ pub fn find_answer(framing: Framing, message: &[u8], buffer: &[u8]) -> FrameMatc
     }
 }
 
+/// Where bytes begin as the answer does.
+fn beginnings<'a>(message: &[u8], buffer: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
+    (0..buffer.len()).map(|start| &buffer[start..]).filter(|rest| frame::begins_answer(message, rest))
+}
+
+/// What is wrong with bytes that begin as the answer and end with a good CRC, but not where they say.
+fn misfit(message: &[u8], buffer: &[u8]) -> Option<Fault> {
+    let checked = |rest| frame::check_answer(Framing::Rtu, message, frame::without_crc(rest).ok()?).err();
+    beginnings(message, buffer).find_map(checked)
+}
+
 /// Looks for a frame with a good CRC at the beginning, then behind noise.
 fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
-    let begins = |rest: &[u8]| frame::begins_answer(message, rest);
     for start in 0..buffer.len() {
         let Some(answer) = good_frame(message, &buffer[start..]) else { continue };
         let end = start + answer.len() + 2;
         match frame::check_answer(Framing::Rtu, message, answer) {
             Ok(()) | Err(Fault::Exception(_)) => return FrameMatch::Answer(start..end),
             // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
-            Err(_) if (0..start).any(|earlier| begins(&buffer[earlier..])) => {}
+            Err(_) if (0..start).any(|earlier| frame::begins_answer(message, &buffer[earlier..])) => {}
             Err(fault) => return FrameMatch::Foreign(end, fault),
         }
     }
     // No good frame yet. Is there one of the right beginning and full length, but corrupt?
-    let mut beginnings = (0..buffer.len()).map(|start| &buffer[start..]).filter(|rest| begins(rest)).peekable();
+    let mut beginnings = beginnings(message, buffer).peekable();
     if beginnings.peek().is_none() {
         return FrameMatch::Nothing;
     }
@@ -169,7 +179,7 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
         let expected = expected_length(Framing::Rtu, message);
         Some(cut.map_or(fault, |got| Fault::Truncated { got: to_u16(got), expected: to_u16(expected) }))
     });
-    corrupt.map_or(FrameMatch::Begun, FrameMatch::Corrupt)
+    corrupt.map_or(FrameMatch::Begun, |fault| FrameMatch::Corrupt(misfit(message, buffer).unwrap_or(fault)))
 }
 
 /// The message of the frame that bytes begin with, if its check fits: as long as its own bytes or the request say.
@@ -200,6 +210,9 @@ pub fn left_over(framing: Framing, message: &[u8], buffer: &[u8]) -> Fault {
     }
     if buffer.is_empty() {
         return Fault::Timeout;
+    }
+    if let Some(fault) = misfit(message, buffer) {
+        return fault;
     }
     let expected = expected_length(framing, message);
     if buffer.len() < expected {
@@ -345,6 +358,19 @@ mod tests {
         assert_eq!(reply(Framing::Rtu, &request, &came), Ok((1..8, None)));
         assert!(find_reply(Framing::Rtu, &request, &came, false).is_err());
         assert_eq!(reply(Framing::Rtu, &request, &with_crc(&[1, 0xC1, 1])), Ok((0..5, Some(1))));
+    }
+
+    #[test]
+    fn a_wrong_byte_count_under_a_good_check_is_no_fault_of_the_line() {
+        for (count, got) in [(&[][..], 6), (&[0, 4], 8), (&[2], 2)] {
+            let bytes = with_crc(&[&[1, 3], count, &[0, 10, 0, 11]].concat());
+            let fault = Fault::WrongLength { got, asked: if got == 2 { 4 } else { 7 } };
+            check(&bytes, FrameMatch::Corrupt(fault));
+        }
+        // It announces more than comes: only silence shows that this was all.
+        let bytes = with_crc(&[1, 3, 74, 0, 10, 0, 11]);
+        check(&bytes, FrameMatch::Begun);
+        assert_eq!(left_over(Framing::Rtu, &REQUEST, &bytes), Fault::WrongLength { got: 74, asked: 4 });
     }
 
     #[test]
