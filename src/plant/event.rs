@@ -269,6 +269,8 @@ impl Fault {
 pub struct ExceptionCode(pub u8);
 
 impl ExceptionCode {
+    /// A refusal that gives no reason.
+    pub const NONE: ExceptionCode = ExceptionCode(0);
     /// The device does not know the function.
     pub const ILLEGAL_FUNCTION: ExceptionCode = ExceptionCode(1);
     /// Nothing is at this address, or it cannot be written.

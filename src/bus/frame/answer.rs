@@ -112,7 +112,7 @@ pub fn answers(framing: Framing, request: &[u8], answer: &[u8]) -> bool {
 
 /// Checks a whole answer message, free of line errors, against its request: unit, function, and every field that the request
 /// or the answer itself determines. An exception answer is [`Fault::Exception`]; over Modbus TCP, where the header says where
-/// it ends, some devices send more bytes behind its code.
+/// it ends, some devices send more bytes behind its code, and some none at all.
 pub fn check_answer(framing: Framing, request: &[u8], answer: &[u8]) -> Result<(), Fault> {
     let (&[asked_unit, asked, ..], &[unit, function, ..]) = (request, answer) else {
         return Err(Fault::Truncated { got: to_u16(answer.len()), expected: 3 });
@@ -124,6 +124,7 @@ pub fn check_answer(framing: Framing, request: &[u8], answer: &[u8]) -> Result<(
         return match answer {
             [_, _, code] => Err(Fault::Exception(ExceptionCode(*code))),
             [_, _, code, ..] if framing == Framing::Mbap => Err(Fault::Exception(ExceptionCode(*code))),
+            [_, _] if framing == Framing::Mbap => Err(Fault::Exception(ExceptionCode::NONE)),
             [_, _] => Err(Fault::Truncated { got: 2, expected: 3 }),
             _ => Err(wrong_length(answer.len() - 2, 1)),
         };

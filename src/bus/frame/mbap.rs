@@ -159,6 +159,8 @@ mod tests {
         let values = [1, 3, 10, 0, 1, 0, 2, 0, 3, 0, 4, 0, 5];
         assert_eq!(check_answer(Framing::Mbap, &ASKED, &values), Ok(()));
         assert!(check_answer(Framing::Mbap, &ASKED, &[&values[..], &[0]].concat()).is_err(), "no normal answer");
-        assert!(check_answer(Framing::Mbap, &ASKED, &[1, 0x83]).is_err(), "no code");
+        let without_code = Err(Fault::Exception(ExceptionCode::NONE));
+        assert_eq!(check_answer(Framing::Mbap, &ASKED, &[1, 0x83]), without_code);
+        assert_ne!(check_answer(Framing::Rtu, &ASKED, &[1, 0x83]), without_code, "only a header says that this is all");
     }
 }
