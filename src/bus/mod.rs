@@ -15,7 +15,7 @@
 //! | `pdu` | the fields of every function |
 //! | [`codec`], [`interpret`] | words to numbers and back; everything that words may mean |
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
-//! | [`hangup`], [`in_flight`], [`other_master`] | what ended a connection; how much a unit takes at once; who else asks |
+//! | [`hangup`], [`in_flight`], [`request_gap`], [`other_master`] | what ended a connection; how much a unit takes at once, and how soon; who else asks |
 //! | [`line_stats`] | what is counted |
 //! | [`diagnostics`], [`live`], [`recognise`] | the steps of a diagnostic and of a live read; which device it looks like |
 //! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
@@ -45,6 +45,7 @@ pub mod admission;
 pub mod late_reply;
 pub mod hangup;
 pub mod in_flight;
+pub mod request_gap;
 pub mod other_master;
 pub mod diagnostics;
 pub mod live;

@@ -59,6 +59,11 @@ pub enum DeviceFinding {
         /// How many.
         count: u16,
     },
+    /// It does not hear a request that comes sooner after its response.
+    RequestGap {
+        /// As found.
+        gap: Duration,
+    },
 }
 
 /// A fact about a device or a connection.
@@ -105,6 +110,9 @@ impl fmt::Display for DeviceFinding {
             }
             DeviceFinding::Unreadable { table, address, count } => {
                 t!("table {table}: no address {address}, {count} in all", table = table.word(), address, count)
+            }
+            DeviceFinding::RequestGap { gap } => {
+                t!("does not hear a request sooner after its response: request_gap_ms = {ms}", ms = gap.as_millis())
             }
         })
     }

@@ -9,6 +9,7 @@
 //! Writes are made, and answers read, by tokio-modbus, with a fresh context for every request on one end of a pipe; the PDU
 //! of a poll is its block's, and what travels on the port is ours.
 
+mod gaps;
 mod outstanding;
 mod raw;
 mod receive;
@@ -202,6 +203,7 @@ impl Link {
             Err(fault) => self.count_fault(message, *fault),
         }
         self.note_silence(matches!(received.answer, Err(Fault::Timeout)));
+        self.keep_request_gap(message, sent_at, &received.answer);
         self.remember_exchange(frame, received, sent_at).map_err(LinkError::Fault)
     }
 
@@ -248,26 +250,6 @@ impl Link {
     /// Another response timeout from now on: a poll or a step of a diagnostic has its own.
     pub fn set_timeout(&mut self, timeout: Duration) {
         self.timeout = timeout;
-    }
-
-    /// Nothing is sent to a unit for this long (plant time): it wants a gap between two requests.
-    pub fn set_unit_gap(&mut self, unit: u8, plant: Duration) {
-        let now = Instant::now();
-        self.gaps.retain(|(other, until)| *other != unit && now < *until);
-        self.gaps.push((unit, now + self.wire.clock().real_span(plant)));
-    }
-
-    /// What is sent next waits for the end of its unit's gap.
-    fn keep_gap(&mut self, unit: Option<u8>) {
-        if let Some(until) = unit.and_then(|unit| self.gap_of(unit)) {
-            self.wire.hold_off(until.saturating_duration_since(Instant::now()));
-        }
-    }
-
-    /// The end of the gap that a unit is kept in now.
-    fn gap_of(&self, unit: u8) -> Option<Instant> {
-        let now = Instant::now();
-        self.gaps.iter().find(|(resting, until)| *resting == unit && now < *until).map(|(_, until)| *until)
     }
 
     /// Nothing is sent for this long (plant time), for devices that need it.

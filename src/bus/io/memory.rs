@@ -4,7 +4,7 @@ use tokio::time::Instant;
 
 use super::clock::Clock;
 use crate::{
-    bus::{late_reply::LineReplies, other_master::OtherMaster, plan::Block},
+    bus::{late_reply::LineReplies, other_master::OtherMaster, plan::Block, request_gap::RequestGaps},
     plant::{def::LineDef, event::LineCounters, line_finding::OtherMasterHeard, number::to_u16},
 };
 
@@ -16,6 +16,8 @@ pub struct LineMemory {
     /// Outstanding replies of each unit.
     pub(super) replies: LineReplies,
     pub(super) other_master: OtherMaster,
+    /// How soon each unit hears the next request.
+    pub(super) request_gaps: RequestGaps,
     pub(super) created_at: Instant,
     /// The last request was cut off with its connection.
     pub(super) is_cut: bool,
@@ -29,6 +31,7 @@ impl LineMemory {
             counters: LineCounters::default(),
             replies: LineReplies::new(line.timeout, seed),
             other_master: OtherMaster::default(),
+            request_gaps: RequestGaps::default(),
             created_at: Instant::now(),
             is_cut: false,
         }

@@ -70,10 +70,12 @@ pub async fn run(
 ) {
     let mut unreadable = UnreadableRanges::default();
     let mut in_flight = InFlight::default();
+    let mut memory = LineMemory::new(def.line(line), clock);
     let own = || found.iter().map(|(id, found)| (def.device(*id), *found)).filter(|(device, _)| device.line == line);
     for (device, found) in own() {
         unreadable.recall(device.unit, found);
         in_flight.recall(device.unit, found);
+        memory.request_gaps.recall(device.unit, found);
     }
     let blocks = plan::blocks(&def, line, &unreadable);
     let task = Task {
@@ -96,7 +98,7 @@ pub async fn run(
         deaf: None,
         refused_all: BTreeMap::new(),
         schedule: Schedule::new(&blocks, clock.now()),
-        memory: LineMemory::new(def.line(line), clock).expect(&blocks),
+        memory: memory.expect(&blocks),
         settings: def.line(line).clone(),
         clock,
         connector,

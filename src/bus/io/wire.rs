@@ -15,6 +15,7 @@ use crate::{
         frame::{self, Unsolicited},
         late_reply::LineReplies,
         other_master::OtherMaster,
+        request_gap::RequestGaps,
     },
     plant::{
         def::{Framing, LineDef},
@@ -49,6 +50,8 @@ pub struct Wire {
     /// Outstanding replies of each unit.
     pub replies: LineReplies,
     other_master: OtherMaster,
+    /// How soon each unit hears the next request.
+    pub request_gaps: RequestGaps,
     /// Bytes that no request waits for, until silence shows that their frame has ended.
     stray: Vec<u8>,
     /// Bytes that are further apart than this (real time) are of two frames.
@@ -66,7 +69,7 @@ pub struct Wire {
 impl Wire {
     /// A freshly opened port; `memory` goes on from an earlier opening.
     pub fn new(port: Box<dyn Stream>, pause: Pause, line: &LineDef, clock: Clock, memory: LineMemory) -> Wire {
-        let LineMemory { counters, mut replies, other_master, created_at, is_cut } = memory;
+        let LineMemory { counters, mut replies, other_master, request_gaps, created_at, is_cut } = memory;
         let (char_time, silent_interval) = match line.transport.serial() {
             // The frames of ASCII have a beginning and an end of their own.
             Some(serial) if line.transport.framing() == Framing::Ascii => (serial.char_time(), line.gap),
@@ -95,6 +98,7 @@ impl Wire {
             created_at,
             replies,
             other_master,
+            request_gaps,
             stray: Vec::new(),
             frame_timeout: clock.real_span(silent_interval).max(line.frame_timeout),
             frames: Vec::new(),
@@ -123,7 +127,8 @@ impl Wire {
     pub fn memory(&self) -> LineMemory {
         let (counters, created_at) = (self.counters, self.created_at);
         let (replies, other_master) = (self.replies.clone(), self.other_master.clone());
-        LineMemory { counters, replies, other_master, created_at, is_cut: false }
+        let request_gaps = self.request_gaps.clone();
+        LineMemory { counters, replies, other_master, request_gaps, created_at, is_cut: false }
     }
 
     /// Nothing is sent for this long (real time).

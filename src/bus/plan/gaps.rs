@@ -68,7 +68,7 @@ impl UnreadableRanges {
                 let start = u32::from(address);
                 self.add(unit, table, start, start + u32::from(count));
             }
-            DeviceFinding::InFlight { .. } => {}
+            DeviceFinding::InFlight { .. } | DeviceFinding::RequestGap { .. } => {}
         }
     }
 
@@ -91,7 +91,7 @@ impl UnreadableRanges {
             DeviceFinding::Unreadable { table, address, count } => {
                 Some(AddressSpan { table, address, count }).filter(|span| span.count <= USUAL_MOST)
             }
-            DeviceFinding::InFlight { .. } => None,
+            DeviceFinding::InFlight { .. } | DeviceFinding::RequestGap { .. } => None,
         };
         self.of(unit).filter_map(request).collect()
     }

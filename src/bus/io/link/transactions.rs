@@ -40,9 +40,10 @@ pub struct Ended {
 }
 
 impl Link {
-    /// How many requests a unit takes at once, over Modbus TCP.
+    /// How many requests a unit takes at once, over Modbus TCP; one that wants a gap between them takes one.
     pub fn allow(&mut self, unit: u8, in_flight_max: u16) {
-        self.transactions.limits[usize::from(unit)] = in_flight_max.max(1);
+        let most = if self.wire.request_gaps.of(unit).is_zero() { in_flight_max.max(1) } else { 1 };
+        self.transactions.limits[usize::from(unit)] = most;
     }
 
     /// From now on one request at a time is under way, or as many as the units take.
@@ -259,6 +260,7 @@ impl Link {
             self.wire.record(false, frame.clone(), result);
         }
         self.wire.hold_off(self.wire.silent_interval);
+        self.keep_request_gap(&request.message, sent_at, &answer);
         let exchange = Exchange {
             at: self.wire.clock().to_utc(self.wire.clock().at(sent_at)),
             framing: Framing::Mbap,

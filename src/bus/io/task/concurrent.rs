@@ -26,8 +26,8 @@ pub(super) struct UnderWay {
     index: usize,
     block: Block,
     began: Timestamp,
-    /// Which try this is.
-    tries: u8,
+    /// What was wrong with the answer to its first try, if this is the second.
+    misfit: Option<Fault>,
     /// Others that were under way when it was sent.
     beside: usize,
 }
@@ -44,10 +44,16 @@ impl Task<'_> {
         let mut next = Next::Run(first);
         let full = loop {
             let Next::Run(index) = next else { break false };
+            // After a write, say, or a read-back.
+            if let Some(left) = link.gap_left(self.blocks[index].unit) {
+                schedule.keep_gap(self.blocks[index].device, now + left);
+                next = schedule.next(now);
+                continue;
+            }
             if !link.has_room(self.blocks[index].unit) {
                 break true;
             }
-            self.begin(link, schedule, (index, self.blocks[index].clone()), now, 1);
+            self.begin(link, schedule, (index, self.blocks[index].clone()), now, None);
             schedule.begin(index, now);
             if link.is_full() {
                 break true;
@@ -89,31 +95,33 @@ impl Task<'_> {
         schedule: &Schedule,
         (index, block): (usize, Block),
         began: Timestamp,
-        tries: u8,
+        misfit: Option<Fault>,
     ) {
         let response_timeout = schedule.response_timeout(index);
         let id = link.submit(&block.request(), response_timeout);
         let beside = self.under_way.len();
-        self.under_way.push(UnderWay { id, index, block, began, tries, beside });
+        self.under_way.push(UnderWay { id, index, block, began, misfit, beside });
     }
 
     /// Takes what has come of the requests under way.
     pub(super) async fn receive_replies(&mut self, link: &mut Link, schedule: &mut Schedule) -> Result<(), LinkExit> {
         for Answered { id, answer, at, mut exchange } in link.take_ended() {
             let Some(place) = self.under_way.iter().position(|read| read.id == id) else { continue };
-            let UnderWay { index, block, began, tries, beside, .. } = self.under_way.swap_remove(place);
+            let UnderWay { index, block, began, misfit, beside, .. } = self.under_way.swap_remove(place);
             let index = self.place_of(index, &block);
             let answer = answer.and_then(|answer| parse(&block, answer));
-            if let (Err(fault), Some(index), 1) = (&answer, index, tries)
+            if let (Err(fault), Some(index), None) = (&answer, index, misfit)
                 && fault.is_corrupt()
                 && link.has_room(block.unit)
+                && link.gap_left(block.unit).is_none()
             {
                 // A retry that cures it must not hide it.
                 self.stats.polled(Some(index), block.device, Err(*fault), None, 1);
-                self.begin(link, schedule, (index, block), self.clock.now(), 2);
+                let misfit = Some(*fault);
+                self.begin(link, schedule, (index, block), self.clock.now(), misfit);
                 continue;
             }
-            Arc::make_mut(&mut exchange).tries = tries;
+            Arc::make_mut(&mut exchange).tries = if misfit.is_some() { 2 } else { 1 };
             let ended = self.clock.at(at);
             let device = self.def.device(block.device);
             // It has taken one of the places that there are.
@@ -125,7 +133,7 @@ impl Task<'_> {
             if let Some(index) = index {
                 let served = schedule.done(index, began, ended);
                 self.stats.served(index, served.jitter, served.missed);
-                self.keep_gap(link, schedule, &block, ended);
+                Self::keep_gap(link, schedule, &block, ended);
             }
             let outcome = ReadResult { began, ended, took, on_wire, answer, exchange: Some(exchange) };
             self.finish_poll(link, schedule, index, &block, outcome).await?;
@@ -162,18 +170,18 @@ impl Task<'_> {
         Ok(true)
     }
 
-    /// The connection is gone: what was under way on it.
-    pub(super) fn cut_off(&mut self, schedule: &mut Schedule) -> Vec<Block> {
+    /// The connection is gone: what was under way on it, and what was wrong with the answer to its first try.
+    pub(super) fn cut_off(&mut self, schedule: &mut Schedule) -> Vec<(Block, Option<Fault>)> {
         let now = self.clock.now();
-        let mut cut = std::mem::take(&mut self.cut);
-        for UnderWay { index, block, began, .. } in std::mem::take(&mut self.under_way) {
+        let mut cut: Vec<_> = std::mem::take(&mut self.cut).into_iter().map(|block| (block, None)).collect();
+        for UnderWay { index, block, began, misfit, .. } in std::mem::take(&mut self.under_way) {
             if let Some(index) = self.place_of(index, &block) {
                 let served = schedule.done(index, began, now);
                 self.stats.served(index, served.jitter, served.missed);
             }
-            cut.push(block);
+            cut.push((block, misfit));
         }
-        let places = cut.iter().filter_map(|block| self.blocks.iter().position(|planned| planned == block));
+        let places = cut.iter().filter_map(|(block, _)| self.blocks.iter().position(|planned| planned == block));
         places.for_each(|index| schedule.cut(index, now));
         cut
     }

@@ -122,6 +122,7 @@ impl Task<'_> {
     /// So many requests may be under way to each device.
     pub(super) fn allow_in_flight(&self, link: &mut Link) {
         for device in self.def.devices.iter().filter(|device| device.line == self.line) {
+            link.state_request_gap(device.unit, device.gap);
             link.allow(device.unit, self.in_flight.limit(device.unit, device.limits.in_flight_max));
         }
     }

@@ -24,13 +24,15 @@ impl Task<'_> {
     /// A connection over a network is gone. The block that has ended it is named and waits; `true` if another connection may take its
     /// place without a word.
     pub(super) async fn on_hangup(&mut self, schedule: &mut Schedule, answers: u64) -> Result<bool, LinkExit> {
-        let cut = self.cut_off(schedule);
+        let (cut, misfits): (Vec<_>, Vec<_>) = self.cut_off(schedule).into_iter().unzip();
         let Hangup { guilty, is_quiet } = self.hangups.on_end(&cut, answers);
         let Some(block) = guilty else { return Ok(is_quiet) };
+        // Where its answer did not fit, that has ended the connection.
+        let fault = misfits.into_iter().flatten().next().unwrap_or(Fault::Hangup);
         let now = self.clock.now();
         let device = &self.def.device(block.device).name;
-        tracing::warn!(device, table = ?block.table, address = block.address, count = block.count, "{}", Fault::Hangup);
-        self.publish_failure(now, block.device, block.tags.to_vec(), Fault::Hangup, None).await?;
+        tracing::warn!(device, table = ?block.table, address = block.address, count = block.count, "{fault}");
+        self.publish_failure(now, block.device, block.tags.to_vec(), fault, None).await?;
         let index = self.blocks.iter().position(|planned| *planned == block);
         if schedule.failed(index, block.device, Failure::Hangup, (now, std::time::Duration::ZERO), now) {
             let tags = self.def.tags_of(block.device).map(|tag| tag.id).collect();
@@ -86,7 +88,8 @@ impl Task<'_> {
             let (id, stated) = (device.id, device.limits.in_flight_max);
             let found = self.in_flight.found(device.unit).filter(|most| *most < stated);
             let found = found.map(|most| DeviceFinding::InFlight { most, stated });
-            let all = found.into_iter().chain(self.unreadable.of(device.unit)).take(FINDINGS_MAX);
+            let gap = self.memory.request_gaps.found(device.unit).map(|gap| DeviceFinding::RequestGap { gap });
+            let all = found.into_iter().chain(gap).chain(self.unreadable.of(device.unit)).take(FINDINGS_MAX);
             findings.extend(all.map(|found| LineFinding::Device(id, found)));
         }
         findings

@@ -64,7 +64,7 @@ impl Task<'_> {
         let served = schedule.done(index, began, ended);
         self.stats.served(index, served.jitter, served.missed);
         self.note_late(link, schedule);
-        self.keep_gap(link, schedule, &block, ended);
+        Self::keep_gap(link, schedule, &block, ended);
         let answer = match read {
             Some(Ok(answer)) => Ok(answer),
             Some(Err(LinkError::Fault(fault))) => Err(fault),
@@ -105,11 +105,10 @@ impl Task<'_> {
         Err(LinkExit::PortFailed(format!("no answer to {} requests over this connection", link.unanswered)))
     }
 
-    pub(super) fn keep_gap(&self, link: &mut Link, schedule: &mut Schedule, block: &Block, ended: Timestamp) {
-        let gap = self.def.device(block.device).gap;
+    pub(super) fn keep_gap(link: &Link, schedule: &mut Schedule, block: &Block, ended: Timestamp) {
+        let gap = link.request_gap(block.unit);
         if !gap.is_zero() {
             schedule.keep_gap(block.device, ended + gap);
-            link.set_unit_gap(block.unit, gap);
         }
     }
 

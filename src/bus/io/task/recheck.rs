@@ -84,7 +84,7 @@ impl Task<'_> {
         self.recheck.tried += 1;
         let read = self.read_unless_stopped(link, block, None).await;
         let ended = self.clock.now();
-        self.keep_gap(link, schedule, block, ended);
+        Self::keep_gap(link, schedule, block, ended);
         match read {
             Some(Ok(_)) => {
                 tracing::info!(unit = block.unit, address = block.address, count = block.count, "can be read now");

@@ -260,9 +260,12 @@ impl Task<'_> {
     fn keep_write_gap(&self, link: &mut Link, schedule: &mut Schedule, device: &DeviceDef) {
         if device.unit == 0 {
             link.hold_off_plant_time(device.write_gap);
-        } else if !device.write_gap.is_zero() {
-            schedule.keep_gap(device.id, self.clock.now() + device.write_gap);
-            link.set_unit_gap(device.unit, device.write_gap);
+            return;
+        }
+        let gap = device.write_gap.max(link.request_gap(device.unit));
+        if !gap.is_zero() {
+            schedule.keep_gap(device.id, self.clock.now() + gap);
+            link.set_unit_gap(device.unit, gap);
         }
     }
 

@@ -173,6 +173,44 @@ async fn the_gap_of_a_unit_after_a_write_does_not_hold_the_others() {
     }
 }
 
+/// The gap that the plant file states for a device is kept before each request to it: a poll, a retry, a proof that it is in sync, a
+/// write and its read-back.
+#[tokio::test(start_paused = true)]
+async fn the_gap_of_a_device_is_kept_before_every_request() {
+    for mode in Mode::ALL {
+        let mut def = plant(mode);
+        def.devices[0].gap = 100 * MS;
+        let mut line = line(def.clone());
+        let too_soon = Arc::new(std::sync::Mutex::new(Vec::new()));
+        let (list, mut last) = (too_soon.clone(), None);
+        line.plug(mode, move |number, message| {
+            let now = tokio::time::Instant::now();
+            if message[0] != 1 {
+                return SlaveAction::Answer;
+            }
+            if last.replace(now).is_some_and(|last| now < last + 100 * MS) {
+                list.lock().expect("no panic").push(message.to_vec());
+            }
+            match number % 23 {
+                5 => SlaveAction::Silent,
+                11 if !mode.has_ids() => SlaveAction::BadCheck,
+                17 => SlaveAction::Instead(vec![1, 3, 4, 0, 1, 0, 2]),
+                _ => SlaveAction::Answer,
+            }
+        });
+        for id in 0..5 {
+            for _ in 0..10 {
+                line.read(&def).await;
+            }
+            let (id, raw) = (WriteId(id), 10.0.into());
+            let job = WriteJob { id, tag: TagId(0), raw, unlock: None, verify: true, urgent: false };
+            line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
+            line.until(&def, |event| matches!(event, Event::Wrote { .. }).then_some(())).await;
+        }
+        assert_eq!(*too_soon.lock().expect("no panic"), Vec::<Vec<u8>>::new(), "{mode:?}");
+    }
+}
+
 /// A unit of a network that has always answered at once is not waited for the whole timeout of 2 s once it is silent.
 #[tokio::test(start_paused = true)]
 async fn a_fast_unit_that_dies_is_not_waited_for_long_over_tcp() {
