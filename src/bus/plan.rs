@@ -20,7 +20,7 @@ mod alternatives;
 #[cfg(test)]
 mod tests;
 
-pub use bisection::{AddressRange, RangeBisection, Refused};
+pub use bisection::{AddressRange, RangeBisection, Refused, split};
 pub use cost::{Wire, cost};
 pub use gaps::{UnreadableRanges, may_be_cut};
 

@@ -185,6 +185,11 @@ impl RangeBisection {
         self.candidates.retain(|candidate| !whole.contains(&candidate.range));
     }
 
+    /// The most registers or bits that the unit of a block has given at once.
+    pub fn given(&self, block: &Block) -> u16 {
+        to_u16(self.given.get(&(block.unit, block.table)).copied().unwrap_or_default())
+    }
+
     /// When every part has answered, or is a gap itself: adds what was confirmed to `unreadable`. Where both parts of a refused
     /// request can be read, the gap between them cannot, or it was too much.
     pub fn conclude(&mut self, unreadable: &mut UnreadableRanges) -> Conclusion {

@@ -11,9 +11,9 @@ use crate::plant::{event::ExceptionCode, line_finding::DeviceFinding, live::Addr
 /// Registers of one request (Modbus application protocol V1.1b3, 6.3).
 const USUAL_MOST: u16 = 125;
 
-/// May the exception mean that a request asks for too much, or for something that is not there?
+/// May the exception mean that too much is asked for, or what is not there? Busy, away and broken memory do not.
 pub fn may_be_cut(code: ExceptionCode) -> bool {
-    matches!(code.0, 0x01..=0x04)
+    !matches!(code.0, 0x05 | 0x06 | 0x08 | 0x0A | 0x0B)
 }
 
 /// Addresses that a unit does not have, although the plan would read (over) them, and how much it gives at once. An empty range is

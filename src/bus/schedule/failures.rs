@@ -17,6 +17,11 @@ impl Schedule {
         self.polls[index].lives()
     }
 
+    /// Was the block silent so often in a row that it should be tried in part?
+    pub fn may_be_too_long(&self, index: usize) -> bool {
+        self.polls[index].may_be_too_long()
+    }
+
     /// The request for this block was cut off with its connection: it is made again at once.
     pub fn cut(&mut self, index: usize, now: Timestamp) {
         let poll = &mut self.polls[index];

@@ -30,6 +30,8 @@ const FREE_WAIT: Duration = Duration::from_secs(1);
 const FREE_AT_FIRST: u32 = 2;
 /// A block whose answers are corrupt so often in a row is asked for less often.
 const CORRUPT_MAX: u32 = 3;
+/// A block that was silent so often in a row is tried in part, once.
+const SILENT_MAX: u32 = 3;
 /// The first wait for a device that is busy (06); it doubles up to [`BUSY_MAX`].
 const BUSY: Duration = Duration::from_millis(100);
 const BUSY_MAX: Duration = Duration::from_secs(5);
@@ -149,6 +151,11 @@ impl ScheduledPoll {
     pub fn pays(&self) -> bool {
         let free = if self.answered { FREE_FAILURES } else { FREE_AT_FIRST };
         free <= self.failures
+    }
+
+    /// Silent so often in a row, and never answered since the start: it may be too long for a device that then says nothing.
+    pub fn may_be_too_long(&self) -> bool {
+        !self.answered && self.failures == SILENT_MAX
     }
 
     /// It was answered.

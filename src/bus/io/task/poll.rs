@@ -200,7 +200,37 @@ impl Task<'_> {
             let searched = self.bisection.is_open();
             self.replan(link, schedule, at, searched);
         }
-        Ok(())
+        match index {
+            Some(index) if fault == Fault::Timeout => self.try_shorter(link, schedule, index, block).await,
+            _ => Ok(()),
+        }
+    }
+
+    /// A block that was always silent is asked for in part: if that is answered, the device gives no more at once.
+    async fn try_shorter(
+        &mut self,
+        link: &mut Link,
+        schedule: &mut Schedule,
+        index: usize,
+        block: &Block,
+    ) -> Result<(), LinkExit> {
+        let given = self.bisection.given(block);
+        let is_asked = self.blocks.get(index) == Some(block) && schedule.may_be_too_long(index);
+        let Some(([part, _], _)) = plan::split(&self.def, block).filter(|_| is_asked && given < block.count) else {
+            return Ok(());
+        };
+        match self.read_unless_stopped(link, &part, None).await {
+            Some(Ok(_)) => {
+                let (now, most) = (self.clock.now(), part.count.max(given));
+                tracing::warn!(unit = block.unit, count = block.count, most, "silent when asked for more at once");
+                schedule.answered(None, block.device, None, now);
+                self.unreadable.limit(block.unit, block.table, most, block.count);
+                self.plan_again(link, schedule, now);
+                Ok(())
+            }
+            Some(Err(LinkError::Gone(why))) => Err(LinkExit::Gone(why)),
+            Some(Err(LinkError::Fault(_))) | None => Ok(()),
+        }
     }
 
     /// Counts how a read has ended, and what a good one has taken.
