@@ -7,6 +7,7 @@ mod live;
 mod oddities;
 mod recalled;
 mod redefined;
+mod reports;
 mod silent;
 mod slave;
 mod slow;

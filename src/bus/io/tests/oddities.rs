@@ -6,7 +6,11 @@ use super::{slave::Line, *};
 use crate::plant::PlantDef;
 
 /// Good reads by block address of the first device until a second.
-async fn reads_until(line: &mut Line, def: &PlantDef, second: i64) -> (BTreeMap<u16, u32>, Vec<Fault>, usize) {
+pub(super) async fn reads_until(
+    line: &mut Line,
+    def: &PlantDef,
+    second: i64,
+) -> (BTreeMap<u16, u32>, Vec<Fault>, usize) {
     let end = Timestamp::from_second(second).expect("a small number");
     let (mut reads, mut faults, mut lost) = (BTreeMap::new(), Vec::new(), 0);
     loop {
@@ -27,7 +31,7 @@ async fn reads_until(line: &mut Line, def: &PlantDef, second: i64) -> (BTreeMap<
 }
 
 /// The addresses that a read asks the first device for.
-fn asked(message: &[u8]) -> Option<std::ops::Range<u16>> {
+pub(super) fn asked(message: &[u8]) -> Option<std::ops::Range<u16>> {
     match *message {
         [1, 3, high, low, many, few] => {
             let (start, count) = (u16::from_be_bytes([high, low]), u16::from_be_bytes([many, few]));
@@ -37,7 +41,7 @@ fn asked(message: &[u8]) -> Option<std::ops::Range<u16>> {
     }
 }
 
-fn touches(message: &[u8], address: u16) -> bool {
+pub(super) fn touches(message: &[u8], address: u16) -> bool {
     asked(message).is_some_and(|asked| asked.contains(&address))
 }
 
