@@ -233,6 +233,11 @@ impl LineReplies {
         self.units[usize::from(unit)].proof_given();
     }
 
+    /// An operator wants it asked now: what takes longest is not tried first.
+    pub fn retry(&mut self, unit: u8) {
+        self.units[usize::from(unit)].proof = Proof::default();
+    }
+
     /// That has proved nothing.
     pub fn proof_failed(&mut self, unit: u8) {
         self.units[usize::from(unit)].proof_failed();

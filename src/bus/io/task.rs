@@ -261,6 +261,7 @@ impl Task<'_> {
                     self.requested.push(device);
                     self.plan_again(link, schedule, self.clock.now());
                 }
+                link.retry(self.def.device(device).unit);
                 schedule.refresh(device, self.clock.now());
                 Ok(())
             }

@@ -17,9 +17,10 @@ impl Schedule {
         self.polls[index].lives()
     }
 
-    /// Was the block silent so often in a row that it should be tried in part?
+    /// Was the block, beside others of its device that answer, silent so often in a row that it should be tried in part?
     pub fn may_be_too_long(&self, index: usize) -> bool {
-        self.polls[index].may_be_too_long()
+        let poll = &self.polls[index];
+        poll.may_be_too_long() && self.devices[poll.place].failures() == 0
     }
 
     /// The request for this block was cut off with its connection: it is made again at once.

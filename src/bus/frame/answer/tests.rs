@@ -100,7 +100,10 @@ fn each_way_of_being_wrong_has_its_name() {
     check(&read, &[1, 3, 2, 0, 1], length(2, 4));
     check(&read, &[1, 3, 2, 0, 1, 0, 2], length(2, 4));
     check(&read, &[1, 0x83, 2], Fault::Exception(ExceptionCode(2)));
-    check(&read, &[1, 0x83], Fault::Truncated { got: 2, expected: 3 });
+    // Where a header says that this was all, it is a refusal without a code.
+    let cut = Err(Fault::Truncated { got: 2, expected: 3 });
+    assert_eq!([Framing::Rtu, Framing::Ascii].map(|framing| on(framing, &read, &[1, 0x83])), [cut, cut]);
+    assert_eq!(on(Framing::Mbap, &read, &[1, 0x83]), Err(Fault::Exception(ExceptionCode::NONE)));
     // Writes as devices answer them: without the address, with another value, of another register, with a byte too many.
     let write = [1, 6, 0, 100, 0, 7];
     check(&write, &[1, 6, 0, 7], length(2, 4));

@@ -24,6 +24,11 @@ impl Link {
         self.wire.replies.proof_given(unit);
     }
 
+    /// See [`crate::bus::late_reply::LineReplies::retry`].
+    pub fn retry(&mut self, unit: u8) {
+        self.wire.replies.retry(unit);
+    }
+
     /// See [`crate::bus::late_reply::LineReplies::proof_failed`].
     pub fn proof_failed(&mut self, unit: u8) {
         self.wire.replies.proof_failed(unit);

@@ -104,7 +104,7 @@ async fn a_device_that_is_deaf_after_each_answer_is_read() {
 /// More registers than it can send are answered with silence: "Timeout error when requesting more than 28 registers"
 /// (github.com/emelianov/modbus-esp8266, issue 370).
 #[tokio::test(start_paused = true)]
-async fn a_block_that_is_too_long_for_a_silent_device_is_read_in_parts() {
+async fn a_block_too_long_for_a_silent_device_is_read_in_parts() {
     for mode in Mode::ALL {
         let def = plant(mode);
         let mut line = line(def.clone());
@@ -309,7 +309,7 @@ async fn a_header_that_counts_too_few_bytes_costs_only_its_device() {
 /// Connections are refused for a while after one was closed: WillCodeForCats/solaredge-modbus-multi, issue 159 (right after a write).
 /// A write whose answer is lost closes the connection: it is never called done, nor sent again, and the values are back soon.
 #[tokio::test(start_paused = true)]
-async fn a_lost_write_to_a_host_that_refuses_the_next_connection_is_not_called_done() {
+async fn a_lost_write_to_a_refusing_host_is_not_called_done() {
     for mode in [Mode::Tcp, Mode::Tcp16, Mode::RtuOverTcp] {
         let def = plant(mode);
         let mut line = line(def.clone());
