@@ -22,7 +22,7 @@ use jiff::Timestamp;
 use many::{TAGS_EACH, plant, tags_of};
 use rustix::time::{ClockId, clock_gettime};
 use sightglass::{
-    access::{Durability, SessionRequest, SessionStatus},
+    access::{Completion, Durability, SessionRequest, SessionStatus},
     attach::{
         io::{connect::connect, serve::listen},
         protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, TerminalOrigin},
@@ -119,7 +119,7 @@ fn station(devices: u16, lines: u16) {
         tokio::spawn(async move {
             while let Some((_, request)) = requests.recv().await {
                 let Request::SessionRequest(_, reply) = request else { continue };
-                let _ = reply.send(Ok(Durability::Recorded));
+                let _ = reply.send(Ok(Completion::new(Durability::Recorded, None)));
             }
         });
         tokio::spawn(live(plant, def, publish));
