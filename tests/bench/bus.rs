@@ -237,6 +237,7 @@ fn line_task(in_flight: u16, blocks: u16) -> (f64, f64) {
                 &mut Requests::new(queue),
                 &mut LiveReads::new(mpsc::channel(1).1),
                 stopped,
+                &[],
             )
             .await;
         });

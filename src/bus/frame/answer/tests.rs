@@ -10,6 +10,8 @@ use super::*;
 struct Row(&'static [u8], &'static [u8], &'static [Range<usize>]);
 
 /// Every function; the examples of V1.1b3, 6, where it has some.
+// One place is a list of places as well.
+#[allow(clippy::single_range_in_vec_init)]
 const ROWS: [Row; 24] = [
     Row(&[1, 0x01, 0, 0x13, 0, 0x13], &[1, 0x01, 3, 0xCD, 0x6B, 5], &[3..6]),
     Row(&[1, 0x02, 0, 0xC4, 0, 0x16], &[1, 0x02, 3, 0xAC, 0xDB, 0x35], &[3..6]),
