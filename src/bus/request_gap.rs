@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn a_unit_that_hears_at_once_is_given_none_however_much_is_lost() {
         for lossy in [2, 3, 5, 10, 50] {
-            let by_chance = |n: u64| (n.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 33) % lossy == 0;
+            let by_chance = |n: u64| (n.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 33).is_multiple_of(lossy);
             assert_eq!(asked(0, by_chance).0, Duration::ZERO, "one in {lossy} is lost");
         }
         assert_eq!(asked(0, |n| n % 2 == 0).0, Duration::ZERO, "each second request is lost");

@@ -13,6 +13,8 @@ use crate::plant::PlantDef;
 const CRC_MODES: [Mode; 2] = [Mode::Rtu, Mode::RtuOverTcp];
 /// Modes of Modbus TCP.
 const MBAP_MODES: [Mode; 2] = [Mode::Tcp, Mode::Tcp16];
+/// An acknowledgement of a write.
+type Form = fn(&[u8]) -> Vec<u8>;
 
 /// Good reads by block address of each of the two devices until a second, and the faults of the first.
 async fn play(line: &mut Line, def: &PlantDef, until: i64) -> ([BTreeMap<u16, u32>; 2], Vec<Fault>) {
@@ -221,7 +223,7 @@ async fn a_wrong_byte_count_under_a_good_check_is_named() {
 /// said, whether that is what was written or not.
 #[tokio::test(start_paused = true)]
 async fn a_write_that_is_acknowledged_in_a_wrong_form_is_read_back() {
-    let forms: [(u8, fn(&[u8]) -> Vec<u8>); 7] = [
+    let forms: [(u8, Form); 7] = [
         (16, |message| message.to_vec()),
         (16, |message| [&message[..4], &[0, 0]].concat()),
         (6, |message| [message, &[6]].concat()),

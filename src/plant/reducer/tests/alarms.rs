@@ -95,9 +95,8 @@ fn a_device_slower_than_stated_is_an_alarm_with_figures() {
 fn a_failing_device_without_a_value_raises_its_alarm() {
     let mut plant = running();
     let tags: Vec<TagId> = plant.def.tags_of(TIC).map(|tag| tag.id).collect();
-    let silent = |plant: &Plant| {
-        plant.snapshot().alarms.iter().find(|alarm| alarm.id == SILENT).map(|alarm| alarm.state)
-    };
+    let silent =
+        |plant: &Plant| plant.snapshot().alarms.iter().find(|alarm| alarm.id == SILENT).map(|alarm| alarm.state);
     for (second, failed) in [(1, &[PV][..]), (10, &tags)] {
         plant.on_event(fail(second, failed, Fault::Exception(ExceptionCode(0x0B))));
         plant.on_tick(at(second + 5));
