@@ -9,7 +9,6 @@ use std::{
     time::Duration,
 };
 
-use duckdb::InterruptHandle;
 use jiff::Timestamp;
 use tokio::{
     sync::oneshot,
@@ -20,6 +19,7 @@ use super::{
     HistoryJob, JobRequest,
     archive::{Job, LeftOut},
     import::{Importing, read_rows},
+    interrupt::Interrupt,
     reader::stop,
     store::{Store, instant},
 };
@@ -48,7 +48,7 @@ type Done = Result<ArchiveOutcome, (Option<Job>, HistoryError)>;
 
 /// Works on the archive of one store after the other.
 pub struct Archiver {
-    running: Option<(JoinHandle<Done>, Arc<InterruptHandle>)>,
+    running: Option<(JoinHandle<Done>, Interrupt)>,
     /// What the station is asked for, to begin next: the archive is not worked on meanwhile.
     asked: Option<JobRequest>,
     /// An import that is being stored, a piece with each commit.

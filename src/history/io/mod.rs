@@ -48,6 +48,7 @@ pub mod disk;
 pub mod sql;
 pub mod files;
 pub mod last;
+pub mod interrupt;
 pub mod store;
 pub mod open;
 pub mod read;

@@ -9,13 +9,14 @@ use std::{
 };
 
 use duckdb::{
-    Appender, Connection, InterruptHandle, ToSql, params,
+    Appender, Connection, ToSql, params,
     types::{TimeUnit, Value},
 };
 use jiff::Timestamp;
 
 use super::{
     disk, files,
+    interrupt::{Interrupt, Open},
     last::{self, LastCommit},
     reports::append_report,
     runs::append_run,
@@ -36,6 +37,7 @@ use crate::{
 
 /// An open store.
 pub struct Store {
+    open: Open,
     pub(super) db: Connection,
     pub(super) def: Arc<PlantDef>,
     pub(super) path: PathBuf,
@@ -85,8 +87,8 @@ impl Store {
     }
 
     /// Ends what this connection is doing, from any thread.
-    pub fn interrupt_handle(&self) -> Arc<InterruptHandle> {
-        self.db.interrupt_handle()
+    pub fn interrupt_handle(&self) -> Interrupt {
+        self.open.interrupt(&self.db)
     }
 
     /// Appends records in one transaction: all of them or none.
@@ -153,6 +155,7 @@ impl Store {
 
     pub(super) fn around(db: Connection, path: &Path, def: &Arc<PlantDef>) -> Store {
         Store {
+            open: Open::default(),
             db,
             def: Arc::clone(def),
             file: files::inode(path),

@@ -17,10 +17,11 @@
 
 use std::{path::Path, sync::Arc, time::Duration};
 
-use duckdb::{Connection, InterruptHandle, params};
+use duckdb::{Connection, params};
 
 use super::{
     archive::{any_rests, quoted, table},
+    interrupt::{Interrupt, Open},
     runs::seconds,
     store::{engine, utc},
 };
@@ -43,6 +44,7 @@ const MEMORY: &str = "256MB";
 
 /// An engine with the tables.
 pub struct Tables {
+    open: Open,
     db: Connection,
 }
 
@@ -64,7 +66,7 @@ impl Tables {
     /// Empty tables. `folder` is for what does not fit into memory, and for results.
     pub fn new(def: &PlantDef, overview: &Overview, folder: &Path) -> Result<Tables, HistoryError> {
         let db = Connection::open_in_memory().map_err(engine)?;
-        let tables = Tables { db };
+        let tables = Tables { open: Open::default(), db };
         let archive = format!("{}/", overview.folder.display());
         tables.run(&format!(
             "SET memory_limit = '{MEMORY}'; SET threads = 2; SET temp_directory = {folder};
@@ -190,8 +192,8 @@ impl Tables {
     }
 
     /// Ends what is running, from any thread.
-    pub fn interrupt_handle(&self) -> Arc<InterruptHandle> {
-        self.db.interrupt_handle()
+    pub fn interrupt_handle(&self) -> Interrupt {
+        self.open.interrupt(&self.db)
     }
 
     /// Refuses what is not one SELECT. The message is that of the engine, with the place.
