@@ -162,8 +162,8 @@ struct Task<'a> {
     timeouts_before: u64,
     /// How long the last connections were deaf after they were opened, in a row.
     deaf: Option<(Duration, u32)>,
-    /// Units that refuse everything, and how long they are left alone.
-    refused_all: BTreeMap<u8, Backoff>,
+    /// Units that refuse everything, and until when they are left alone with what they have refused.
+    refused_all: BTreeMap<u8, (Backoff, Timestamp)>,
     /// Whose turn it is; what is known of blocks and devices outlives an opening.
     schedule: Schedule,
     /// When the counters of the link were last added to the statistics.

@@ -64,7 +64,16 @@ impl AddressRange {
     }
 
     fn contains(&self, other: &AddressRange) -> bool {
-        (self.unit, self.table) == (other.unit, other.table) && self.start <= other.start && other.end <= self.end
+        self.is_beside(other) && self.start <= other.start && other.end <= self.end
+    }
+
+    /// What lies between two parts may be empty.
+    fn touches(&self, other: &AddressRange) -> bool {
+        self.contains(other) || self.is_beside(other) && self.start < other.end && other.start < self.end
+    }
+
+    fn is_beside(&self, other: &AddressRange) -> bool {
+        (self.unit, self.table) == (other.unit, other.table)
     }
 }
 
@@ -94,8 +103,16 @@ pub enum Refused {
 pub struct Conclusion {
     /// The plan must be made again.
     pub replan: bool,
-    /// These units have refused everything since the last search, which is not believed: a device that starts up does so.
-    pub disbelieved: BTreeSet<u8>,
+    /// Of units that have refused everything since the last search, which is not believed: a device that starts up does so.
+    disbelieved: Vec<AddressRange>,
+}
+
+impl Conclusion {
+    /// Was the refusal of this block, or of a part of it, not believed?
+    pub fn disbelieves(&self, block: &Block) -> bool {
+        let whole = AddressRange::of_block(block);
+        self.disbelieved.iter().any(|range| whole.touches(range))
+    }
 }
 
 /// The search for what is wrong with a refused request: its parts are asked for in its place, and their responses narrow it down.
@@ -200,7 +217,7 @@ impl RangeBisection {
         let (gives, candidates) = (&self.gives, &self.candidates);
         let (believed, doubted): (Vec<Obstacle>, Vec<Obstacle>) =
             self.found.drain(..).partition(|found| found.sound || gives.contains(&found.range.unit));
-        let disbelieved = doubted.iter().map(|found| found.range.unit).collect();
+        let disbelieved = doubted.into_iter().map(|found| found.range).collect();
         let meanwhile = &self.gives_meanwhile;
         let sound = |found: Obstacle| Obstacle { sound: meanwhile.contains(&found.range.unit), ..found };
         self.found = believed.into_iter().map(sound).collect();

@@ -148,8 +148,9 @@ fn bisection(def: &PlantDef, missing: &[u32], count_max: u32) -> (UnreadableRang
     let (mut unreadable, mut search, mut asked) = (UnreadableRanges::default(), RangeBisection::default(), 0);
     let plan =
         |unreadable: &UnreadableRanges| blocks(def, LineId(0), unreadable).into_iter().rev().collect::<Vec<Block>>();
-    let mut todo = plan(&unreadable);
+    let (mut todo, mut waiting) = (plan(&unreadable), Vec::new());
     while let Some(block) = todo.pop() {
+        waiting.retain(|waits| *waits != block.range());
         asked += 1;
         assert!(asked < 1000, "the search ends");
         let (start, end) = block.range();
@@ -164,11 +165,9 @@ fn bisection(def: &PlantDef, missing: &[u32], count_max: u32) -> (UnreadableRang
         if found.replan {
             todo = plan(&unreadable);
         }
-        if !found.disbelieved.is_empty() {
-            // What was refused waits, and the others are read meanwhile.
-            todo.retain(|other| *other != block);
-            todo.insert(0, block);
-        }
+        // What was refused waits, and the others are read meanwhile.
+        waiting.extend(todo.iter().filter(|block| found.disbelieves(block)).map(Block::range));
+        todo.sort_by_key(|block| !waiting.contains(&block.range()));
     }
     (unreadable, asked)
 }
@@ -196,6 +195,13 @@ fn a_missing_tag_is_reported_and_its_neighbours_are_read() {
     assert_eq!(refused(&def, LineId(0), &unreadable), [TagId(5)]);
     assert_eq!(ranges(&def, &unreadable), [(0, 5), (6, 8)]);
     assert_eq!(asked, 11, "the whole, six parts, the whole again, and the three blocks of the new plan");
+}
+
+#[test]
+fn the_only_register_that_is_there_is_found_behind_refused_ones() {
+    let def = words(&[10, 32, 42]);
+    let (unreadable, _) = bisection(&def, &[10, 32], 125);
+    assert_eq!(refused(&def, LineId(0), &unreadable), [TagId(0), TagId(1)]);
 }
 
 #[test]

@@ -283,10 +283,13 @@ impl Task<'_> {
         if wrong || found.replan {
             self.plan_again(link, schedule, at);
         }
-        for unit in found.disbelieved {
-            let until = at + self.refused_all.entry(unit).or_insert_with(Backoff::for_ports).fail();
-            let of_unit = |(_, block): &(usize, &Block)| block.unit == unit;
-            self.blocks.iter().enumerate().filter(of_unit).for_each(|(index, _)| schedule.later(index, until));
+        // What the unit has not been asked for yet goes first: it may be there.
+        for (index, block) in self.blocks.iter().enumerate().filter(|(_, block)| found.disbelieves(block)) {
+            let (backoff, until) = self.refused_all.entry(block.unit).or_insert_with(|| (Backoff::for_ports(), at));
+            if *until <= at {
+                *until = at + backoff.fail();
+            }
+            schedule.later(index, *until);
         }
     }
 

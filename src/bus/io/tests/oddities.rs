@@ -65,11 +65,11 @@ async fn a_refused_block_is_split_in_every_mode_and_with_every_code() {
     }
 }
 
-/// The first block is silent, corrupt or refused: the others are read all the same, and the device is not given up.
+/// A block, or two of three, are silent, corrupt or refused: the others are read all the same, and the device is not given up.
 #[tokio::test(start_paused = true)]
-async fn a_bad_first_block_does_not_take_its_device_down() {
+async fn bad_blocks_do_not_take_their_device_down() {
     for mode in Mode::ALL {
-        for bad in [10, 20, 400] {
+        for bad in [&[10][..], &[20], &[400], &[10, 20], &[10, 400], &[20, 400]] {
             for what in [
                 SlaveAction::Silent,
                 SlaveAction::BadCheck,
@@ -84,17 +84,17 @@ async fn a_bad_first_block_does_not_take_its_device_down() {
                 let action = what.clone();
                 line.plug(mode, move |_, message| match asked(message) {
                     // Parts of the block as well.
-                    Some(asked) if (bad..bad + 4).contains(&asked.start) => action.clone(),
+                    Some(asked) if bad.iter().any(|bad| (*bad..bad + 4).contains(&asked.start)) => action.clone(),
                     _ => SlaveAction::Answer,
                 });
                 let (reads, faults, _) = reads_until(&mut line, &def, 30).await;
-                for good in [10, 20, 400].into_iter().filter(|block| *block != bad) {
+                for good in [10, 20, 400].into_iter().filter(|block| !bad.contains(block)) {
                     let count = reads.get(&good).copied().unwrap_or_default();
-                    assert!(15 <= count, "{mode:?}, {bad} is bad ({what:?}): {count} reads of {good} in 30 s");
+                    assert!(15 <= count, "{mode:?}, {bad:?} are bad ({what:?}): {count} reads of {good} in 30 s");
                 }
                 // Good frames of a wrong length are noise to the others for a timeout: there it may be given up for a moment.
                 let is_noise = matches!(what, SlaveAction::Instead(_)) && !mode.has_ids();
-                assert!(is_noise || !faults.contains(&Fault::BackedOff), "{mode:?}, {bad} is bad ({what:?})");
+                assert!(is_noise || !faults.contains(&Fault::BackedOff), "{mode:?}, {bad:?} are bad ({what:?})");
             }
         }
     }
@@ -140,6 +140,26 @@ async fn a_refusal_of_everything_while_starting_is_not_believed() {
                 let count = reads.get(&block).copied().unwrap_or_default();
                 assert!(15 <= count, "{mode:?}, exception {code}: {count} reads of {block} after it was up");
             }
+        }
+    }
+}
+
+/// Blocks of one register of which all but one are refused: that one is found, whichever it is.
+#[tokio::test(start_paused = true)]
+async fn one_register_that_is_there_is_read_beside_refused_ones() {
+    for mode in Mode::ALL {
+        for there in [10, 12, 20, 22, 400] {
+            let mut def = plant(mode);
+            let every_second = |address: u16| [10, 12, 20, 22, 400].contains(&address);
+            def.tags.iter_mut().filter(|tag| !every_second(tag.point.address)).for_each(|tag| tag.poll = Poll::Never);
+            let mut line = line(def.clone());
+            line.plug(mode, move |_, message| match asked(message) {
+                Some(asked) if asked != (there..there + 1) => SlaveAction::Exception(2),
+                _ => SlaveAction::Answer,
+            });
+            let (reads, _, _) = reads_until(&mut line, &def, 30).await;
+            let count = reads.get(&there).copied().unwrap_or_default();
+            assert!(15 <= count, "{mode:?}: {count} reads of {there} in 30 s");
         }
     }
 }
