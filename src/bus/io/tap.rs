@@ -4,7 +4,7 @@ use std::{fs::OpenOptions, io, os::unix::fs::OpenOptionsExt};
 
 use rustix::{
     fs::{FlockOperation, OFlags, flock},
-    termios::{self, ControlModes, OptionalActions, QueueSelector},
+    termios::{self, ControlModes, InputModes, OptionalActions, QueueSelector},
 };
 use tokio::{io::AsyncRead, net::unix::pipe};
 
@@ -80,6 +80,8 @@ fn set(port: &std::fs::File, serial: Serial) -> rustix::io::Result<()> {
     let mut settings = termios::tcgetattr(port)?;
     settings.make_raw();
     settings.set_speed(serial.baud)?;
+    // A byte whose parity is wrong is read as 0, so that no check is left to chance: that of ASCII is a mere sum.
+    settings.input_modes.set(InputModes::INPCK, serial.parity != Parity::None);
     let modes = &mut settings.control_modes;
     modes.remove(
         ControlModes::CSIZE
@@ -122,6 +124,17 @@ mod tests {
         let second = Tap::open(&transport, false).await.err().unwrap_or_default();
         assert!(second.contains("in use by this program"), "{second}");
         assert!(tokio_serial::new(&path, 9_600).open_native_async().is_err());
+    }
+
+    #[tokio::test]
+    async fn a_byte_whose_parity_is_wrong_is_not_taken_as_it_is() {
+        let (_master, slave) = SerialStream::pair().expect("a pseudo-terminal is free");
+        let port = fs::File::open(slave.name().expect("it has a name")).expect("it opens");
+        for (parity, checked) in [(Parity::Even, true), (Parity::Odd, true), (Parity::None, false)] {
+            set(&port, Serial { parity, ..Serial::USUAL }).expect("it takes the settings");
+            let modes = termios::tcgetattr(&port).expect("it has settings").input_modes;
+            assert_eq!(modes.contains(InputModes::INPCK), checked, "{parity:?}");
+        }
     }
 
     #[tokio::test]
