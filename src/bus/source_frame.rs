@@ -94,6 +94,10 @@ pub fn advice(fault: Fault) -> &'static str {
         Fault::Exception(code) => names::advice(code.0),
         Fault::NotConnected => "check that the port or host exists and that no other program uses it; settings: c",
         Fault::BackedOff => "it is retried at growing intervals; find out why it stopped responding",
+        Fault::NotHeard => {
+            "check wires A and B, ground and place of the tap: the other master hears more than this port"
+        }
+        Fault::HeardOnce => "wait until the other master reads it again",
     }
 }
 

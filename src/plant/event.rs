@@ -220,6 +220,13 @@ pub enum Fault {
     /// The device is left alone (it has failed, or is saving its settings); nothing was sent.
     #[error("{}", t!("device in backoff, retry later"))]
     BackedOff,
+    /// On the line of another master: it has got its response, which was not heard, or what was heard may be that to
+    /// another request.
+    #[error("{}", t!("no response was heard that is certainly its own"))]
+    NotHeard,
+    /// On the line of another master: a response to a request that was never heard before.
+    #[error("{}", t!("heard once: not yet certain"))]
+    HeardOnce,
 }
 
 /// What a fault proves about the device and the line; what exactly was wrong with a frame makes no difference.
@@ -233,6 +240,8 @@ pub(crate) enum FaultKind {
     NotANumber,
     NotConnected,
     BackedOff,
+    NotHeard,
+    HeardOnce,
 }
 
 impl Fault {
@@ -254,6 +263,8 @@ impl Fault {
             Fault::NotANumber => FaultKind::NotANumber,
             Fault::NotConnected => FaultKind::NotConnected,
             Fault::BackedOff => FaultKind::BackedOff,
+            Fault::NotHeard => FaultKind::NotHeard,
+            Fault::HeardOnce => FaultKind::HeardOnce,
         }
     }
 

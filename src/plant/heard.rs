@@ -46,14 +46,22 @@ pub fn refusal(def: &PlantDef, kind: &CommandKind) -> Option<Refusal> {
 pub(super) struct Heard {
     last: Option<Timestamp>,
     intervals: [Option<Duration>; 2],
+    /// Why it has not come since.
+    pub missed: Option<Cause>,
 }
 
 impl Heard {
     /// It has come.
     pub fn hear(&mut self, at: Timestamp) {
+        self.missed = None;
         if let Some(last) = self.last.replace(at) {
             self.intervals = [Some(elapsed(last, at)), self.intervals[0]];
         }
+    }
+
+    /// It should have come.
+    pub fn miss(&mut self, cause: Cause) {
+        self.missed = Some(cause);
     }
 
     /// The period by which its age is measured: that of the profile, or the one at which it is heard, if that is longer.

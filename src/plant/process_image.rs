@@ -1,15 +1,17 @@
 //! The values of all tags: raw responses become samples, faults and age make them uncertain, changes are stored.
 
+mod fault_effect;
 mod redefine;
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
+use self::fault_effect::{FaultEffect, effect_of};
 use super::{
     calculation::Calculator,
     def::{DeviceId, PlantDef, TagId},
-    event::{ExceptionCode, Fault, FaultKind},
+    event::Fault,
     exact::Exact,
     heard::{Heard, Stated},
     record::Record,
@@ -100,8 +102,22 @@ impl ProcessImage {
 
     /// Takes the raw numbers of one answer. A fault word or decimals among them count for their dependents at once.
     pub fn read(&mut self, values: &[(TagId, impl Into<Exact> + Copy)], at: Timestamp) {
+        self.read_as(values, None, at);
+    }
+
+    /// Takes what may be an answer to another request: as uncertain, where nothing better is known.
+    pub fn read_once(&mut self, values: &[(TagId, Exact)], texts: &[(TagId, Arc<str>)], at: Timestamp) {
+        let is_new = |tag: &TagId| !self.sample(*tag).quality.is_good();
+        let values: Vec<_> = values.iter().filter(|(tag, _)| is_new(tag)).copied().collect();
+        let texts: Vec<_> = texts.iter().filter(|(tag, _)| is_new(tag)).cloned().collect();
+        self.read_as(&values, Some(Cause::HeardOnce), at);
+        self.read_texts(&texts, at);
+        texts.iter().for_each(|(tag, _)| self.mark_uncertain(*tag, Cause::HeardOnce));
+    }
+
+    fn read_as(&mut self, values: &[(TagId, impl Into<Exact> + Copy)], uncertain: Option<Cause>, at: Timestamp) {
         for (tag, raw) in values {
-            self.raw[tag.index()] = Some(Reading { raw: (*raw).into(), at, uncertain: None });
+            self.raw[tag.index()] = Some(Reading { raw: (*raw).into(), at, uncertain });
             self.heard[tag.index()].hear(at);
         }
         for (tag, _) in values {
@@ -126,10 +142,13 @@ impl ProcessImage {
     }
 
     /// A request for these tags failed: they lose trust, and at once their value where the fault says that there is none.
+    /// What was only not heard stands for as long as its period says.
     pub fn failed(&mut self, tags: &[TagId], fault: Fault, at: Timestamp) {
         let def = self.def.clone();
         for tag in tags.iter().filter(|tag| def.tag(**tag).calculation.is_none()) {
+            let waits = def.listens_to(*tag) && self.sample(*tag).quality.is_good();
             match effect_of(fault) {
+                FaultEffect::Uncertain(cause) if waits => self.heard[tag.index()].miss(cause),
                 FaultEffect::Uncertain(cause) => self.doubt(*tag, cause, at),
                 FaultEffect::Gone(cause) => self.drop_value(*tag, cause, at),
             }
@@ -196,7 +215,10 @@ impl ProcessImage {
             }
             let listens = def.listens_to(tag.id);
             let (period, cause) = match tag.poll {
-                poll if listens => (self.heard[tag.id.index()].period(poll), Cause::NotHeard),
+                poll if listens => {
+                    let heard = &self.heard[tag.id.index()];
+                    (heard.period(poll), heard.missed.unwrap_or(Cause::NotHeard))
+                }
                 Poll::Every(period) => (period, Cause::Stale),
                 Poll::Once => continue,
                 // Known from a write or a look; it may have changed since.
@@ -353,40 +375,12 @@ impl ProcessImage {
                 None => sample.uncertain(word.quality.cause().unwrap_or(Cause::NotRead)),
             },
         };
-        let sample = match uncertain {
+        let by_heard_once = tag.decimals.source().is_some_and(|from| self.sample(from).is_heard_once());
+        let sample = match uncertain.or(by_heard_once.then_some(Cause::HeardOnce)) {
             Some(cause) if !sample.quality.is_bad() => sample.uncertain(cause),
             Some(_) | None => sample,
         };
         self.set(tag.id, sample);
-    }
-}
-
-enum FaultEffect {
-    Uncertain(Cause),
-    Gone(Cause),
-}
-
-impl Sample {
-    /// What is left of it when a request for it has failed.
-    pub(crate) fn after(self, fault: Fault, at: Timestamp) -> Sample {
-        match effect_of(fault) {
-            FaultEffect::Uncertain(cause) => Sample { at, ..self }.uncertain(cause),
-            FaultEffect::Gone(cause) => Sample::bad(cause, at),
-        }
-    }
-}
-
-/// What a fault means for the values that were asked for.
-fn effect_of(fault: Fault) -> FaultEffect {
-    match fault.kind() {
-        FaultKind::Timeout => FaultEffect::Uncertain(Cause::Timeout),
-        FaultKind::Corrupt | FaultKind::OutOfSync => FaultEffect::Uncertain(Cause::Corrupt),
-        // 05 acknowledge and 06 busy pass; any other exception means that there is no such value.
-        FaultKind::Exception(ExceptionCode(0x05 | 0x06)) => FaultEffect::Uncertain(Cause::Exception),
-        FaultKind::Exception(_) => FaultEffect::Gone(Cause::Exception),
-        FaultKind::NotANumber => FaultEffect::Gone(Cause::SensorFault),
-        FaultKind::NotConnected => FaultEffect::Gone(Cause::NotConnected),
-        FaultKind::BackedOff => FaultEffect::Gone(Cause::DeviceDown),
     }
 }
 

@@ -25,7 +25,7 @@ use super::{
     commands::CommandTracker,
     control_run::RunTracker,
     def::{LineDef, LineId, PlantDef, TagId},
-    event::{Event, LineState, WriteResult},
+    event::{Event, Fault, LineState, WriteResult},
     heard,
     interlock::ActuatorTracker,
     line_minute::LineMinuteTracker,
@@ -163,8 +163,12 @@ impl Plant {
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {
             Event::Read { at, device, values, texts, response_time, exchange } => {
-                self.image.read(&values, at);
-                self.image.read_texts(&texts, at);
+                if exchange.as_ref().is_some_and(|exchange| exchange.outcome == Err(Fault::HeardOnce)) {
+                    self.image.read_once(&values, &texts, at);
+                } else {
+                    self.image.read(&values, at);
+                    self.image.read_texts(&texts, at);
+                }
                 let tags = values.iter().map(|(tag, _)| *tag).chain(texts.iter().map(|(tag, _)| *tag));
                 self.keep_source_frames(tags, exchange);
                 let status = &mut self.devices[device.index()];
@@ -175,8 +179,11 @@ impl Plant {
                 (at, None)
             }
             Event::Failed { at, device, tags, fault, exchange } => {
-                self.keep_source_frames(tags.iter().copied(), exchange);
                 self.failed(device, &tags, fault, at);
+                // What is good still comes from an earlier exchange.
+                let image = &self.image;
+                let without = tags.into_iter().filter(|tag| !image.sample(*tag).quality.is_good()).collect::<Vec<_>>();
+                self.keep_source_frames(without.into_iter(), exchange);
                 (at, None)
             }
             Event::ForeignWrite { at, tags, fault } => {

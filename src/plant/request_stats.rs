@@ -54,7 +54,7 @@ impl RequestStats {
             return;
         };
         match fault {
-            Fault::Timeout | Fault::Hangup => self.timeouts += 1,
+            Fault::Timeout | Fault::Hangup | Fault::NotHeard => self.timeouts += 1,
             Fault::Crc { .. } | Fault::Lrc { .. } => self.check += 1,
             Fault::Truncated { .. } | Fault::WrongLength { .. } | Fault::NotHex(_) | Fault::NotANumber => {
                 self.length += 1;
@@ -69,6 +69,7 @@ impl RequestStats {
                 Some((_, count)) => *count += 1,
                 None => self.exceptions.push((code, 1)),
             },
+            Fault::HeardOnce => self.ok += 1,
             // Nothing was sent.
             Fault::NotConnected | Fault::BackedOff => self.requests -= 1,
         }

@@ -60,6 +60,8 @@ keyword_enum! {
         Stated = 17 => "stated in the plant file",
         /// The plant file was reloaded, and has other registers for it.
         Reloaded = 18 => "plant file reloaded",
+        /// The master of a line that is only listened to was heard reading it for the first time.
+        HeardOnce = 19 => "heard once",
     }
 }
 
@@ -178,14 +180,20 @@ impl Sample {
         self.exact().filter(|_| self.quality.is_good())
     }
 
-    /// The value only if others may be scaled by it: it is good, or the plant file states it.
+    /// The value only if others may be scaled by it: it is good, the plant file states it, or it was heard once, and then
+    /// they are no better.
     pub fn scaling_value(self) -> Option<f64> {
-        self.value.filter(|_| self.quality.is_good() || self.is_stated())
+        self.value.filter(|_| self.quality.is_good() || self.is_stated() || self.is_heard_once())
     }
 
     /// Does the plant file say so, and not the device?
     pub fn is_stated(self) -> bool {
         self.quality == Quality::Uncertain(Cause::Stated)
+    }
+
+    /// Has the master of its line been heard reading it only once?
+    pub fn is_heard_once(self) -> bool {
+        self.quality == Quality::Uncertain(Cause::HeardOnce)
     }
 }
 

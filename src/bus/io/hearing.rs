@@ -1,11 +1,10 @@
 //! Hears a line: the bytes of a tap as requests, responses and noise. For `sightglass listen` and for a line of the plant.
 
-use jiff::Timestamp;
 use tokio::io::AsyncReadExt;
 
 use super::{clock::Clock, tap::Tap};
 use crate::{
-    bus::listen::{Heard, HeardFrame, Listener},
+    bus::listen::{Ended, Heard, HeardFrame, Listener},
     plant::{line::LineDef, traffic::Frame},
 };
 
@@ -41,7 +40,7 @@ impl Hearing {
 
     /// Nothing more comes: what has begun has ended.
     pub fn end(&mut self) -> Vec<Heard> {
-        let heard = self.listener.rest(Timestamp::MAX);
+        let heard = self.listener.end();
         self.in_utc(heard)
     }
 
@@ -57,7 +56,7 @@ impl Hearing {
 
     fn in_utc(&self, mut heard: Vec<Heard>) -> Vec<Heard> {
         for heard in &mut heard {
-            let (Heard::Frame(HeardFrame { frame: Frame { at, .. }, .. }) | Heard::Lost { at, .. }) = heard;
+            let (Heard::Frame(HeardFrame { frame: Frame { at, .. }, .. }) | Heard::Ended(Ended { at, .. })) = heard;
             *at = self.clock.to_utc(*at);
         }
         heard

@@ -345,7 +345,9 @@ impl Link {
             | FaultKind::OutOfSync
             | FaultKind::NotANumber
             | FaultKind::NotConnected
-            | FaultKind::BackedOff => self.wire.counters.corrupt += 1,
+            | FaultKind::BackedOff
+            | FaultKind::NotHeard
+            | FaultKind::HeardOnce => self.wire.counters.corrupt += 1,
         }
         tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
         // Even what looked like a corrupt answer may have been noise, with the answer still on its way.

@@ -17,7 +17,7 @@ use crate::{
     bus::{
         backoff::Backoff,
         line_stats::{LineStats, Plan},
-        listen::{self, Ending, Heard, Losses, Role},
+        listen::{self, Ended, Heard, Losses, Role, Traffic},
         schedule::Load,
     },
     plant::{
@@ -164,9 +164,8 @@ impl Task<'_> {
 
     /// Hears an open port until it is left.
     async fn listen(&mut self, mut hearing: Hearing) -> Result<Infallible, Exit> {
-        let silence = listen::silent_after(&self.def, self.line);
-        let (mut heard_at, mut silent) = (self.clock.now(), false);
-        self.closed_at = heard_at;
+        self.closed_at = self.clock.now();
+        let mut traffic = Traffic::new(listen::silent_after(&self.def, self.line), self.closed_at);
         self.publish_report().await?;
         loop {
             let report_at = self.closed_at + REPORT_EVERY;
@@ -182,17 +181,13 @@ impl Task<'_> {
                 Err(request) => self.serve_request(request, true).await.map(|_| Vec::new())?,
             };
             let now = self.clock.now();
-            if heard.iter().any(is_frame) {
-                heard_at = now;
-                if std::mem::take(&mut silent) {
-                    self.publish_state(LineState::Connected).await?;
-                }
+            if heard.iter().any(is_frame) && traffic.hear(now) {
+                self.publish_state(LineState::Connected).await?;
             }
             for heard in heard {
                 self.on_heard(heard, now).await?;
             }
-            if !silent && silence <= elapsed(heard_at, now) {
-                silent = true;
+            if traffic.falls_silent(now) {
                 self.losses = Losses::new(&self.def);
                 self.publish_state(LineState::NoTraffic).await?;
             }
@@ -236,16 +231,16 @@ impl Task<'_> {
                 (Role::Noise, _) => self.counters.unexpected += 1,
             }
         }
-        let Some(Ending { unit, outcome, response_time }) = listen::ending(heard) else { return };
+        let Heard::Ended(Ended { request, outcome, time, .. }) = heard else { return };
         match outcome {
-            Ok(()) => self.counters.ok += 1,
+            Ok(()) | Err(Fault::HeardOnce) => self.counters.ok += 1,
             Err(Fault::Exception(_)) => self.counters.exceptions += 1,
-            Err(Fault::Timeout) => self.counters.timeouts += 1,
+            Err(Fault::Timeout | Fault::NotHeard) => self.counters.timeouts += 1,
             Err(_) => self.counters.corrupt += 1,
         }
-        let is_it = |device: &&DeviceDef| device.line == self.line && device.unit == unit;
+        let is_it = |device: &&DeviceDef| device.line == self.line && Some(&device.unit) == request.first();
         for device in self.def.devices.iter().filter(is_it) {
-            self.stats.asked(device.id, outcome, response_time);
+            self.stats.asked(device.id, *outcome, *time);
         }
     }
 

@@ -129,7 +129,7 @@ mod tests {
     #[tokio::test]
     async fn a_byte_whose_parity_is_wrong_is_not_taken_as_it_is() {
         let (_master, slave) = SerialStream::pair().expect("a pseudo-terminal is free");
-        let port = fs::File::open(slave.name().expect("it has a name")).expect("it opens");
+        let port = std::fs::File::open(slave.name().expect("it has a name")).expect("it opens");
         for (parity, checked) in [(Parity::Even, true), (Parity::Odd, true), (Parity::None, false)] {
             set(&port, Serial { parity, ..Serial::USUAL }).expect("it takes the settings");
             let modes = termios::tcgetattr(&port).expect("it has settings").input_modes;

@@ -1,10 +1,10 @@
 //! What was heard of devices, as events for their plant: the same that a poll gives, by the maps of their profiles.
 
-use std::{sync::Arc, time::Duration};
+use std::sync::Arc;
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
-use super::{Heard, HeardFrame, Role};
+use super::{Ended, Heard, HeardFrame, Role};
 use crate::{
     bus::{
         codec, frame,
@@ -12,16 +12,12 @@ use crate::{
     },
     plant::{
         Plant, PlantDef, Snapshot,
-        def::{DeviceId, Framing, LineId},
-        event::{Event, Fault},
+        def::{DeviceDef, DeviceId, Framing, LineId},
+        event::{Event, Fault, FaultKind},
         id::TagId,
-        tag::Poll,
-        traffic::Exchange,
+        traffic::{Exchange, Frame},
     },
 };
-
-/// No line is without traffic before this time.
-const SILENT_MIN: Duration = Duration::from_secs(10);
 
 /// Follows the devices of a plant, whose tags are never asked for here.
 pub struct Follower {
@@ -54,26 +50,11 @@ impl Follower {
     }
 }
 
-/// How a request of the other master has ended.
-pub struct Ending {
-    /// The unit that was asked.
-    pub unit: u8,
-    /// As a poll would have it.
-    pub outcome: Result<(), Fault>,
-    /// From the request to the response, if one came.
-    pub response_time: Option<Duration>,
-}
+/// A device does not respond after three requests in a row without a response, or nine with none but corrupt ones, which some
+/// noise can do to a device that lives.
+const LOST_MAX: u32 = 9;
 
-/// How a request has ended, if one has.
-pub fn ending(heard: &Heard) -> Option<Ending> {
-    let (exchange, (request, _)) = exchange_of(heard)?;
-    Some(Ending { unit: *request.first()?, outcome: exchange.outcome, response_time: exchange.response_time })
-}
-
-/// A device that did not answer so many requests in a row does not respond.
-const LOST_MAX: u32 = 3;
-
-/// The requests to each device that had no response, since its last.
+/// What came of the requests to each device since its last response: see [`LOST_MAX`].
 pub struct Losses(Vec<u32>);
 
 impl Losses {
@@ -87,101 +68,99 @@ impl Losses {
         if let Event::Read { device, .. } = event {
             self.0[device.index()] = 0;
         }
-        let Event::Failed { at, device, fault, .. } = event else { return None };
+        let Event::Failed { at, device, fault, exchange, .. } = event else { return None };
         let lost = &mut self.0[device.index()];
-        if matches!(fault, Fault::Exception(code) if !code.is_of_gateway()) {
-            *lost = 0;
-        }
-        // Anything else says nothing of the device.
-        if *fault != Fault::Timeout && !fault.is_corrupt() {
-            return None;
-        }
-        *lost = lost.saturating_add(1);
+        let before = *lost;
+        *lost = match fault.kind() {
+            FaultKind::Exception(code) if !code.is_of_gateway() => 0,
+            // It has responded, perhaps to another request.
+            FaultKind::NotHeard if exchange.as_ref().is_some_and(|exchange| !exchange.answer.is_empty()) => 0,
+            FaultKind::Timeout => before.saturating_add(LOST_MAX / 3),
+            FaultKind::Corrupt => before.saturating_add(1),
+            // Anything else says nothing of the device.
+            FaultKind::Exception(_)
+            | FaultKind::OutOfSync
+            | FaultKind::NotANumber
+            | FaultKind::NotConnected
+            | FaultKind::BackedOff
+            | FaultKind::NotHeard
+            | FaultKind::HeardOnce => before,
+        };
         let tags = def.tags_of(*device).map(|tag| tag.id).collect();
         let (at, device, fault) = (*at, *device, Fault::BackedOff);
-        (*lost == LOST_MAX).then_some(Event::Failed { at, device, tags, fault, exchange: None })
+        (before < LOST_MAX && LOST_MAX <= *lost).then_some(Event::Failed { at, device, tags, fault, exchange: None })
     }
 }
 
-/// A line on which no frame is heard for so long has no traffic: three of the shortest poll periods of its profiles, and not
-/// less than ten seconds.
-pub fn silent_after(def: &PlantDef, line: LineId) -> Duration {
-    let devices = def.devices.iter().filter(|device| device.line == line);
-    let periods = devices.flat_map(|device| def.tags_of(device.id)).filter_map(|tag| match tag.poll {
-        Poll::Every(period) if tag.calculation.is_none() => Some(period),
-        Poll::Every(_) | Poll::Once | Poll::Never => None,
-    });
-    (periods.min().unwrap_or_default() * 3).max(SILENT_MIN)
-}
-
-/// What was heard on a line, for its devices. A response that may be a late one to another request gives no values, and what
-/// was written is uncertain until it is read.
-pub fn events(def: &PlantDef, line: LineId, at: Timestamp, heard: &Heard) -> Vec<Event> {
-    if let Some(request) = broadcast(heard) {
-        let spans = meaning::spans(&request, None).unwrap_or_default();
-        let devices = def.devices.iter().filter(|device| device.line == line);
-        let pairs = devices.flat_map(|device| spans.iter().filter(|span| span.writes).map(|span| (device.id, span)));
-        let tags: Vec<TagId> = pairs.flat_map(|(device, span)| span.tags(def, device).map(|tag| tag.id)).collect();
-        return vec![Event::ForeignWrite { at, tags, fault: None }];
-    }
-    let Some((exchange, message)) = exchange_of(heard) else { return Vec::new() };
-    let (request, response) = message;
-    let spans = meaning::spans(&request, response.as_deref()).unwrap_or_default();
-    let devices = def.devices.iter().filter(|device| device.line == line && Some(&device.unit) == request.first());
-    let pairs = devices.flat_map(|device| spans.iter().map(|span| (device.id, span)));
-    let exchange = Arc::new(exchange);
-    pairs.flat_map(|(device, span)| events_of(def, at, device, span, &exchange)).collect()
-}
-
-/// A request to all devices of a serial line, which none of them answers.
-fn broadcast(heard: &Heard) -> Option<Vec<u8>> {
-    let Heard::Frame(HeardFrame { frame, role: Role::Request }) = heard else { return None };
-    if frame.framing == Framing::Mbap {
-        return None;
-    }
-    frame::unwrap(frame.framing, &frame.bytes).ok().filter(|message| message.first() == Some(&0))
-}
-
-/// A request and its response, without frames.
-type Messages = (Vec<u8>, Option<Vec<u8>>);
-
-/// The request and what came back, as a poll would have it, and both as messages; `None` for what is no end of a request.
-fn exchange_of(heard: &Heard) -> Option<(Exchange, Messages)> {
-    let (at, framing, request, answer, response_time, outcome) = match heard {
-        Heard::Lost { at, framing, request, fault } => (*at, *framing, request, None, None, Err(*fault)),
-        Heard::Frame(heard) => {
-            let Role::Response { request, time, proven } = &heard.role else { return None };
-            let message = frame::unwrap(heard.frame.framing, &heard.frame.bytes).ok()?;
-            let checked = frame::check_answer(heard.frame.framing, request, &message);
-            let outcome = if *proven { checked } else { checked.and(Err(Fault::OutOfSync)) };
-            (heard.frame.at, heard.frame.framing, request, Some((&heard.frame, message)), *time, outcome)
+/// What was heard on a line until `now`, for its devices. A response that may be that of another request gives no values, and what
+/// the master writes is uncertain until it is read.
+pub fn events(def: &PlantDef, line: LineId, now: Timestamp, heard: &Heard) -> Vec<Event> {
+    match heard {
+        Heard::Frame(HeardFrame { frame, role: Role::Request }) => writes(def, line, now, frame),
+        Heard::Frame(_) => Vec::new(),
+        Heard::Ended(ended) => {
+            let at = now.checked_sub(SignedDuration::try_from(ended.held).unwrap_or_default()).unwrap_or(now);
+            let (exchange, response) = exchange_of(ended);
+            let spans = meaning::spans(&ended.request, response.as_deref()).unwrap_or_default();
+            let devices = devices_of(def, line, &ended.request);
+            let pairs = devices.flat_map(|device| spans.iter().map(move |span| (device, span)));
+            pairs.flat_map(|(device, span)| events_of(def, at, device, span, &exchange)).collect()
         }
-    };
+    }
+}
+
+/// The devices that a request asks: on a serial line unit 0 is all of them.
+fn devices_of<'a>(def: &'a PlantDef, line: LineId, request: &[u8]) -> impl Iterator<Item = DeviceId> + use<'a> {
+    let unit = request.first().copied();
+    let all = unit == Some(0) && def.line(line).transport.framing() != Framing::Mbap;
+    let asked = move |device: &&DeviceDef| device.line == line && (all || Some(device.unit) == unit);
+    def.devices.iter().filter(asked).map(|device| device.id)
+}
+
+/// What a request writes, as soon as it is heard.
+fn writes(def: &PlantDef, line: LineId, at: Timestamp, frame: &Frame) -> Vec<Event> {
+    let Ok(request) = frame::unwrap(frame.framing, &frame.bytes) else { return Vec::new() };
+    let spans = meaning::spans(&request, None).unwrap_or_default();
+    let written = spans.iter().filter(|span| span.writes);
+    let tags: Vec<TagId> = written
+        .flat_map(|span| devices_of(def, line, &request).map(move |device| (span, device)))
+        .flat_map(|(span, device)| span.tags(def, device).map(|tag| tag.id))
+        .collect();
+    if tags.is_empty() { Vec::new() } else { vec![Event::ForeignWrite { at, tags, fault: None }] }
+}
+
+/// The request and what came back, as a poll would have it, and the response message.
+fn exchange_of(ended: &Ended) -> (Arc<Exchange>, Option<Vec<u8>>) {
+    let answer: Arc<[u8]> = ended.response.clone().unwrap_or_else(|| [].into());
     // The number of the transaction is that of the response.
-    let transaction =
-        answer.as_ref().and_then(|(frame, _)| frame.bytes.first_chunk()).map_or(0, |id| u16::from_be_bytes(*id));
+    let transaction = answer.first_chunk().map_or(0, |id| u16::from_be_bytes(*id));
+    let response = ended.response.as_ref().and_then(|frame| frame::unwrap(ended.framing, frame).ok());
     let exchange = Exchange {
-        at,
-        framing,
-        request: frame::wrap(framing, transaction, request).into(),
-        answer: answer.as_ref().map_or_else(|| [].into(), |(frame, _)| frame.bytes.clone()),
-        outcome,
-        response_time,
+        at: ended.at,
+        framing: ended.framing,
+        request: frame::wrap(ended.framing, transaction, &ended.request).into(),
+        answer,
+        outcome: ended.outcome,
+        response_time: ended.time,
         tries: 1,
     };
-    Some((exchange, (request.clone(), answer.map(|(_, message)| message))))
+    (Arc::new(exchange), response)
 }
 
 fn events_of(def: &PlantDef, at: Timestamp, device: DeviceId, span: &Span, exchange: &Arc<Exchange>) -> Vec<Event> {
     let fault = exchange.outcome.err();
     let tags = || span.tags(def, device).map(|tag| tag.id).collect();
-    if span.writes {
-        return vec![Event::ForeignWrite { at, tags: tags(), fault }];
+    match fault {
+        // What a write that was answered has done is known when it is read.
+        None | Some(Fault::HeardOnce) if span.writes => return Vec::new(),
+        Some(_) if span.writes => return vec![Event::ForeignWrite { at, tags: tags(), fault }],
+        // A value all the same, which is uncertain.
+        None | Some(Fault::HeardOnce) => {}
+        Some(fault) => {
+            return vec![Event::Failed { at, device, tags: tags(), fault, exchange: Some(exchange.clone()) }];
+        }
     }
     let exchange = Some(exchange.clone());
-    if let Some(fault) = fault {
-        return vec![Event::Failed { at, device, tags: tags(), fault, exchange }];
-    }
     let (mut values, mut texts, mut unreadable) = (Vec::new(), Vec::new(), Vec::new());
     for tag in span.tags(def, device) {
         let Some(words) = span.words_of(tag.point) else { continue };

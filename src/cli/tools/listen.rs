@@ -12,7 +12,7 @@ use super::PortArgs;
 use crate::{
     bus::{
         io::{clock::Clock, hearing::Hearing, tap::Tap},
-        listen::{Follower, Heard, Listener},
+        listen::{Ended, Follower, Heard, Listener},
     },
     cli::{CliError, in_runtime, is_read, run::signalled, say, span},
     plant::{PlantDef, line::LineDef, time::elapsed},
@@ -130,7 +130,9 @@ impl Session<'_> {
         }
         let (at, unit) = match heard {
             Heard::Frame(heard) => (heard.frame.at, heard.frame.unit),
-            Heard::Lost { at, request, .. } => (*at, request.first().copied()),
+            Heard::Ended(Ended { at, held, request, .. }) => {
+                (at.checked_add(*held).unwrap_or(*at), request.first().copied())
+            }
         };
         let shown = !self.args.quiet && (self.args.unit.is_none() || unit.is_none() || unit == self.args.unit);
         if shown {

@@ -2,7 +2,10 @@
 
 use super::*;
 use crate::plant::fixture::{self, DP, FAULT, PV, RUN, TIC};
-use crate::plant::tag::{DataType, StorePolicy};
+use crate::plant::{
+    event::ExceptionCode,
+    tag::{DataType, StorePolicy},
+};
 
 fn at(second: i64) -> Timestamp {
     Timestamp::from_second(second).expect("a small number")
@@ -93,6 +96,62 @@ fn trust_goes_with_failures() {
         assert_eq!(sample.quality, quality);
         assert_eq!(sample.value.is_none(), quality.is_bad(), "{fault}: a bad sample has no value");
     }
+}
+
+/// The same values on the line of another master, each heard twice, a second apart.
+fn heard() -> ProcessImage {
+    let mut def = fixture::plant();
+    def.lines[0].listens = true;
+    let mut image = ProcessImage::new(Arc::new(def), at(-1));
+    for second in [-1, 0] {
+        image.read(&[(PV, 724.0), (DP, 1.0), (FAULT, 0.0)], at(second));
+    }
+    image
+}
+
+#[test]
+fn what_is_not_heard_stands_for_its_period_and_no_longer() {
+    for (fault, cause) in [
+        (Fault::NotHeard, Cause::NotHeard),
+        (Fault::Timeout, Cause::Timeout),
+        (Fault::Crc { got: 1, computed: 2 }, Cause::Corrupt),
+    ] {
+        let mut image = heard();
+        for second in 1..=3 {
+            image.failed(&[PV], fault, at(second));
+            image.age(at(second));
+            assert_eq!(image.sample(PV), Sample::good(72.4, at(0)), "{fault} after {second} s");
+        }
+        image.age(at(4));
+        assert_eq!(image.sample(PV).quality, Quality::Uncertain(cause), "{fault}");
+        image.age(at(11));
+        assert_eq!(image.sample(PV).quality, Quality::Bad(cause), "{fault}");
+    }
+    // Nothing was lost, the master has not read it.
+    let mut image = heard();
+    image.failed(&[PV], Fault::Timeout, at(1));
+    image.read(&[(PV, 725.0)], at(2));
+    image.age(at(6));
+    assert_eq!(image.sample(PV).quality, Quality::Uncertain(Cause::NotHeard));
+    // What says that there is no value counts at once.
+    image.failed(&[DP], Fault::Exception(ExceptionCode(2)), at(6));
+    assert_eq!(image.sample(DP).quality, Quality::Bad(Cause::Exception));
+}
+
+#[test]
+fn what_was_heard_once_is_uncertain_and_scales_no_better() {
+    let mut image = heard();
+    image.read_once(&[(PV, 1.0.into())], &[], at(1));
+    assert_eq!(image.sample(PV), Sample::good(72.4, at(0)), "what is known stays");
+    let mut def = fixture::plant();
+    def.lines[0].listens = true;
+    let mut image = ProcessImage::new(Arc::new(def), at(0));
+    image.read_once(&[(PV, 724.0.into()), (DP, 1.0.into()), (FAULT, 0.0.into())], &[], at(0));
+    image.read(&[(PV, 724.0), (FAULT, 0.0)], at(1));
+    let once = Quality::Uncertain(Cause::HeardOnce);
+    assert_eq!(image.sample(PV), Sample { quality: once, ..Sample::good(72.4, at(1)) }, "its decimals were heard once");
+    image.read(&[(DP, 1.0)], at(2));
+    assert_eq!(image.sample(PV), Sample::good(72.4, at(1)));
 }
 
 #[test]

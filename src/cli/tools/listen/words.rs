@@ -8,12 +8,12 @@ use crate::{
     bus::{
         dissect::{self, Direction},
         frame,
-        listen::{Heard, HeardFrame, Listener, Role},
+        listen::{Ended, Heard, HeardFrame, Listener, Role},
     },
     cli::tools::shown,
     plant::{
         Snapshot,
-        event::UartCounters,
+        event::{Fault, UartCounters},
         id::TagId,
         line::{Framing, LineDef},
         request_stats::RequestStats,
@@ -44,10 +44,12 @@ impl Words {
     /// `12:01:05.135 response  1 register: 0032, after 12.1 ms`, and its bytes.
     pub fn frame_lines(&self, heard: &Heard) -> Vec<String> {
         match heard {
-            Heard::Lost { at, request, fault, .. } => {
+            Heard::Ended(Ended { outcome: Ok(()) | Err(Fault::Exception(_) | Fault::HeardOnce), .. }) => Vec::new(),
+            Heard::Ended(Ended { outcome: Err(fault), at, request, response, .. }) => {
                 let asked = frame::with_crc(request);
                 let asked = dissect::dissect(&asked, Some(Framing::Rtu), Some(Direction::Request), None).summary;
-                vec![self.line(*at, "lost", &format!("{asked}: {fault}"))]
+                let what = if response.is_some() { "doubtful" } else { "lost" };
+                vec![self.line(*at, what, &format!("{asked}: {fault}"))]
             }
             Heard::Frame(heard) => {
                 let (what, text) = words_of(heard);
@@ -96,10 +98,9 @@ fn words_of(heard: &HeardFrame) -> (&'static str, String) {
     };
     match &heard.role {
         Role::Request => ("request", dissected(Direction::Request, None)),
-        Role::Response { request, time, proven } => {
+        Role::Response { request, time } => {
             let after = time.map(|time| format!(", after {}", millis(Some(time)))).unwrap_or_default();
-            let late = if *proven { "" } else { "; may be the late response to an earlier request" };
-            ("response", format!("{}{after}{late}", dissected(Direction::Answer, Some(request))))
+            ("response", format!("{}{after}", dissected(Direction::Answer, Some(request))))
         }
         Role::Unmatched => {
             let unit = frame.unit.map(|unit| format!("unit {unit}: ")).unwrap_or_default();

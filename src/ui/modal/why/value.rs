@@ -114,7 +114,8 @@ fn because(
         | Cause::Unreadable
         | Cause::NotStored
         | Cause::NotReadBack
-        | Cause::Stated => None,
+        | Cause::Stated
+        | Cause::HeardOnce => None,
     }
 }
 
@@ -137,7 +138,9 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
         Cause::Exception => fault.or(last).and_then(of),
         Cause::SensorFault if fault == Some(Fault::NotANumber) => of(Fault::NotANumber),
         Cause::SensorFault => Some(t!("check the sensor, its wires and the input range of the device").to_owned()),
+        Cause::NotHeard if last == Some(Fault::NotHeard) => of(Fault::NotHeard),
         Cause::NotHeard => Some(t!("see whether the other master still reads it").to_owned()),
+        Cause::HeardOnce => of(Fault::HeardOnce),
         Cause::Unscaled => Some(t!("correct the other value first: press w on it for the cause").to_owned()),
         Cause::Stale => match def.poll {
             Poll::Every(_) => {

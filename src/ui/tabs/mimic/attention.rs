@@ -146,6 +146,7 @@ fn is_trouble(cause: Cause) -> bool {
         Cause::NotRead
         | Cause::NotReadBack
         | Cause::Stated
+        | Cause::HeardOnce
         | Cause::DeviceDown
         | Cause::NotConnected
         | Cause::StationOff

@@ -83,6 +83,8 @@ fn of_fault(fault: Fault, serial: bool) -> Vec<&'static str> {
         | FaultKind::OutOfSync
         | FaultKind::NotANumber
         | FaultKind::NotConnected
-        | FaultKind::BackedOff => Vec::new(),
+        | FaultKind::BackedOff
+        | FaultKind::NotHeard
+        | FaultKind::HeardOnce => Vec::new(),
     }
 }
