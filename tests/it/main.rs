@@ -13,6 +13,7 @@
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `listen` | the line of a master and a slave that we did not write, heard over a tap: frames, values, capture; nothing is sent |
 //! | `listening` | a station that only listens to such a line: its values, its refusals, a master that stops; nothing is sent |
+//! | `listening_losses` | the lines of other masters in virtual time, with bytes and frames lost, flipped, merged, late: no wrong value is good |
 //! | `mqtt` | data out to a broker that is stopped and killed, as the station is; TLS and passwords |
 //! | `mqtt_requests` | requests from outside: written once, refused, repeated, before and after a kill |
 //! | `capture` | saved traffic, opened by Wireshark's own reader |
@@ -60,6 +61,7 @@ mod hostile;
 mod kills;
 mod listen;
 mod listening;
+mod listening_losses;
 mod logs;
 mod masters;
 mod mqtt;
