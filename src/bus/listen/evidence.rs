@@ -30,7 +30,7 @@ const RISK_MAX: f64 = 4e-6;
 /// Losses are counted among about so many requests.
 const COUNT_MAX: u32 = 2048;
 /// A unit that was silent for so many times the usual timeout owes nothing any more.
-const REST: u32 = 10;
+const REST: u32 = 5;
 /// A master that goes on so long after the usual end of a response has surely given up.
 const PATIENCE_MAX: Duration = Duration::from_millis(50);
 /// A response lasts longer by this at the most, while its time is to be a proof.
@@ -200,6 +200,11 @@ impl Evidence {
         }
     }
 
+    /// A response of a unit to no open request has come.
+    pub fn answer_late(&mut self, unit: u8, at: Timestamp) {
+        self.unit(unit, at).answer_late(at);
+    }
+
     /// A request had no response that was heard, when the master went on after `waited`. `false`: its response was lost on the way
     /// here, because a master that gives up waits for longer.
     pub fn miss(&mut self, request: &[u8], waited: Duration) -> bool {
@@ -208,7 +213,7 @@ impl Evidence {
         let slack = self.units.get(&request[0]).and_then(Unit::slack).unwrap_or_default();
         let pause = 2 * self.order.pause(&request_key).unwrap_or_default() + slack;
         let takes = self.order.takes(&request_key);
-        let gave_up = takes.is_none_or(|takes| takes + pause.min(PATIENCE_MAX) < waited);
+        let gave_up = takes.map_or(2 * PATIENCE_MAX, |takes| takes + pause.min(PATIENCE_MAX)) < waited;
         // Or its response was lost on the way here, and the master has waited for that to a request behind it, which was lost too.
         if gave_up && !self.order.gives_up(&request_key, waited, takes.unwrap_or_default() / 2) {
             self.hide();

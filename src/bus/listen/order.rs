@@ -14,7 +14,9 @@ const SHARE_MIN: f64 = 1.0 / 16.0;
 const SHARE_RARE: f64 = 1.0 / 64.0;
 /// What was never heard has been as if so often: less than once.
 const UNSEEN: f64 = 0.25;
-/// What follows a request is known once it was heard so often.
+/// How long the master pauses after a request is known once it was heard so often.
+const PAUSES_MIN: u32 = 8;
+/// What follows it is known once it was heard so often.
 const ORDER_MIN: u32 = 64;
 /// Counts are halved from here on, so that the master's order of today counts, and what it did once is forgotten.
 const COUNT_MAX: u32 = 1024;
@@ -143,9 +145,9 @@ impl Order {
         usual
     }
 
-    /// How long the master pauses after its response as a rule.
+    /// How long the master pauses after its response as a rule, once that is known.
     pub fn pause(&self, request: &Key) -> Option<Duration> {
-        self.requests.get(request)?.pause
+        self.requests.get(request).filter(|known| PAUSES_MIN <= known.all())?.pause
     }
 
     /// Is no other request known that may have this response?

@@ -201,8 +201,9 @@ impl Listener {
     pub(super) fn unmatched(&mut self, message: &[u8], bytes: Vec<u8>, at: Timestamp, heard: &mut Vec<Heard>) {
         self.totals.unmatched += 1;
         self.units.entry(message[0]).or_default().late += 1;
+        self.evidence.answer_late(message[0], at);
         // A frame that came twice is no other response.
-        if !self.answered.as_ref().is_some_and(|answered| answered.message == message) {
+        if self.answered.as_ref().is_none_or(|answered| answered.message != message) {
             let of_unit = |answered: &Answered| !answered.open.numbered && answered.open.message[0] == message[0];
             let in_doubt = self.answered.as_ref().is_some_and(of_unit);
             self.settle(if in_doubt { Next::Doubt } else { Next::Other }, heard);

@@ -16,7 +16,9 @@ const OWED_MAX: usize = 16;
 /// Counts are halved from here on.
 const COUNT_MAX: u32 = 2048;
 /// Of so many times the mean and the least are known.
-const TIMES_MIN: u32 = 32;
+const TIMES_MIN: u32 = 16;
+/// Before they are known, a unit that has answered so many requests in a row owes nothing, if it hardly ever owes anything.
+const CALM: u32 = 256;
 /// Each time counts for so much in the mean: one part in as many.
 const MEAN_OF: f64 = 32.0;
 /// The least is that of the last one or two windows.
@@ -37,6 +39,8 @@ pub(super) struct Unit {
     /// Requests without response: any of them may still be answered. And whether one may be that was not heard.
     owed: Vec<Vec<u8>>,
     hidden: bool,
+    /// The master has waited in vain, so that one is really late or lost: no mere suspicion.
+    gave_up: bool,
     /// Responses since the last of them: how many; how much later than usual and how long after the one before, in seconds.
     since: u32,
     later: f64,
@@ -63,6 +67,7 @@ impl Unit {
             gap: None,
             owed,
             hidden: false,
+            gave_up: false,
             since,
             later,
             gaps,
@@ -97,7 +102,7 @@ impl Unit {
     /// No response to an earlier request can come any more.
     fn settle(&mut self) {
         self.owed.clear();
-        self.hidden = false;
+        (self.hidden, self.gave_up) = (false, false);
     }
 
     /// A request that was not heard may have had no response, which may still come.
@@ -121,14 +126,25 @@ impl Unit {
         }
         let time = elapsed(asked_at, first).as_secs_f64();
         let off = (time - self.mean).clamp(-self.spread(), self.spread());
-        if !self.is_in_doubt() {
+        if !self.is_in_doubt() || (self.times < TIMES_MIN && !self.gave_up) {
             self.learn(time, off);
-        } else if let Some(gap) = self.gap.filter(|_| TIMES_MIN <= self.times) {
+        } else if self.times < TIMES_MIN {
+            // There is nothing to compare it with.
+            self.since += 1;
+            if CALM <= self.since && self.missed() * f64::from(CALM) <= 2.0 {
+                self.settle();
+            }
+        } else if let Some(gap) = self.gap {
             (self.since, self.later, self.gaps) = (self.since + 1, self.later + off, self.gaps + gap.as_secs_f64());
             if self.in_order() <= risk {
                 self.settle();
             }
         }
+    }
+
+    /// A response of it to no open request has come: what it owes may still come.
+    pub fn answer_late(&mut self, at: Timestamp) {
+        self.answered_at = at;
     }
 
     /// How likely it is that the latest responses belong to the requests before theirs, by their times.
@@ -164,6 +180,7 @@ impl Unit {
         self.before = None;
         if owed {
             self.misses += 1;
+            self.gave_up = true;
             (self.since, self.later, self.gaps) = (0, 0.0, 0.0);
         }
         // What the master has got may have been the response to an earlier one.
@@ -182,7 +199,7 @@ impl Unit {
     /// It has certainly answered a request: what was asked before would have been answered before, unless this request was too.
     pub fn prove(&mut self, request: &[u8]) {
         if !self.hidden && self.owed.iter().all(|owed| owed != request) {
-            self.owed.clear();
+            self.settle();
         }
     }
 

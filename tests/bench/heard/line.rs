@@ -141,7 +141,8 @@ impl World {
     pub fn round(&mut self) -> Vec<Sent> {
         let mut sent = Vec::new();
         let round = self.round;
-        let mut cycle: Vec<Ask> = self.model.cycle.iter().filter(|ask| round % ask.every == 0).copied().collect();
+        let mut cycle: Vec<Ask> =
+            self.model.cycle.iter().filter(|ask| round.is_multiple_of(ask.every)).copied().collect();
         if self.model.shuffled {
             for place in (1..cycle.len()).rev() {
                 cycle.swap(place, self.dice.below(place as u64 + 1) as usize);
