@@ -97,7 +97,7 @@ pub fn advice(fault: Fault) -> &'static str {
         Fault::NotHeard => {
             "check wires A and B, ground and place of the tap: the other master hears more than this port"
         }
-        Fault::HeardOnce => "wait until the other master reads it again",
+        Fault::Unproven => "wait until the other master reads it again",
     }
 }
 

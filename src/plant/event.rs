@@ -225,8 +225,8 @@ pub enum Fault {
     #[error("{}", t!("no response was heard that is certainly its own"))]
     NotHeard,
     /// On the line of another master: a response to a request that was never heard before.
-    #[error("{}", t!("heard once: not yet certain"))]
-    HeardOnce,
+    #[error("{}", t!("heard, but not certainly its own response"))]
+    Unproven,
 }
 
 /// What a fault proves about the device and the line; what exactly was wrong with a frame makes no difference.
@@ -241,7 +241,7 @@ pub(crate) enum FaultKind {
     NotConnected,
     BackedOff,
     NotHeard,
-    HeardOnce,
+    Unproven,
 }
 
 impl Fault {
@@ -264,7 +264,7 @@ impl Fault {
             Fault::NotConnected => FaultKind::NotConnected,
             Fault::BackedOff => FaultKind::BackedOff,
             Fault::NotHeard => FaultKind::NotHeard,
-            Fault::HeardOnce => FaultKind::HeardOnce,
+            Fault::Unproven => FaultKind::Unproven,
         }
     }
 

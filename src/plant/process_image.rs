@@ -106,13 +106,13 @@ impl ProcessImage {
     }
 
     /// Takes what may be an answer to another request: as uncertain, where nothing better is known.
-    pub fn read_once(&mut self, values: &[(TagId, Exact)], texts: &[(TagId, Arc<str>)], at: Timestamp) {
+    pub fn read_unproven(&mut self, values: &[(TagId, Exact)], texts: &[(TagId, Arc<str>)], at: Timestamp) {
         let is_new = |tag: &TagId| !self.sample(*tag).quality.is_good();
         let values: Vec<_> = values.iter().filter(|(tag, _)| is_new(tag)).copied().collect();
         let texts: Vec<_> = texts.iter().filter(|(tag, _)| is_new(tag)).cloned().collect();
-        self.read_as(&values, Some(Cause::HeardOnce), at);
+        self.read_as(&values, Some(Cause::Unproven), at);
         self.read_texts(&texts, at);
-        texts.iter().for_each(|(tag, _)| self.mark_uncertain(*tag, Cause::HeardOnce));
+        texts.iter().for_each(|(tag, _)| self.mark_uncertain(*tag, Cause::Unproven));
     }
 
     fn read_as(&mut self, values: &[(TagId, impl Into<Exact> + Copy)], uncertain: Option<Cause>, at: Timestamp) {
@@ -375,8 +375,8 @@ impl ProcessImage {
                 None => sample.uncertain(word.quality.cause().unwrap_or(Cause::NotRead)),
             },
         };
-        let by_heard_once = tag.decimals.source().is_some_and(|from| self.sample(from).is_heard_once());
-        let sample = match uncertain.or(by_heard_once.then_some(Cause::HeardOnce)) {
+        let by_unproven = tag.decimals.source().is_some_and(|from| self.sample(from).is_unproven());
+        let sample = match uncertain.or(by_unproven.then_some(Cause::Unproven)) {
             Some(cause) if !sample.quality.is_bad() => sample.uncertain(cause),
             Some(_) | None => sample,
         };

@@ -163,8 +163,8 @@ impl Plant {
     pub fn on_event(&mut self, event: Event) -> Effects {
         let (at, action) = match event {
             Event::Read { at, device, values, texts, response_time, exchange } => {
-                if exchange.as_ref().is_some_and(|exchange| exchange.outcome == Err(Fault::HeardOnce)) {
-                    self.image.read_once(&values, &texts, at);
+                if exchange.as_ref().is_some_and(|exchange| exchange.outcome == Err(Fault::Unproven)) {
+                    self.image.read_unproven(&values, &texts, at);
                 } else {
                     self.image.read(&values, at);
                     self.image.read_texts(&texts, at);

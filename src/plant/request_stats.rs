@@ -69,7 +69,7 @@ impl RequestStats {
                 Some((_, count)) => *count += 1,
                 None => self.exceptions.push((code, 1)),
             },
-            Fault::HeardOnce => self.ok += 1,
+            Fault::Unproven => self.ok += 1,
             // Nothing was sent.
             Fault::NotConnected | Fault::BackedOff => self.requests -= 1,
         }

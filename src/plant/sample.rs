@@ -61,7 +61,7 @@ keyword_enum! {
         /// The plant file was reloaded, and has other registers for it.
         Reloaded = 18 => "plant file reloaded",
         /// The master of a line that is only listened to was heard reading it for the first time.
-        HeardOnce = 19 => "heard once",
+        Unproven = 19 => "heard, not proven",
     }
 }
 
@@ -180,10 +180,10 @@ impl Sample {
         self.exact().filter(|_| self.quality.is_good())
     }
 
-    /// The value only if others may be scaled by it: it is good, the plant file states it, or it was heard once, and then
+    /// The value only if others may be scaled by it: it is good, the plant file states it, or what was heard may be it, and then
     /// they are no better.
     pub fn scaling_value(self) -> Option<f64> {
-        self.value.filter(|_| self.quality.is_good() || self.is_stated() || self.is_heard_once())
+        self.value.filter(|_| self.quality.is_good() || self.is_stated() || self.is_unproven())
     }
 
     /// Does the plant file say so, and not the device?
@@ -191,9 +191,9 @@ impl Sample {
         self.quality == Quality::Uncertain(Cause::Stated)
     }
 
-    /// Has the master of its line been heard reading it only once?
-    pub fn is_heard_once(self) -> bool {
-        self.quality == Quality::Uncertain(Cause::HeardOnce)
+    /// May it be what another request was answered with?
+    pub fn is_unproven(self) -> bool {
+        self.quality == Quality::Uncertain(Cause::Unproven)
     }
 }
 

@@ -347,7 +347,7 @@ impl Link {
             | FaultKind::NotConnected
             | FaultKind::BackedOff
             | FaultKind::NotHeard
-            | FaultKind::HeardOnce => self.wire.counters.corrupt += 1,
+            | FaultKind::Unproven => self.wire.counters.corrupt += 1,
         }
         tracing::debug!(unit, request = %frame::hex(message), %fault, "a request failed");
         // Even what looked like a corrupt answer may have been noise, with the answer still on its way.

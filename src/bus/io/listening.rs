@@ -233,7 +233,7 @@ impl Task<'_> {
         }
         let Heard::Ended(Ended { request, outcome, time, .. }) = heard else { return };
         match outcome {
-            Ok(()) | Err(Fault::HeardOnce) => self.counters.ok += 1,
+            Ok(()) | Err(Fault::Unproven) => self.counters.ok += 1,
             Err(Fault::Exception(_)) => self.counters.exceptions += 1,
             Err(Fault::Timeout | Fault::NotHeard) => self.counters.timeouts += 1,
             Err(_) => self.counters.corrupt += 1,

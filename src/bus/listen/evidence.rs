@@ -54,9 +54,9 @@ pub(super) struct Pair<'a> {
 pub(super) enum Verdict {
     /// The response belongs to the request.
     Proven,
-    /// So it seems, but the request was never heard before: others of the master may be as new.
-    HeardOnce,
-    /// Not proven.
+    /// So it seems, but it may be that to another request.
+    Unproven,
+    /// Nothing is known yet, or nothing can be.
     Open,
 }
 
@@ -169,7 +169,7 @@ impl Evidence {
         let in_time = time <= self.timeout.max(self.patience(request[0]));
         if clean && in_time && self.order.is_only(&request, pair.response) {
             let is_new = self.order.times(&request) < 2 && RISK_MAX < one_by_one;
-            return if is_new { Verdict::HeardOnce } else { Verdict::Proven };
+            return if is_new { Verdict::Unproven } else { Verdict::Proven };
         }
         let Some(next) = next.map(key).filter(|_| is_usual) else { return Verdict::Open };
         let risk = match clean {
@@ -205,15 +205,15 @@ impl Evidence {
         self.unit(unit, at).answer_late(at);
     }
 
-    /// A request had no response that was heard, when the master went on after `waited`. `false`: its response was lost on the way
-    /// here, because a master that gives up waits for longer.
-    pub fn miss(&mut self, request: &[u8], waited: Duration) -> bool {
+    /// A request had no response that was heard whole, when the master went on after `waited`. `false`: its response was lost on the
+    /// way here, because a master that gives up waits for longer, or because it was heard, `damaged`.
+    pub fn miss(&mut self, request: &[u8], waited: Duration, damaged: bool) -> bool {
         let request_key = key(request);
         // After a response it pauses as usual, or a little longer.
         let slack = self.units.get(&request[0]).and_then(Unit::slack).unwrap_or_default();
         let pause = 2 * self.order.pause(&request_key).unwrap_or_default() + slack;
         let takes = self.order.takes(&request_key);
-        let gave_up = takes.map_or(2 * PATIENCE_MAX, |takes| takes + pause.min(PATIENCE_MAX)) < waited;
+        let gave_up = !damaged && takes.map_or(2 * PATIENCE_MAX, |takes| takes + pause.min(PATIENCE_MAX)) < waited;
         // Or its response was lost on the way here, and the master has waited for that to a request behind it, which was lost too.
         if gave_up && !self.order.gives_up(&request_key, waited, takes.unwrap_or_default() / 2) {
             self.hide();

@@ -84,7 +84,7 @@ impl Losses {
             | FaultKind::NotConnected
             | FaultKind::BackedOff
             | FaultKind::NotHeard
-            | FaultKind::HeardOnce => before,
+            | FaultKind::Unproven => before,
         };
         let tags = def.tags_of(*device).map(|tag| tag.id).collect();
         let (at, device, fault) = (*at, *device, Fault::BackedOff);
@@ -152,10 +152,10 @@ fn events_of(def: &PlantDef, at: Timestamp, device: DeviceId, span: &Span, excha
     let tags = || span.tags(def, device).map(|tag| tag.id).collect();
     match fault {
         // What a write that was answered has done is known when it is read.
-        None | Some(Fault::HeardOnce) if span.writes => return Vec::new(),
+        None | Some(Fault::Unproven) if span.writes => return Vec::new(),
         Some(_) if span.writes => return vec![Event::ForeignWrite { at, tags: tags(), fault }],
         // A value all the same, which is uncertain.
-        None | Some(Fault::HeardOnce) => {}
+        None | Some(Fault::Unproven) => {}
         Some(fault) => {
             return vec![Event::Failed { at, device, tags: tags(), fault, exchange: Some(exchange.clone()) }];
         }

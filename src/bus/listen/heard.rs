@@ -57,6 +57,6 @@ pub struct Ended {
     pub response: Option<Arc<[u8]>>,
     /// From the last byte of the request to the first of the response; `None` if both came at once.
     pub time: Option<Duration>,
-    /// As a poll would have it. [`Fault::NotHeard`] and [`Fault::HeardOnce`]: the response is not proven to be its own.
+    /// As a poll would have it. [`Fault::NotHeard`] and [`Fault::Unproven`]: the response is not proven to be its own.
     pub outcome: Result<(), Fault>,
 }

@@ -95,6 +95,9 @@ impl Listener {
             Next::Request(request) => self.evidence.judge(&answered.pair(), Some(request)),
             Next::Silence | Next::Other => self.evidence.judge(&answered.pair(), None),
         };
+        let may_be_its_own =
+            !answered.late && answered.open.strange == 0 && matches!(next, Next::Request(_) | Next::Other);
+        let verdict = if verdict == Verdict::Open && may_be_its_own { Verdict::Unproven } else { verdict };
         if verdict == Verdict::Open && matches!(next, Next::Silence) {
             answered.waits = true;
             self.answered = Some(answered);
@@ -108,7 +111,7 @@ impl Listener {
         let checked = frame::check_answer(self.framing, pair.request, pair.response);
         let outcome = match verdict {
             Verdict::Proven => checked,
-            Verdict::HeardOnce => checked.and(Err(Fault::HeardOnce)),
+            Verdict::Unproven => checked.and(Err(Fault::Unproven)),
             Verdict::Open => Err(Fault::NotHeard),
         };
         let time = response_time(&answered.open, pair.first);
@@ -157,7 +160,7 @@ impl Listener {
         if open.first {
             return;
         }
-        let gave_up = self.evidence.miss(&open.message, elapsed(open.at, first));
+        let gave_up = self.evidence.miss(&open.message, elapsed(open.at, first), self.is_response_damaged(&open));
         let fault = match self.left_over(&open.message, &open.noise) {
             Fault::Timeout if !gave_up => Fault::NotHeard,
             fault => fault,
@@ -169,6 +172,12 @@ impl Listener {
         let (held, framing) = (elapsed(at, self.now), self.framing);
         let (request, response, time, outcome) = (open.message, None, None, Err(fault));
         heard.push(Heard::Ended(Ended { at, held, framing, request, response, time, outcome }));
+    }
+
+    /// Is what came behind a request most of its response, in the time of one?
+    fn is_response_damaged(&self, open: &Open) -> bool {
+        let expected = frame::expected_length(&open.message).map(|length| frame::wrapped_length(self.framing, length));
+        expected.is_some_and(|expected| 3 * expected <= 4 * open.noise.len())
     }
 
     /// Names what came in place of a response.

@@ -37,6 +37,6 @@ pub(super) fn effect_of(fault: Fault) -> FaultEffect {
         FaultKind::NotConnected => FaultEffect::Gone(Cause::NotConnected),
         FaultKind::BackedOff => FaultEffect::Gone(Cause::DeviceDown),
         FaultKind::NotHeard => FaultEffect::Uncertain(Cause::NotHeard),
-        FaultKind::HeardOnce => FaultEffect::Uncertain(Cause::HeardOnce),
+        FaultKind::Unproven => FaultEffect::Uncertain(Cause::Unproven),
     }
 }

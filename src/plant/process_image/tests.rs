@@ -139,17 +139,21 @@ fn what_is_not_heard_stands_for_its_period_and_no_longer() {
 }
 
 #[test]
-fn what_was_heard_once_is_uncertain_and_scales_no_better() {
+fn what_is_not_proven_is_uncertain_and_scales_no_better() {
     let mut image = heard();
-    image.read_once(&[(PV, 1.0.into())], &[], at(1));
+    image.read_unproven(&[(PV, 1.0.into())], &[], at(1));
     assert_eq!(image.sample(PV), Sample::good(72.4, at(0)), "what is known stays");
     let mut def = fixture::plant();
     def.lines[0].listens = true;
     let mut image = ProcessImage::new(Arc::new(def), at(0));
-    image.read_once(&[(PV, 724.0.into()), (DP, 1.0.into()), (FAULT, 0.0.into())], &[], at(0));
+    image.read_unproven(&[(PV, 724.0.into()), (DP, 1.0.into()), (FAULT, 0.0.into())], &[], at(0));
     image.read(&[(PV, 724.0), (FAULT, 0.0)], at(1));
-    let once = Quality::Uncertain(Cause::HeardOnce);
-    assert_eq!(image.sample(PV), Sample { quality: once, ..Sample::good(72.4, at(1)) }, "its decimals were heard once");
+    let unproven = Quality::Uncertain(Cause::Unproven);
+    assert_eq!(
+        image.sample(PV),
+        Sample { quality: unproven, ..Sample::good(72.4, at(1)) },
+        "its decimals are not proven"
+    );
     image.read(&[(DP, 1.0)], at(2));
     assert_eq!(image.sample(PV), Sample::good(72.4, at(1)));
 }

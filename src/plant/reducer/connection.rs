@@ -30,7 +30,7 @@ impl Plant {
             }
             FaultKind::NotConnected => return,
             // Its master has heard it, for all that is known.
-            FaultKind::NotHeard | FaultKind::HeardOnce => {}
+            FaultKind::NotHeard | FaultKind::Unproven => {}
             // An exception proves that the device is there, unless a gateway sent it.
             FaultKind::Exception(code) if !code.is_of_gateway() => status.state = DeviceState::Responding,
             FaultKind::NotANumber => status.state = DeviceState::Responding,

@@ -355,7 +355,7 @@ fn failure_of(fault: Fault) -> Failure {
         _ if fault == Fault::Hangup => Failure::Hangup,
         FaultKind::Exception(_) => Failure::OfGateway,
         FaultKind::Corrupt | FaultKind::NotANumber => Failure::Corrupt,
-        FaultKind::OutOfSync | FaultKind::NotHeard | FaultKind::HeardOnce => Failure::Doubt,
+        FaultKind::OutOfSync | FaultKind::NotHeard | FaultKind::Unproven => Failure::Doubt,
         FaultKind::Timeout | FaultKind::NotConnected | FaultKind::BackedOff => Failure::Silence,
     }
 }

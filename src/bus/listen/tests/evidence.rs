@@ -71,8 +71,7 @@ impl Line {
             _ => "C",
         };
         let one = |ended: &Ended| match (ended.outcome, &ended.response) {
-            (Err(Fault::NotHeard), Some(_)) => format!("{}?", name(&ended.request)),
-            (Err(Fault::HeardOnce), _) => format!("{}1", name(&ended.request)),
+            (Err(Fault::NotHeard | Fault::Unproven), Some(_)) => format!("{}?", name(&ended.request)),
             (_, Some(_)) => format!("{}+", name(&ended.request)),
             (_, None) => format!("{}×", name(&ended.request)),
         };
@@ -168,7 +167,7 @@ fn what_is_heard_for_the_first_time_is_not_yet_certain() {
             line.frame(12, OF_A);
             line.silence(60);
         }
-        assert_eq!(line.shown(), "A1 A+", "{framing:?}");
+        assert_eq!(line.shown(), "A? A+", "{framing:?}");
         // On a line on which nothing was lost for long the first time is enough.
         line.rounds(300, 12);
         line.frame(100, C);

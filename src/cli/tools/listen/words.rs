@@ -44,7 +44,7 @@ impl Words {
     /// `12:01:05.135 response  1 register: 0032, after 12.1 ms`, and its bytes.
     pub fn frame_lines(&self, heard: &Heard) -> Vec<String> {
         match heard {
-            Heard::Ended(Ended { outcome: Ok(()) | Err(Fault::Exception(_) | Fault::HeardOnce), .. }) => Vec::new(),
+            Heard::Ended(Ended { outcome: Ok(()) | Err(Fault::Exception(_) | Fault::Unproven), .. }) => Vec::new(),
             Heard::Ended(Ended { outcome: Err(fault), at, request, response, .. }) => {
                 let asked = frame::with_crc(request);
                 let asked = dissect::dissect(&asked, Some(Framing::Rtu), Some(Direction::Request), None).summary;

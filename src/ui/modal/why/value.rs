@@ -115,7 +115,7 @@ fn because(
         | Cause::NotStored
         | Cause::NotReadBack
         | Cause::Stated
-        | Cause::HeardOnce => None,
+        | Cause::Unproven => None,
     }
 }
 
@@ -140,7 +140,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
         Cause::SensorFault => Some(t!("check the sensor, its wires and the input range of the device").to_owned()),
         Cause::NotHeard if last == Some(Fault::NotHeard) => of(Fault::NotHeard),
         Cause::NotHeard => Some(t!("see whether the other master still reads it").to_owned()),
-        Cause::HeardOnce => of(Fault::HeardOnce),
+        Cause::Unproven => of(Fault::Unproven),
         Cause::Unscaled => Some(t!("correct the other value first: press w on it for the cause").to_owned()),
         Cause::Stale => match def.poll {
             Poll::Every(_) => {

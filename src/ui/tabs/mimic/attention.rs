@@ -146,7 +146,7 @@ fn is_trouble(cause: Cause) -> bool {
         Cause::NotRead
         | Cause::NotReadBack
         | Cause::Stated
-        | Cause::HeardOnce
+        | Cause::Unproven
         | Cause::DeviceDown
         | Cause::NotConnected
         | Cause::StationOff

@@ -85,6 +85,6 @@ fn of_fault(fault: Fault, serial: bool) -> Vec<&'static str> {
         | FaultKind::NotConnected
         | FaultKind::BackedOff
         | FaultKind::NotHeard
-        | FaultKind::HeardOnce => Vec::new(),
+        | FaultKind::Unproven => Vec::new(),
     }
 }
