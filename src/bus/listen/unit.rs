@@ -19,6 +19,8 @@ const COUNT_MAX: u32 = 2048;
 const TIMES_MIN: u32 = 16;
 /// Before they are known, a unit that has answered so many requests in a row owes nothing, if it hardly ever owes anything.
 const CALM: u32 = 256;
+/// A pause is long from here on, if it is longer than four times the response behind it takes.
+const PAUSE_MIN: Duration = Duration::from_millis(100);
 /// Each time counts for so much in the mean: one part in as many.
 const MEAN_OF: f64 = 32.0;
 /// The least is that of the last one or two windows.
@@ -45,6 +47,8 @@ pub(super) struct Unit {
     since: u32,
     later: f64,
     gaps: f64,
+    /// And how many of them came after a long pause.
+    pauses: u32,
     /// Of about as many requests so many had no response.
     requests: u32,
     misses: u32,
@@ -71,6 +75,7 @@ impl Unit {
             since,
             later,
             gaps,
+            pauses: 0,
             requests,
             misses,
             before: None,
@@ -108,7 +113,7 @@ impl Unit {
     /// A request that was not heard may have had no response, which may still come.
     pub fn hide(&mut self) {
         self.hidden = true;
-        (self.since, self.later, self.gaps) = (0, 0.0, 0.0);
+        (self.since, self.later, self.gaps, self.pauses) = (0, 0.0, 0.0, 0);
     }
 
     /// It has answered a request that ended at `asked_at`, from `first` to `at`; `clean` without noise between. An error in a
@@ -129,9 +134,11 @@ impl Unit {
         if !self.is_in_doubt() || (self.times < TIMES_MIN && !self.gave_up) {
             self.learn(time, off);
         } else if self.times < TIMES_MIN {
-            // There is nothing to compare it with.
+            // There is nothing to compare it with, but nothing outlasts a long pause unless it is late again.
             self.since += 1;
-            if CALM <= self.since && self.missed() * f64::from(CALM) <= 2.0 {
+            self.pauses += u32::from(self.gap.is_some_and(|gap| PAUSE_MIN.max(elapsed(asked_at, first) * 4) < gap));
+            let late_again = self.may_miss().powi(i32::try_from(self.pauses).unwrap_or(i32::MAX));
+            if late_again <= risk || (CALM <= self.since && self.missed() * f64::from(CALM) <= 2.0) {
                 self.settle();
             }
         } else if let Some(gap) = self.gap {
@@ -152,9 +159,12 @@ impl Unit {
         let gap = self.gaps / f64::from(self.since);
         let odds = (self.later + self.gaps / 2.0) * gap / self.variance.max(VARIANCE_MIN);
         // Each of them may be late again.
-        (-odds).exp().max(
-            (self.missed() + 1.0 / f64::from(self.requests + 1)).powi(i32::try_from(self.since).unwrap_or(i32::MAX)),
-        )
+        (-odds).exp().max(self.may_miss().powi(i32::try_from(self.since).unwrap_or(i32::MAX)))
+    }
+
+    /// How often it may have no response, of 1.
+    fn may_miss(&self) -> f64 {
+        self.missed() + 1.0 / f64::from(self.requests + 1)
     }
 
     fn learn(&mut self, time: f64, off: f64) {
@@ -181,7 +191,7 @@ impl Unit {
         if owed {
             self.misses += 1;
             self.gave_up = true;
-            (self.since, self.later, self.gaps) = (0, 0.0, 0.0);
+            (self.since, self.later, self.gaps, self.pauses) = (0, 0.0, 0.0, 0);
         }
         // What the master has got may have been the response to an earlier one.
         if owed || self.is_in_doubt() {
