@@ -32,9 +32,10 @@ pub(super) struct Open {
     pub at: Timestamp,
     /// The first frame of all: its response may have been before the first byte heard.
     first: bool,
-    /// What has come since that is no frame; and how many bytes of anything.
+    /// What has come since in place of its response; how many bytes of anything, and of what is no frame.
     noise: Vec<u8>,
     strange: usize,
+    broken: usize,
 }
 
 impl Open {
@@ -151,7 +152,16 @@ impl Listener {
             self.units.entry(0).or_default().requests += 1;
         } else {
             let noise = Vec::new();
-            self.open.push_back(Open { message, transaction, numbered, at, first: is_first, noise, strange: 0 });
+            self.open.push_back(Open {
+                message,
+                transaction,
+                numbered,
+                at,
+                first: is_first,
+                noise,
+                strange: 0,
+                broken: 0,
+            });
         }
     }
 
@@ -174,10 +184,10 @@ impl Listener {
         heard.push(Heard::Ended(Ended { at, held, framing, request, response, time, outcome }));
     }
 
-    /// Is what came behind a request most of its response, in the time of one?
+    /// Is what came behind a request, and is no frame, as long as most of its response?
     fn is_response_damaged(&self, open: &Open) -> bool {
         let expected = frame::expected_length(&open.message).map(|length| frame::wrapped_length(self.framing, length));
-        expected.is_some_and(|expected| 3 * expected <= 4 * open.noise.len())
+        expected.is_some_and(|expected| 3 * expected <= 4 * open.broken)
     }
 
     /// Names what came in place of a response.
@@ -257,6 +267,7 @@ impl Listener {
         if let Some(open) = self.open.front_mut() {
             open.add_noise(&bytes);
             open.strange += bytes.len();
+            open.broken += bytes.len();
         }
         heard.push(self.frame(at, false, bytes.into(), FrameResult::Wrong(why), Role::Noise));
     }
