@@ -123,7 +123,9 @@ impl Order {
     /// A request has taken so long, up to the end of its response, which has lasted so long.
     pub fn took(&mut self, request: &Key, time: Duration, lasted: Duration) {
         let Some(known) = self.requests.get_mut(request) else { return };
-        (known.takes, known.lasts) = (Some(mean(known.takes, time)), Some(mean(known.lasts, lasted)));
+        // A spell of slow responses must not look like the rule: the master gives up in it.
+        let usual = known.takes.map_or(time, |takes| time.min(takes + takes / 16));
+        (known.takes, known.lasts) = (Some(mean(known.takes, usual)), Some(mean(known.lasts, lasted)));
     }
 
     /// How long its response lasts as a rule.

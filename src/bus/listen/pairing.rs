@@ -96,8 +96,9 @@ impl Listener {
             Next::Request(request) => self.evidence.judge(&answered.pair(), Some(request)),
             Next::Silence | Next::Other => self.evidence.judge(&answered.pair(), None),
         };
-        let may_be_its_own =
-            !answered.late && answered.open.strange == 0 && matches!(next, Next::Request(_) | Next::Other);
+        let is_beside = matches!(next, Next::Request(_) | Next::Other) && answered.open.strange == 0;
+        // A refusal would take the value away.
+        let may_be_its_own = is_beside && !answered.late && answered.message.get(1).is_some_and(|code| *code < 0x80);
         let verdict = if verdict == Verdict::Open && may_be_its_own { Verdict::Unproven } else { verdict };
         if verdict == Verdict::Open && matches!(next, Next::Silence) {
             answered.waits = true;
