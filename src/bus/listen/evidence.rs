@@ -114,11 +114,24 @@ impl Evidence {
     /// Something comes after a silence in which no response was waited for.
     pub fn pause(&mut self, silence: Duration) {
         if self.order.pause(&self.last).is_some_and(|usual| 2 * usual + PATIENCE_MAX < silence) {
+            self.suspect();
+        }
+    }
+
+    /// There was time enough for a request that was not heard and is without response. A line that hardly ever loses frames, with
+    /// units that hardly ever are silent, does not do both.
+    fn suspect(&mut self) {
+        let missed = self.units.values().map(Unit::may_miss).fold(0.0, f64::max);
+        if RISK_MAX < self.of_requests(self.losses + 1) * missed {
             self.hide();
         }
     }
 
-    /// There was time enough for a request without response that was not heard either.
+    fn of_requests(&self, count: u32) -> f64 {
+        f64::from(count) / f64::from(self.requests + 1)
+    }
+
+    /// A response to a request that was not heard may still come.
     pub fn hide(&mut self) {
         self.hidden = true;
         self.units.values_mut().for_each(Unit::hide);
@@ -163,9 +176,8 @@ impl Evidence {
             return Verdict::Proven;
         }
         // Two frames are lost one by one, where nothing is left as noise; or at once, which there may be a first time for.
-        let of_requests = |count: u32| f64::from(count) / f64::from(self.requests + 1);
-        let lost = of_requests(self.losses + 1) + unit.map_or(0.0, Unit::missed);
-        let (one_by_one, at_once) = (lost.powi(2), of_requests(self.gaps + 1));
+        let lost = self.of_requests(self.losses + 1) + unit.map_or(0.0, Unit::missed);
+        let (one_by_one, at_once) = (lost.powi(2), self.of_requests(self.gaps + 1));
         let in_time = time <= self.timeout.max(self.patience(request[0]));
         if clean && in_time && self.order.is_only(&request, pair.response) {
             let is_new = self.order.times(&request) < 2 && RISK_MAX < one_by_one;
@@ -193,7 +205,7 @@ impl Evidence {
         unit.answer(pair.asked_at, pair.first, pair.at, clean, RISK_MAX);
         self.answered_at = pair.at;
         if unusual {
-            self.hide();
+            self.suspect();
         }
         if clean {
             self.order.took(&key(pair.request), elapsed(pair.asked_at, pair.at), elapsed(pair.first, pair.at));
@@ -216,7 +228,7 @@ impl Evidence {
         let gave_up = !damaged && takes.map_or(2 * PATIENCE_MAX, |takes| takes + pause.min(PATIENCE_MAX)) < waited;
         // Or its response was lost on the way here, and the master has waited for that to a request behind it, which was lost too.
         if gave_up && !self.order.gives_up(&request_key, waited, takes.unwrap_or_default() / 2) {
-            self.hide();
+            self.suspect();
         }
         self.units.get_mut(&request[0]).into_iter().for_each(|unit| unit.miss(request, gave_up));
         gave_up

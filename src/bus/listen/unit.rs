@@ -163,7 +163,7 @@ impl Unit {
     }
 
     /// How often it may have no response, of 1.
-    fn may_miss(&self) -> f64 {
+    pub fn may_miss(&self) -> f64 {
         self.missed() + 1.0 / f64::from(self.requests + 1)
     }
 

@@ -200,8 +200,7 @@ fn a_missing_tag_is_reported_and_its_neighbours_are_read() {
 #[test]
 fn the_only_register_that_is_there_is_found_behind_refused_ones() {
     let def = words(&[10, 32, 42]);
-    let (unreadable, _) = bisection(&def, &[10, 32], 125);
-    assert_eq!(refused(&def, LineId(0), &unreadable), [TagId(0), TagId(1)]);
+    assert_eq!(refused(&def, LineId(0), &bisection(&def, &[10, 32], 125).0), [TagId(0), TagId(1)]);
 }
 
 #[test]
