@@ -24,6 +24,7 @@
 //! | `rights` | every command, request and query through the socket, by everybody who may be at a terminal |
 //! | `users` | wrong passwords, lockout, idle lock, second users, two operators at once |
 //! | `kills` | stations killed during writes, acknowledgements, logins and reports: what was reported as done is in the audit log |
+//! | `crashes` | stations that end at any operation on the disk, by a kill or a loss of power, as seeds say |
 //! | `outstanding` | stations killed and started again, with a slow device: a late reply to the old one is no value |
 //! | `tampering` | the audit log changed by hand: what `sightglass audit verify` says |
 //! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
@@ -51,6 +52,7 @@ mod attach;
 mod backup;
 mod capture;
 mod commands;
+mod crashes;
 mod devices;
 mod durability;
 mod endings;
