@@ -1,6 +1,6 @@
 //! What stands between a command and its effect: interlocks, the mode in which a command is effective, and whether the feedback follows it.
 
-use std::time::Duration;
+use std::{ops::RangeInclusive, time::Duration};
 
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -12,6 +12,8 @@ use super::{
     id::TagId,
     role::Role,
     sample::{Cause, Sample},
+    scale,
+    tag::{Decimals, TagDef},
 };
 use crate::plant::time::elapsed;
 
@@ -112,18 +114,6 @@ pub struct SequenceDef {
 }
 
 impl ControlLogic {
-    /// The interlocks of one value of a command, as the device will hold it or does.
-    pub fn interlocks_of(&self, tag: TagId, value: Exact) -> impl Iterator<Item = &InterlockDef> {
-        self.interlocks.iter().filter(move |lock| lock.tag == tag && value == lock.value)
-    }
-
-    /// The interlock for which this command is certainly without effect and is not to be sent. What will be sent decides, not
-    /// what was typed: `value` is as the device will hold it, `super::scale::rounded_to_device`.
-    pub fn refusal(&self, tag: TagId, value: Exact, sample: impl Fn(TagId) -> Sample) -> Option<&InterlockDef> {
-        let blocks = |lock: &&InterlockDef| lock.refuse && lock.status(sample(lock.of)) == InterlockStatus::Blocked;
-        self.interlocks_of(tag, value).find(blocks)
-    }
-
     /// The actuator that a tag is the output or the command of.
     pub fn actuator(&self, tag: TagId) -> Option<(usize, &ActuatorDef)> {
         self.actuators.iter().enumerate().find(|(_, actuator)| actuator.output == tag || actuator.command == tag)
@@ -137,7 +127,7 @@ impl ControlLogic {
             return false;
         };
         let is_effective = actuator.needs.iter().all(|(tag, state)| sample(*tag).good_value() == Some(*state));
-        let mut locks = self.interlocks_of(actuator.command, command.into());
+        let mut locks = self.interlocks.iter().filter(|lock| lock.tag == actuator.command && lock.value == command);
         let blocked = locks.any(|lock| lock.status(sample(lock.of)) == InterlockStatus::Blocked);
         actuator.travel.is_some() && is_effective && !blocked && (command != actuator.off) != (output != 0.0)
     }
@@ -152,20 +142,66 @@ pub fn stops<'a>(logic: &'a ControlLogic, actions: &'a [ActionDef], tag: TagId) 
     actuators.chain(sequences).chain(actions).filter(move |(command, _)| *command == tag).map(|(_, off)| off)
 }
 
-/// Does this value of a command switch something off? It is as the device will hold it, [`super::scale::rounded_to_device`]: a typed number
-/// that is only rounded to a stop counts as none.
-pub fn is_stop(def: &PlantDef, tag: TagId, rounded: Exact) -> bool {
-    stops(&def.logic, &def.device(def.tag(tag).device).actions, tag).any(|off| rounded == off)
+/// The interlocks of this value of a command. Here and below `value` is what is asked for, and what is then sent is compared
+/// ([`scale::is_sent_as`]); `decimals` are those of [`TagDef::scaling_decimals`], `None` where they are not known: then the strictest
+/// of all that are possible counts.
+pub fn of_write(def: &PlantDef, tag: TagId, value: Exact, decimals: Option<u8>) -> impl Iterator<Item = &InterlockDef> {
+    let written = def.tag(tag);
+    let is_meant = move |rule: f64| {
+        possible_decimals(written, decimals).any(|decimals| scale::is_sent_as(written, value, rule.into(), decimals))
+    };
+    def.logic.interlocks.iter().filter(move |lock| lock.tag == tag && is_meant(lock.value))
+}
+
+/// The interlock for which this command is certainly without effect and is not to be sent.
+pub fn refusal(
+    def: &PlantDef,
+    tag: TagId,
+    value: Exact,
+    decimals: Option<u8>,
+    sample: impl Fn(TagId) -> Sample,
+) -> Option<&InterlockDef> {
+    let blocks = |lock: &&InterlockDef| lock.refuse && lock.status(sample(lock.of)) == InterlockStatus::Blocked;
+    of_write(def, tag, value, decimals).find(blocks)
+}
+
+/// Does this value of a command certainly switch something off?
+pub fn is_stop(def: &PlantDef, tag: TagId, value: Exact, decimals: Option<u8>) -> bool {
+    let mut ways = sent_by(def.tag(tag), value, decimals).peekable();
+    ways.peek().is_some() && ways.all(|decimals| is_stop_by(def, tag, value, decimals))
+}
+
+fn is_stop_by(def: &PlantDef, tag: TagId, value: Exact, decimals: u8) -> bool {
+    let mut stops = stops(&def.logic, &def.device(def.tag(tag).device).actions, tag);
+    stops.any(|off| scale::is_sent_as(def.tag(tag), value, off.into(), decimals))
+}
+
+/// By how many decimals the raw number of a tag may be scaled: those that are `known`, else all that its device can announce.
+fn possible_decimals(tag: &TagDef, known: Option<u8>) -> RangeInclusive<u8> {
+    match (tag.decimals, known) {
+        (Decimals::Fixed(_), _) => 0..=0,
+        (Decimals::From(_), Some(known)) => known..=known,
+        (Decimals::From(_), None) => 0..=Decimals::MAX,
+    }
+}
+
+/// The decimals by which a value can be sent at all.
+fn sent_by(tag: &TagDef, value: Exact, known: Option<u8>) -> impl Iterator<Item = u8> {
+    possible_decimals(tag, known).filter(move |decimals| scale::to_raw(tag, value, *decimals).is_some())
 }
 
 /// The least role that may write this value to a tag: that of the action that writes it, else that of the tag. A stop is for
-/// everybody who may operate.
-pub fn role_to_write(def: &PlantDef, tag: TagId, rounded: Exact) -> Role {
-    if is_stop(def, tag, rounded) {
-        return Role::Technician;
-    }
-    let mut actions = actions_on(def, tag).filter(|action| rounded == action.value);
-    actions.find_map(|action| action.role).unwrap_or(def.tag(tag).role)
+/// everybody who may operate. Decimals that a device announces may change before the write, so that all are considered.
+pub fn role_to_write(def: &PlantDef, tag: TagId, value: Exact) -> Role {
+    let written = def.tag(tag);
+    let role_by = |decimals: u8| {
+        if is_stop_by(def, tag, value, decimals) {
+            return Role::Technician;
+        }
+        let is_sent = |action: &&ActionDef| scale::is_sent_as(written, value, action.value.into(), decimals);
+        actions_on(def, tag).filter(is_sent).find_map(|action| action.role).unwrap_or(written.role)
+    };
+    sent_by(written, value, None).map(role_by).max().unwrap_or(written.role)
 }
 
 /// The least role that may write any value to a tag.
@@ -275,9 +311,9 @@ mod tests {
     #[test]
     fn only_what_is_certainly_blocked_is_refused() {
         let check = |refuse, value, level: Sample, refused: bool| {
-            let logic = logic(refuse);
+            let def = PlantDef { logic: logic(refuse), ..crate::plant::fixture::plant() };
             assert_eq!(
-                logic.refusal(COMMAND, Exact::plain(value), |_| level).is_some(),
+                refusal(&def, COMMAND, Exact::plain(value), Some(0), |_| level).is_some(),
                 refused,
                 "{value} at {level:?}"
             );

@@ -6,6 +6,9 @@ use super::{
     tag::{Encoding, TagDef},
 };
 
+/// Least and greatest value, where there are any.
+pub type Bounds = (Option<Exact>, Option<Exact>);
+
 /// The value of a raw number: `raw · scale · 10^-decimals + offset`. `decimals` are those that the device
 /// announces for this tag ([`super::tag::Decimals::From`]), 0 for all others.
 pub fn to_value(tag: &TagDef, raw: impl Into<Exact>, decimals: u8) -> Exact {
@@ -25,7 +28,8 @@ pub fn to_raw(tag: &TagDef, value: impl Into<Exact>, decimals: u8) -> Option<Exa
         Encoding::Float => {
             let held = as_stored(tag, unscaled(value, tag.scale, tag.offset, decimals));
             let max = if tag.point.kind.registers() == 2 { f64::from(f32::MAX) } else { f64::MAX };
-            return (held.abs() <= max).then(|| held.into());
+            // A zero has no sign: its bits would be those of another number to a device that compares words.
+            return (held.abs() <= max).then(|| (held + 0.0).into());
         }
         Encoding::Text => return None,
         Encoding::Bit | Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => {
@@ -55,6 +59,21 @@ fn unscaled(value: Exact, scale: f64, offset: f64, decimals: u8) -> f64 {
 /// The value as the device will hold it once it is written: rounded to what the type can hold; `None` if it does not fit.
 pub fn rounded_to_device(tag: &TagDef, value: impl Into<Exact>, decimals: u8) -> Option<Exact> {
     to_raw(tag, value, decimals).map(|raw| to_value(tag, raw, decimals))
+}
+
+/// The raw number to write for a value within bounds; `None` if the type cannot hold it, or if the value, or what the device
+/// will hold, is beyond a bound: rounding must not lead there, nor hide that more was asked for.
+pub fn raw_within(tag: &TagDef, value: Exact, decimals: u8, (min, max): Bounds) -> Option<Exact> {
+    let raw = to_raw(tag, value, decimals)?;
+    let inside = |value| is_inside(min, max, value);
+    (inside(value) && inside(to_value(tag, raw, decimals))).then_some(raw)
+}
+
+/// Does a device get the same raw number for two values? What is sent decides, not what was typed: 3.4 is 3 in a register
+/// without decimals, and a single-precision one has no 0.1.
+pub fn is_sent_as(tag: &TagDef, value: Exact, other: Exact, decimals: u8) -> bool {
+    let raw = |value| to_raw(tag, value, decimals);
+    raw(value).zip(raw(other)).is_some_and(|(one, other)| same_raw(tag, one, other))
 }
 
 /// Do two raw numbers of a tag mean the same stored value?

@@ -165,7 +165,7 @@ impl Snapshot {
     pub fn step(&self, tag: TagId) -> f64 {
         self.def.tag(tag).scale.abs() * 10f64.powi(-i32::from(self.scaling_decimals(tag)))
     }
-    fn scaling_decimals(&self, tag: TagId) -> u8 {
+    pub(crate) fn scaling_decimals(&self, tag: TagId) -> u8 {
         match self.def.tag(tag).decimals {
             Decimals::Fixed(_) => 0,
             Decimals::From(_) => self.decimals[tag.index()],

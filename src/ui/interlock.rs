@@ -16,7 +16,7 @@ use crate::plant::{
     command::{CommandKind, CommandStatus, NotConfirmed, Outcome},
     def::TagId,
     exact::Exact,
-    interlock::{ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
+    interlock::{self, ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
     tag::{DataType, TagDef},
     time::elapsed,
 };
@@ -44,9 +44,13 @@ fn two_states(def: &TagDef) -> Option<(f64, f64)> {
     }
 }
 
+fn decimals(cx: &ViewContext, tag: TagId) -> Option<u8> {
+    Some(cx.snapshot.scaling_decimals(tag))
+}
+
 /// Is this value of a tag certainly without effect, so that it is not to be sent?
 pub fn is_refused(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
-    cx.def().logic.refusal(tag, cx.snapshot.rounded_to_device(tag, value), |tag| cx.snapshot.sample(tag)).is_some()
+    interlock::refusal(cx.def(), tag, value, decimals(cx, tag), |tag| cx.snapshot.sample(tag)).is_some()
 }
 
 /// What forbids a command now: the missing right, the line, an interlock or the mode; nothing where it can be given. Of two
@@ -59,8 +63,8 @@ pub fn forbidden_text(cx: &ViewContext, tag: TagId) -> Option<String> {
     };
     let kind = CommandKind::Write { tag, value: value.unwrap_or_default().into() };
     let blocks = |value: f64| {
-        let value = cx.snapshot.rounded_to_device(tag, value.into());
-        cx.def().logic.interlocks_of(tag, value).find_map(|lock| interlock_text(cx, lock)).map(|(words, _)| words)
+        let mut locks = interlock::of_write(cx.def(), tag, value.into(), decimals(cx, tag));
+        locks.find_map(|lock| interlock_text(cx, lock)).map(|(words, _)| words)
     };
     rights::missing(cx, &kind)
         .or_else(|| Notice::why_unreachable(cx, def.device))
@@ -73,11 +77,8 @@ pub fn forbidden_text(cx: &ViewContext, tag: TagId) -> Option<String> {
 pub fn before_write(cx: &ViewContext, tag: TagId, value: Exact) -> Vec<(String, Style)> {
     let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
     let gone = gone.map(|why| (t!("! Writing is not possible now. {why}", why), cx.theme.trouble()));
-    let locks = cx
-        .def()
-        .logic
-        .interlocks_of(tag, cx.snapshot.rounded_to_device(tag, value))
-        .filter_map(|lock| interlock_text(cx, lock));
+    let locks = interlock::of_write(cx.def(), tag, value, decimals(cx, tag));
+    let locks = locks.filter_map(|lock| interlock_text(cx, lock));
     let mut rows: Vec<(String, Style)> = gone.into_iter().chain(locks).collect();
     if is_refused(cx, tag, value) {
         rows.push((t!("Not sent: it would have no effect.").to_owned(), cx.theme.strong()));
@@ -228,7 +229,8 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
             (Some(command), Some(output)) if (command != actuator.off) != (output != 0.0) => {
                 let arrow = cx.theme.pick("→", "->");
                 let new = cx.snapshot.format(actuator.command, command);
-                let mut locks = cx.def().logic.interlocks_of(actuator.command, command.into());
+                let shown = decimals(cx, actuator.command);
+                let mut locks = interlock::of_write(cx.def(), actuator.command, command.into(), shown);
                 let blocked = locks.any(|lock| lock.status(cx.snapshot.sample(lock.of)) == InterlockStatus::Blocked);
                 let but = if blocked { t!(", blocked") } else { "" };
                 changes.push(format!("{name} {} {arrow} {new}{but}", value::show(cx, actuator.output).with_unit()));

@@ -33,7 +33,7 @@ impl AccessControl {
         command.note = command.note.map(|note| clean(&note).into());
         // A stop is never one command too many.
         let stops = matches!(command.kind, CommandKind::AbortProcedure(_))
-            || command.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value));
+            || command.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value, None));
         if !self.within_rate(terminal, at) && !stops {
             return self.undelivered(command.id, TOO_MANY);
         }

@@ -118,7 +118,7 @@ impl AccessControl {
 pub fn required(def: &PlantDef, kind: &CommandKind) -> Option<Reauthentication> {
     let asks = |tag: TagId, value: Exact| {
         let kind = def.tags.get(tag.index())?.reauthenticate?;
-        (!interlock::is_stop(def, tag, value)).then_some(kind)
+        (!interlock::is_stop(def, tag, value, None)).then_some(kind)
     };
     // The strictest of all.
     kind.writes(def).filter_map(|(tag, value)| asks(tag, value)).max()

@@ -362,6 +362,7 @@ mod commands;
 mod place;
 mod room;
 mod delegate;
+mod matrix;
 
 proptest! {
     #[test]

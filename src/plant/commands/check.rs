@@ -48,34 +48,33 @@ impl CommandTracker {
             return refuse(Refusal::ReadOnly);
         }
         let decimals = image.scaling_decimals(def);
-        let rounded = decimals.and_then(|decimals| scale::rounded_to_device(def, value, decimals));
-        let urgent = rounded.is_some_and(|rounded| interlock::is_stop(&self.def, tag, rounded));
+        let sent = decimals.and_then(|decimals| scale::to_raw(def, value, decimals));
+        let urgent = interlock::is_stop(&self.def, tag, value, decimals);
         let mut under_way = self.writes.iter().filter(|(_, job)| job.tag == tag).map(|(_, job)| job.raw).peekable();
         let is_busy = under_way.peek().is_some();
         // A stop need not wait for the start under way; the same stop twice would only take the line's time.
-        let same = |raw| decimals.map(|decimals| scale::to_value(def, raw, decimals)) == rounded;
+        let same = |raw| sent.is_some_and(|sent| scale::same_raw(def, raw, sent));
         if is_busy && (!urgent || under_way.any(same)) {
             return refuse(Refusal::UnderWay);
         }
-        if !def.enum_labels.is_empty() && def.label_of(value).is_none() {
+        let held = decimals.zip(sent).map(|(decimals, sent)| scale::to_value(def, sent, decimals));
+        if !def.enum_labels.is_empty()
+            && [Some(value), held].iter().flatten().any(|value| def.label_of(*value).is_none())
+        {
             return refuse(Refusal::NotAChoice);
         }
-        if let Some(lock) = self.def.logic.refusal(tag, rounded.unwrap_or(value), |tag| image.sample(tag)) {
+        if let Some(lock) = interlock::refusal(&self.def, tag, value, decimals, |tag| image.sample(tag)) {
             return refuse(Refusal::Interlock(lock.message.clone()));
         }
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
-        let (min, max) = def.limits(|tag| image.sample(tag).good_exact()).map_err(unknown)?;
+        let bounds = def.limits(|tag| image.sample(tag).good_exact()).map_err(unknown)?;
         let Some(decimals) = decimals else {
             return refuse(Refusal::Unknown("number of decimals".into()));
         };
-        // A limit holds for what is sent: rounding must not lead beyond it, nor hide that more was asked for.
-        let inside =
-            scale::is_inside(min, max, value) && rounded.is_none_or(|rounded| scale::is_inside(min, max, rounded));
-        let raw = scale::to_raw(def, value, decimals).filter(|_| inside);
-        let Some(raw) = raw else {
+        let Some(raw) = scale::raw_within(def, value, decimals, bounds) else {
             let shown = Some(image.shown_decimals(def));
             let text = |bound: Option<Exact>, none: &str| bound.map_or(none.into(), |bound| digits(bound, shown));
-            return refuse(Refusal::OutOfRange { min: text(min, "−∞"), max: text(max, "∞") });
+            return refuse(Refusal::OutOfRange { min: text(bounds.0, "−∞"), max: text(bounds.1, "∞") });
         };
         // What was read before the write under way says nothing about the time after it.
         if !is_busy && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {

@@ -10,6 +10,7 @@ use super::{ParameterSet, Trusted, compare, same};
 use crate::plant::{
     def::{DeviceId, PlantDef, TagId},
     exact::Exact,
+    interlock,
     sample::{Cause, Sample},
     scale,
     tag::{Decimals, TagDef},
@@ -91,6 +92,12 @@ pub fn plan(
     if !problems.is_empty() {
         return Err(problems);
     }
+    // From here on it is what will be sent: that is confirmed, permitted and recorded.
+    for PlannedChange { tag, new, .. } in &mut changes {
+        let tag = def.tag(*tag);
+        let held = tag.scaling_decimals(trusted).and_then(|decimals| scale::rounded_to_device(tag, *new, decimals));
+        *new = held.unwrap_or(*new);
+    }
     in_order(def, device, changes, trusted)
         .map_err(|stuck| stuck.iter().map(|change| Problem::NoOrder(def.tag(change.tag).short.clone())).collect())
 }
@@ -153,23 +160,22 @@ fn unfit(
     if !tag.enum_labels.is_empty() && tag.label_of(change.new).is_none() {
         return Some(Problem::NotAChoice { tag: tag.short.clone(), value: change.new });
     }
-    let rounded =
-        tag.scaling_decimals(trusted).and_then(|decimals| scale::rounded_to_device(tag, change.new, decimals));
-    if let Some(lock) = def.logic.refusal(tag.id, rounded.unwrap_or(change.new), |tag| as_sample(trusted(tag))) {
+    let decimals = tag.scaling_decimals(trusted);
+    if let Some(lock) = interlock::refusal(def, tag.id, change.new, decimals, |tag| as_sample(trusted(tag))) {
         return Some(Problem::Interlock { tag: tag.short.clone(), text: lock.message.clone() });
     }
-    let (min, max) = match tag.limits(then) {
+    let bounds = match tag.limits(then) {
         Ok(limits) => limits,
         Err(from) => return Some(Problem::Unknown(def.tag(from).short.clone())),
     };
-    let Some(decimals) = tag.scaling_decimals(trusted) else {
+    let Some(decimals) = decimals else {
         return Some(Problem::Unknown(t!("the decimals of {tag}", tag = tag.short)));
     };
-    if scale::is_inside(min, max, change.new) && scale::to_raw(tag, change.new, decimals).is_some() {
+    if scale::raw_within(tag, change.new, decimals, bounds).is_some() {
         return None;
     }
     let text = |bound: Option<Exact>, none: &str| bound.map_or(none.to_owned(), |bound| bound.to_string());
-    let (min, max) = (text(min, "−∞"), text(max, "∞"));
+    let (min, max) = (text(bounds.0, "−∞"), text(bounds.1, "∞"));
     Some(Problem::OutOfRange { tag: tag.short.clone(), value: change.new, min, max })
 }
 

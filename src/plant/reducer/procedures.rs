@@ -77,7 +77,9 @@ impl Plant {
             let view = View {
                 value: &|tag| image.sample(tag).good_exact(),
                 outcome: &|id| commands.outcome_of(id).cloned(),
-                is_stop: &|tag, value| interlock::is_stop(&def, tag, value.into()),
+                is_stop: &|tag, value| {
+                    interlock::is_stop(&def, tag, value.into(), image.scaling_decimals(def.tag(tag)))
+                },
                 at,
             };
             let todo = run.next(def.procedure(id), &view);
