@@ -28,6 +28,15 @@ const SHOWN: usize = 32;
 /// A command without a result for so long is given up: a write may or may not have taken effect.
 const PENDING_MAX: Duration = Duration::from_secs(120);
 
+/// Which limits of a tag a write must keep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Limits {
+    /// All: while one is not known nothing is written.
+    All,
+    /// Those that are known. What makes safe is not held back by what cannot be read.
+    Known,
+}
+
 /// Tracks commands from acceptance to outcome.
 #[derive(Debug, Clone)]
 pub struct CommandTracker {
@@ -60,10 +69,10 @@ impl CommandTracker {
         &mut self,
         image: &ProcessImage,
         status: &CommandStatus,
-        tag: TagId,
-        value: Exact,
+        (tag, value): (TagId, Exact),
+        limits: Limits,
     ) -> Result<WriteJob, Box<ActionRecord>> {
-        let checked = self.check(image, status, tag, value);
+        let checked = self.check(image, status, (tag, value), limits);
         // What is shown and recorded is what the device will hold, not what was typed.
         let def = self.def.tag(tag);
         let rounded = image.scaling_decimals(def).and_then(|decimals| scale::rounded_to_device(def, value, decimals));

@@ -6,7 +6,8 @@
 //!            │ hold ─────── over ─────┤
 //!            └ measurement ───────────┘
 //!                 │ refused, not verified, time limit over, or an operator aborts
-//!                 └──> safe state: each of its writes once, whatever becomes of the others ──> failed or aborted
+//!                 └──> safe state: each of its writes, whatever becomes of the others ──> failed or aborted
+//!                        └ not verified ──> again once its device answers, until it is, or a person writes or starts
 //! ```
 //!
 //! A station that is stopped aborts its procedure first. One that is killed goes on with nothing: its successor shows the
@@ -20,9 +21,11 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    command::{CommandId, Outcome},
+    command::{CommandId, NotConfirmed, Outcome},
+    def::PlantDef,
     expr::Expr,
     id::{DeviceId, TagId},
+    number::digits,
 };
 use crate::t;
 
@@ -34,6 +37,8 @@ pub const START: &str = "start procedure";
 pub const ABORT: &str = "abort procedure";
 /// The recorded word for its end, however it ended.
 pub const END: &str = "end procedure";
+/// In the outcome of that, before the writes that are missing.
+const NOT_SAFE: &str = "safe state NOT complete";
 /// How the outcome of that begins where the station stopped meanwhile.
 pub const INTERRUPTED: &str = "interrupted";
 
@@ -202,6 +207,33 @@ pub struct SafeWrite {
     command: Option<CommandId>,
     /// Its outcome; `None` before its end.
     pub outcome: Option<Outcome>,
+    /// How often it was sent in vain; like the two below for the station only.
+    #[serde(skip)]
+    tries: u32,
+    /// When it was sent in vain last.
+    #[serde(skip)]
+    tried: Timestamp,
+    /// A person has decided otherwise: it is not sent again.
+    #[serde(skip)]
+    is_left: bool,
+}
+
+impl SafeWrite {
+    fn new((tag, value): (TagId, f64), outcome: Option<Outcome>) -> SafeWrite {
+        SafeWrite { tag, value, command: None, outcome, tries: 0, tried: Timestamp::UNIX_EPOCH, is_left: false }
+    }
+
+    /// Is it still to be reached?
+    fn is_missing(&self) -> bool {
+        !self.is_left && !self.outcome.as_ref().is_some_and(Outcome::is_done)
+    }
+
+    /// `PLC-1.RUN = STOP`.
+    fn words(&self, def: &PlantDef) -> String {
+        let tag = def.tag(self.tag);
+        let value = tag.label_of(self.value).map_or_else(|| digits(self.value, None), str::to_owned);
+        format!("{} = {value}", tag.name)
+    }
 }
 
 impl ProcedureRun {
@@ -246,21 +278,29 @@ impl ProcedureRun {
         }
     }
 
-    pub(super) fn times(&mut self) -> [&mut Timestamp; 2] {
-        [&mut self.started, &mut self.since]
+    /// The writes of the safe state that are still to be reached, once it has ended.
+    pub(super) fn missing(&self) -> impl Iterator<Item = &SafeWrite> {
+        self.safe.iter().filter(|write| !self.at_work() && write.is_missing())
     }
 
-    /// The outcome on record: `failed at step 3 of 9: …; safe state written`.
-    pub(super) fn recorded(&self, steps: usize) -> String {
+    pub(super) fn times(&mut self) -> impl Iterator<Item = &mut Timestamp> {
+        let tried = self.safe.iter_mut().map(|write| &mut write.tried);
+        [&mut self.started, &mut self.since].into_iter().chain(tried)
+    }
+
+    /// The outcome on record: `failed at step 3 of 9: …; safe state written`. What is missing has its name and value.
+    pub(super) fn recorded(&self, def: &PlantDef, steps: usize) -> String {
         let end = self.end().map_or(String::new(), ToString::to_string);
         let place = match (self.end(), self.step) {
             (Some(ProcedureEnd::Done) | None, _) | (_, None) => String::new(),
             (Some(_), Some(step)) => format!(", step {} of {steps}", (step + 1).min(steps)),
         };
+        let missing: Vec<String> = self.missing().map(|write| write.words(def)).collect();
         let safe = match self.is_safe() {
-            None => "",
-            Some(true) => "; safe state written",
-            Some(false) => "; safe state NOT complete",
+            Some(true) => "; safe state written".to_owned(),
+            None | Some(false) if !missing.is_empty() => format!("; {NOT_SAFE}: {}", missing.join(", ")),
+            None => String::new(),
+            Some(false) => format!("; {NOT_SAFE}, left as it is by an operator"),
         };
         format!("{end}{place}{safe}")
     }

@@ -22,7 +22,7 @@ use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_note},
     batch::BatchTracker,
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId, WriteJob},
-    commands::CommandTracker,
+    commands::{CommandTracker, Limits},
     control_run::RunTracker,
     def::{LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
@@ -245,7 +245,12 @@ impl Plant {
         }
         let outcome = match status.command.kind.clone() {
             CommandKind::Write { tag, value } => {
-                effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
+                let written = self.commands.write(&self.image, &status, (tag, value), Limits::All);
+                effects.write(self.line_of(tag), written);
+                let outcome = self.commands.outcome_of(status.command.id);
+                if matches!(outcome, Some(Outcome::Pending | Outcome::Unchanged)) {
+                    self.leave_safe_state(tag, value, at, &mut effects);
+                }
                 return self.after_command(effects, at);
             }
             CommandKind::Alarm(alarm_command) => Some(self.alarm_command(&status, alarm_command, &mut effects)),

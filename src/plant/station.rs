@@ -152,7 +152,7 @@ impl StationFault {
             StationFault::Procedure => [
                 "a write was refused or not verified, a condition was not true in time, or the station stopped meanwhile",
                 "the procedure has ended; the plant is in its safe state only where the details say so",
-                "read the details and the page of the procedures (tab Controllers, e); write by hand what is missing",
+                "read the details; what is missing is written once its device answers",
             ],
         }
     }
@@ -207,6 +207,11 @@ impl StationFaults {
             }
             None => true,
         });
+    }
+
+    /// Is it active until it is cleared?
+    pub fn is_lasting(&self, fault: StationFault) -> bool {
+        self.active.get(&fault) == Some(&None)
     }
 
     /// Is it active?

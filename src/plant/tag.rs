@@ -180,11 +180,7 @@ impl TagDef {
     }
     /// Least and greatest value that may be written now; `Err` names a tag that one of them needs and that is not known.
     pub fn limits(&self, value: impl Fn(TagId) -> Option<Exact>) -> Result<(Option<Exact>, Option<Exact>), TagId> {
-        let now = |bound: Option<Bound>| match bound {
-            None => Ok(None),
-            Some(Bound::Fixed(value)) => Ok(Some(value)),
-            Some(Bound::From(from)) => value(from).map(Some).ok_or(from),
-        };
+        let now = |bound: Option<Bound>| bound.map(|bound| bound.now(&value)).transpose();
         Ok((now(self.min)?, now(self.max)?))
     }
     /// May an operator write it?
@@ -337,6 +333,13 @@ pub enum Bound {
 }
 
 impl Bound {
+    /// What it is now; `Err` names the tag that is not known.
+    pub(super) fn now(self, value: impl Fn(TagId) -> Option<Exact>) -> Result<Exact, TagId> {
+        match self {
+            Bound::Fixed(bound) => Ok(bound),
+            Bound::From(from) => value(from).ok_or(from),
+        }
+    }
     fn source(self) -> Option<TagId> {
         match self {
             Bound::From(tag) => Some(tag),

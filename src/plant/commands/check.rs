@@ -1,6 +1,6 @@
 //! The checks of a write before it goes to the bus.
 
-use super::CommandTracker;
+use super::{CommandTracker, Limits};
 use crate::plant::{
     command::{CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::record::value_text,
@@ -10,7 +10,7 @@ use crate::plant::{
     number::digits,
     process_image::ProcessImage,
     scale,
-    tag::Access,
+    tag::{Access, Bound},
 };
 
 impl CommandTracker {
@@ -19,10 +19,10 @@ impl CommandTracker {
         &self,
         image: &ProcessImage,
         status: &CommandStatus,
-        tag: TagId,
-        value: Exact,
+        written: (TagId, Exact),
+        limits: Limits,
     ) -> Result<WriteJob, Outcome> {
-        let job = self.check_value(image, tag, value)?;
+        let job = self.check_value(image, written, limits)?;
         self.check_expected(image, status, &job)?;
         Ok(job)
     }
@@ -41,7 +41,12 @@ impl CommandTracker {
         }
     }
 
-    fn check_value(&self, image: &ProcessImage, tag: TagId, value: Exact) -> Result<WriteJob, Outcome> {
+    fn check_value(
+        &self,
+        image: &ProcessImage,
+        (tag, value): (TagId, Exact),
+        limits: Limits,
+    ) -> Result<WriteJob, Outcome> {
         let refuse = |refusal| Err(Outcome::Refused(refusal));
         let def = self.def.tag(tag);
         if !def.writable() {
@@ -67,7 +72,14 @@ impl CommandTracker {
             return refuse(Refusal::Interlock(lock.message.clone()));
         }
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
-        let bounds = def.limits(|tag| image.sample(tag).good_exact()).map_err(unknown)?;
+        let known = |tag: TagId| image.sample(tag).good_exact();
+        let bounds = match limits {
+            Limits::All if !urgent => def.limits(known).map_err(unknown)?,
+            Limits::All | Limits::Known => {
+                let now = |bound: Option<Bound>| bound?.now(known).ok();
+                (now(def.min), now(def.max))
+            }
+        };
         let Some(decimals) = decimals else {
             return refuse(Refusal::Unknown("number of decimals".into()));
         };

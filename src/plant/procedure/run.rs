@@ -1,10 +1,13 @@
 //! What a procedure does next: a state machine without I/O and clock.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::{ProcedureDef, ProcedureEnd, ProcedureRun, ProcedureState, ProcedureStep, SafeWrite, StepFailure};
+use super::{
+    NOT_SAFE, NotConfirmed, PlantDef, ProcedureDef, ProcedureEnd, ProcedureRun, ProcedureState, ProcedureStep,
+    SafeWrite, StepFailure,
+};
 use crate::plant::{
     command::{CommandId, Outcome},
     event::Fault,
@@ -12,6 +15,11 @@ use crate::plant::{
     id::{DeviceId, TagId},
     time::elapsed,
 };
+
+/// A write of the safe state that was sent in vain is sent again after this time, then after twice as long, and so on.
+const AGAIN_MIN: Duration = Duration::from_secs(5);
+/// At the latest after this.
+const AGAIN_MAX: Duration = Duration::from_secs(600);
 
 /// What a procedure looks at.
 pub(in crate::plant) struct View<'a> {
@@ -21,6 +29,8 @@ pub(in crate::plant) struct View<'a> {
     pub outcome: &'a dyn Fn(CommandId) -> Option<Outcome>,
     /// Does this value of a tag switch something off, so that it is sent whatever is under way?
     pub is_stop: &'a dyn Fn(TagId, f64) -> bool,
+    /// Does the device of a tag answer?
+    pub responds: &'a dyn Fn(TagId) -> bool,
     /// Now.
     pub at: Timestamp,
 }
@@ -68,21 +78,44 @@ impl ProcedureRun {
         ProcedureRun { step: None, since: at, state, ..ProcedureRun::new(by, from, started) }
     }
 
-    /// The same, where its steps mean nothing any more.
-    pub(in crate::plant) fn without_step(&self) -> ProcedureRun {
-        ProcedureRun { step: None, safe: Vec::new(), measuring: Vec::new(), ..self.clone() }
+    /// The same, with what its station has put on record as missing: those writes are still to be reached.
+    pub(in crate::plant) fn with_missing(self, plant: &PlantDef, def: &ProcedureDef, recorded: &str) -> ProcedureRun {
+        let missing = recorded.split_once(&format!("{NOT_SAFE}: ")).map_or("", |(_, missing)| missing);
+        let stopped = || Some(Outcome::NotConfirmed(NotConfirmed::StationStopped));
+        let safe = def.safe.iter().map(|write| SafeWrite::new(*write, stopped()));
+        let is_named = |write: &SafeWrite| missing.split(", ").any(|named| named == write.words(plant));
+        ProcedureRun { safe: safe.filter(is_named).collect(), ..self }
     }
 
-    /// The next things to do; empty while it waits, and once it has ended. Each step comes up once, so that who asks again
-    /// until nothing is to be done comes to an end.
+    /// The same, where its steps mean nothing any more, and the tags of its safe state are those that `tag` says.
+    pub(in crate::plant) fn without_step(&self, tag: impl Fn(TagId) -> Option<TagId>) -> ProcedureRun {
+        let missing = self.missing().filter_map(|write| Some(SafeWrite { tag: tag(write.tag)?, ..write.clone() }));
+        ProcedureRun { step: None, safe: missing.collect(), measuring: Vec::new(), ..self.clone() }
+    }
+
+    /// Writes what is missing of the safe state at once, as this person has asked.
+    pub(in crate::plant) fn write_missing(&mut self, by: Arc<str>, at: Timestamp) {
+        (self.state, self.since) = (ProcedureState::WritingSafeState(ProcedureEnd::Aborted(by)), at);
+        for write in self.safe.iter_mut().filter(|write| write.is_missing()) {
+            (write.command, write.outcome) = (None, None);
+        }
+    }
+
+    /// A person has decided otherwise about a tag, or about all: what is missing there is not written any more. `false`: nothing is.
+    pub(in crate::plant) fn leave(&mut self, is_meant: impl Fn(&SafeWrite) -> bool) -> bool {
+        let has_ended = !self.at_work();
+        let left = self.safe.iter_mut().filter(|write| has_ended && write.is_missing() && is_meant(write));
+        left.map(|write| write.is_left = true).count() > 0
+    }
+
+    /// The next things to do; empty while it waits, and once it has ended in its safe state. Each step comes up once, so that
+    /// who asks again until nothing is to be done comes to an end.
     pub(in crate::plant) fn next(&mut self, def: &ProcedureDef, view: &View) -> Vec<Instruction> {
         match &self.state {
             ProcedureState::Running => self.next_step(def, view),
-            ProcedureState::WritingSafeState(end) => {
-                let end = end.clone();
-                self.next_safe(end, self.under_way(def, view), view)
+            ProcedureState::WritingSafeState(_) | ProcedureState::Ended(_) => {
+                self.next_safe(self.under_way(def, view), view)
             }
-            ProcedureState::Ended(_) => Vec::new(),
         }
     }
 
@@ -101,8 +134,7 @@ impl ProcedureRun {
 
     /// Ends it at once, and writes the safe state.
     pub(in crate::plant) fn stop(&mut self, def: &ProcedureDef, end: ProcedureEnd, at: Timestamp) -> Vec<Instruction> {
-        let safe = |(tag, value): &(TagId, f64)| SafeWrite { tag: *tag, value: *value, command: None, outcome: None };
-        self.safe = def.safe.iter().map(safe).collect();
+        self.safe = def.safe.iter().map(|write| SafeWrite::new(*write, None)).collect();
         (self.state, self.since) = (ProcedureState::WritingSafeState(end), at);
         self.interrupt()
     }
@@ -195,25 +227,47 @@ impl ProcedureRun {
         }
     }
 
-    /// Every write of the safe state is sent, whatever becomes of the others; it ends once all have an outcome.
-    fn next_safe(&mut self, end: ProcedureEnd, under_way: Option<TagId>, view: &View) -> Vec<Instruction> {
+    /// Every write of the safe state is sent, whatever becomes of the others; it ends once all have an outcome. What is missing
+    /// then is sent again when its device answers.
+    fn next_safe(&mut self, under_way: Option<TagId>, view: &View) -> Vec<Instruction> {
         let mut todo = Vec::new();
+        let (at_work, was_missing) = (self.at_work(), self.missing().next().is_some());
         for (place, write) in self.safe.iter_mut().enumerate() {
+            if !at_work && write.is_due(view) {
+                (write.command, write.outcome) = (None, None);
+            }
             match write.command {
+                _ if write.outcome.is_some() => {}
                 // A write of a step to the same tag may be under way: another one would be refused.
                 None if under_way == Some(write.tag) && !(view.is_stop)(write.tag, write.value) => {}
                 None => todo.push(Instruction::Write { tag: write.tag, value: write.value, safe: Some(place) }),
-                Some(command) if write.outcome.is_none() => {
+                Some(command) => {
                     let outcome = (view.outcome)(command).unwrap_or(Outcome::Failed(Fault::Timeout));
                     write.outcome = Some(outcome).filter(|outcome| *outcome != Outcome::Pending);
+                    (write.tries, write.tried) = (write.tries + u32::from(write.outcome.is_some()), view.at);
                 }
-                Some(_) => {}
             }
         }
-        if self.safe.iter().all(|write| write.outcome.is_some()) {
-            (self.state, self.since) = (ProcedureState::Ended(end), view.at);
-            todo.push(Instruction::Record);
+        match &self.state {
+            ProcedureState::WritingSafeState(end) if self.safe.iter().all(|write| write.outcome.is_some()) => {
+                (self.state, self.since) = (ProcedureState::Ended(end.clone()), view.at);
+                todo.push(Instruction::Record);
+            }
+            ProcedureState::Ended(_) if was_missing && self.missing().next().is_none() => {
+                todo.push(Instruction::Record);
+            }
+            ProcedureState::Running | ProcedureState::WritingSafeState(_) | ProcedureState::Ended(_) => {}
         }
         todo
+    }
+}
+
+impl SafeWrite {
+    /// Is it to be sent again?
+    fn is_due(&self, view: &View) -> bool {
+        let doubled = AGAIN_MIN.saturating_mul(2u32.saturating_pow(self.tries.saturating_sub(1)));
+        let pause = if self.tries == 0 { Duration::ZERO } else { doubled.min(AGAIN_MAX) };
+        let is_over = self.outcome.is_some() && self.is_missing() && pause <= elapsed(self.tried, view.at);
+        is_over && (view.responds)(self.tag)
     }
 }

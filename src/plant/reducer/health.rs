@@ -8,6 +8,7 @@ use crate::plant::{
     def::{DeviceId, LineId, TagId},
     ne107::{self, DiagnosisInput},
     record::Record,
+    scale,
     snapshot::DeviceStatus,
     time::elapsed,
     tuning::Noticed,
@@ -68,7 +69,10 @@ impl Plant {
                 Outcome::Verified | Outcome::Sent | Outcome::NotConfirmed(_) | Outcome::Failed(_),
             ) => {
                 let age = elapsed(status.at, self.at);
-                actions.iter().any(|action| action.tag == *tag && *value == action.value && age < action.settle)
+                let (def, decimals) =
+                    (self.def.tag(*tag), self.image.scaling_decimals(self.def.tag(*tag)).unwrap_or(0));
+                let is_it = |rule: f64| scale::is_sent_as(def, *value, rule.into(), decimals);
+                actions.iter().any(|action| action.tag == *tag && is_it(action.value) && age < action.settle)
             }
             _ => false,
         })

@@ -10,6 +10,7 @@ use jiff::Timestamp;
 use super::{Effects, Plant, restore::PLANT};
 use crate::plant::{
     command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
+    commands::Limits,
     control_run::RunState,
     def::{DeviceId, ProcedureId, TagId},
     exact::Exact,
@@ -17,6 +18,8 @@ use crate::plant::{
     number::to_u16,
     procedure::{self, Instruction, ProcedureEnd, ProcedureRun, View},
     record::{ActionRecord, Record},
+    scale,
+    snapshot::DeviceState,
     station::{FaultState, StationFault},
 };
 
@@ -31,12 +34,14 @@ impl Plant {
         if trackers.any(|place| !self.runs[place].is_ready()) {
             return Err(Refusal::NotMeasurable);
         }
+        // Who starts one has decided about the safe states of all.
+        self.procedures.iter_mut().flatten().for_each(|run| _ = Arc::make_mut(run).leave(|_| true));
         let run = ProcedureRun::new(status.by.clone(), status.from.clone(), status.at);
         self.procedures[id.index()] = Some(Arc::new(run));
         Ok(())
     }
 
-    /// Ends the procedure at work. One that was interrupted gets its safe state now.
+    /// Ends the procedure at work. One that was interrupted gets its safe state now, and any other what is missing of it.
     pub(super) fn abort_procedure(
         &mut self,
         id: ProcedureId,
@@ -48,13 +53,20 @@ impl Plant {
             let name = self.def.procedures[other].name.to_string();
             return Outcome::Refused(Refusal::ProcedureAtWork(name));
         }
+        let is_missing = run.missing().next().is_some();
         match run.end() {
             None | Some(ProcedureEnd::Interrupted) => {}
+            Some(_) if is_missing => {}
             Some(ProcedureEnd::Done | ProcedureEnd::Failed(_) | ProcedureEnd::Aborted(_)) => return Outcome::Unchanged,
         }
         let mut run = (**run).clone();
         let def = self.def.clone();
-        let todo = run.stop(def.procedure(id), ProcedureEnd::Aborted(status.by.clone()), status.at);
+        let todo = if is_missing {
+            run.write_missing(status.by.clone(), status.at);
+            Vec::new()
+        } else {
+            run.stop(def.procedure(id), ProcedureEnd::Aborted(status.by.clone()), status.at)
+        };
         run.from = status.from.clone();
         self.carry_out(id, &mut run, todo, status.at, effects);
         self.procedures[id.index()] = Some(Arc::new(run));
@@ -67,19 +79,38 @@ impl Plant {
         self.advance_procedures(at, effects);
     }
 
-    /// Lets the procedure at work go on.
+    /// Lets the procedure at work go on, and those whose safe state is not complete. The alarm stays as long as there are any.
     fn advance_procedures(&mut self, at: Timestamp, effects: &mut Effects) {
-        let Some(place) = self.procedure_at_work() else { return };
+        let goes_on = |run: &ProcedureRun| run.at_work() || run.missing().next().is_some();
+        for place in 0..self.procedures.len() {
+            if self.procedures[place].as_deref().is_some_and(goes_on) {
+                self.advance_procedure(place, at, effects);
+            }
+        }
+        let missing = self.def.procedures.iter().zip(&self.procedures).filter_map(|(def, run)| {
+            let run = run.as_deref().filter(|run| run.missing().next().is_some())?;
+            Some(format!("{}: {}", def.name, run.recorded(&self.def, def.steps.len())))
+        });
+        let missing: Vec<String> = missing.collect();
+        if !missing.is_empty() {
+            self.faults.set(StationFault::Procedure, FaultState::Active(missing.join("; ").into()));
+        } else if self.faults.is_lasting(StationFault::Procedure) {
+            self.faults.set(StationFault::Procedure, FaultState::Cleared);
+        }
+    }
+
+    fn advance_procedure(&mut self, place: usize, at: Timestamp, effects: &mut Effects) {
         let Some(before) = self.procedures[place].clone() else { return };
         let (id, def, mut run) = (ProcedureId(to_u16(place)), self.def.clone(), (*before).clone());
         loop {
-            let (image, commands) = (&self.image, &self.commands);
+            let (image, commands, devices) = (&self.image, &self.commands, &self.devices);
             let view = View {
                 value: &|tag| image.sample(tag).good_exact(),
                 outcome: &|id| commands.outcome_of(id).cloned(),
                 is_stop: &|tag, value| {
                     interlock::is_stop(&def, tag, value.into(), image.scaling_decimals(def.tag(tag)))
                 },
+                responds: &|tag| devices[def.tag(tag).device.index()].state == DeviceState::Responding,
                 at,
             };
             let todo = run.next(def.procedure(id), &view);
@@ -90,6 +121,21 @@ impl Plant {
         }
         if run != *before {
             self.procedures[place] = Some(Arc::new(run));
+        }
+    }
+
+    /// A person has written this to a tag: a safe state that wants something else there is left as it is.
+    pub(super) fn leave_safe_state(&mut self, tag: TagId, value: Exact, at: Timestamp, effects: &mut Effects) {
+        let def = self.def.clone();
+        let decimals = self.image.scaling_decimals(def.tag(tag)).unwrap_or_default();
+        let is_same = |wanted: f64| scale::is_sent_as(def.tag(tag), value, wanted.into(), decimals);
+        for place in 0..self.procedures.len() {
+            let Some(mut run) = self.procedures[place].as_deref().cloned() else { continue };
+            if run.leave(|write| write.tag == tag && !is_same(write.value)) {
+                let id = ProcedureId(to_u16(place));
+                self.carry_out(id, &mut run, vec![Instruction::Record], at, effects);
+                self.procedures[place] = Some(Arc::new(run));
+            }
         }
     }
 
@@ -112,13 +158,13 @@ impl Plant {
     pub fn restore_procedures(&mut self, latest: Option<&ActionRecord>) -> Vec<Record> {
         let Some(latest) = latest else { return Vec::new() };
         let is_started = &*latest.action == procedure::START;
-        if !is_started && !latest.outcome.starts_with(procedure::INTERRUPTED) {
-            return Vec::new();
-        }
+        let is_interrupted = is_started || latest.outcome.starts_with(procedure::INTERRUPTED);
         let place = self.def.procedures.iter().position(|def| *def.name == *latest.target);
-        if let Some(shown) = place.map(|place| &mut self.procedures[place]).filter(|shown| shown.is_none()) {
+        if let Some(place) = place.filter(|place| self.procedures[*place].is_none()) {
             let run = ProcedureRun::interrupted(latest.by.clone(), latest.from.clone(), latest.at, self.at);
-            *shown = Some(Arc::new(run));
+            let run = run.with_missing(&self.def, &self.def.procedures[place], &latest.outcome);
+            let is_shown = is_interrupted || run.missing().next().is_some();
+            self.procedures[place] = is_shown.then(|| Arc::new(run));
         }
         if !is_started {
             return Vec::new();
@@ -142,7 +188,7 @@ impl Plant {
         while let Some(instruction) = todo.pop_front() {
             match instruction {
                 Instruction::Write { tag, value, safe } => {
-                    let command = self.write_for(id, run, (tag, value), at, effects);
+                    let command = self.write_for(id, run, (tag, value, safe.is_some()), at, effects);
                     run.sent(safe, command);
                 }
                 Instruction::Begin(controller, label) => {
@@ -162,7 +208,7 @@ impl Plant {
                 }
                 Instruction::Record => {
                     let def = self.def.procedure(id);
-                    let outcome = run.recorded(def.steps.len());
+                    let outcome = run.recorded(&self.def, def.steps.len());
                     if run.is_fault() {
                         self.faults.set(StationFault::Procedure, occurred(&def.name, &outcome));
                     }
@@ -178,7 +224,7 @@ impl Plant {
         &mut self,
         id: ProcedureId,
         run: &ProcedureRun,
-        (tag, value): (TagId, f64),
+        (tag, value, is_safe): (TagId, f64, bool),
         at: Timestamp,
         effects: &mut Effects,
     ) -> CommandId {
@@ -191,7 +237,8 @@ impl Plant {
         let note = Some(format!("procedure {}", self.def.procedure(id).name).into());
         let request = Command { expected_value, note, ..Command::new(self.run, command, kind) };
         let status = CommandStatus { from: run.from.clone(), ..CommandStatus::new(request, run.actor().clone(), at) };
-        effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
+        let limits = if is_safe { Limits::Known } else { Limits::All };
+        effects.write(self.line_of(tag), self.commands.write(&self.image, &status, (tag, value), limits));
         command
     }
 

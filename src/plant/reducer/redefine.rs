@@ -93,8 +93,9 @@ impl Plant {
             if keeps_ids && before.procedures[place] == *own {
                 return Some(run.clone());
             }
-            let interrupted = run.end() == Some(&ProcedureEnd::Interrupted);
-            interrupted.then(|| Arc::new(run.without_step()))
+            let run = run.without_step(|tag| def.tag_named(&before.tag(tag).name));
+            let is_shown = run.end() == Some(&ProcedureEnd::Interrupted) || run.missing().next().is_some();
+            is_shown.then(|| Arc::new(run))
         });
         shown.collect()
     }

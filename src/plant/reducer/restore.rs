@@ -10,6 +10,7 @@ use jiff::Timestamp;
 use super::{Effects, Plant};
 use crate::plant::{
     command::{BusRequest, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
+    commands::Limits,
     def::{DeviceId, LineId, TagId},
     exact::Exact,
     parameter_set::{self, StoredSet},
@@ -197,7 +198,8 @@ impl Plant {
                 effects.records.push(Record::Action(refused));
                 continue;
             }
-            effects.write(self.line_of(tag), self.commands.write(&self.image, &status, tag, value));
+            effects.write(self.line_of(tag), self.commands.write(&self.image, &status, (tag, value), Limits::All));
+            self.leave_safe_state(tag, value, at, effects);
         }
         if let Some(outcome) = run.outcome(&self.def) {
             let action = self.commands.complete(run.id, outcome, &self.image, at);

@@ -1,5 +1,7 @@
 //! Procedures as an operator sees them: step by step, and into the safe state by whatever ends them early.
 
+mod safe_state;
+
 use std::time::Duration;
 
 use super::{super::tests::actions, *};
@@ -174,19 +176,6 @@ fn a_write_that_is_not_verified_ends_in_the_safe_state() {
         assert!(last.ends_with(", step 1 of 6; safe state written"), "{last}");
         assert_eq!(run(&plant).is_safe(), Some(true));
     }
-}
-
-#[test]
-fn a_safe_state_that_is_not_reached_is_said() {
-    let mut plant = plant();
-    let started = start(&mut plant);
-    let failed = end(&mut plant, &started, 2, |_| WriteResult::NotSent(Fault::NotConnected));
-    let safe = end(&mut plant, &failed, 3, |_| WriteResult::NotSent(Fault::NotConnected));
-    let [.., last] = &actions(&safe)[..] else { panic!("{safe:?}") };
-    assert!(last.ends_with("; safe state NOT complete"), "{last}");
-    assert_eq!(run(&plant).is_safe(), Some(false));
-    assert!(!run(&plant).at_work(), "no write is tried again");
-    assert!(plant.on_tick(at(900)).bus.is_empty());
 }
 
 #[test]

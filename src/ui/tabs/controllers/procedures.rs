@@ -47,11 +47,13 @@ impl Procedures {
         (self.selected < cx.def().procedures.len()).then(|| ProcedureId(to_u16(self.selected)))
     }
 
-    /// What an abort would end: the one at work, else the selected one where it was interrupted.
+    /// What an abort would end: the one at work, else the selected one where it was interrupted or is not in its safe state.
     pub fn to_abort(&self, cx: &ViewContext) -> Option<ProcedureId> {
         let interrupted = |id: &ProcedureId| {
             let run = cx.snapshot.procedures.get(id.index()).and_then(Option::as_deref);
-            run.is_some_and(|run| !run.at_work() && run.end() == Some(&ProcedureEnd::Interrupted))
+            let is_open =
+                |run: &ProcedureRun| run.is_safe() == Some(false) || run.end() == Some(&ProcedureEnd::Interrupted);
+            run.is_some_and(|run| !run.at_work() && is_open(run))
         };
         cx.snapshot.procedure_at_work().map(|(id, _)| id).or_else(|| self.id(cx).filter(interrupted))
     }
