@@ -2,13 +2,14 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
+use super::protocol::TRY_AGAIN;
 use crate::access::RateLimit;
 
 /// Terminals of all users at once.
 pub const TERMINALS_MAX: usize = 64;
 /// Terminals of one user at once, except root and the user who runs the station.
 const TERMINALS_OF_USER_MAX: usize = TERMINALS_MAX / 2;
-/// So many are kept for these two.
+/// So many are kept for these two, and for the users that the plant file trusts.
 const TERMINALS_KEPT: usize = 4;
 /// Connections of one user that have not completed the handshake; one more, and the oldest of them is dropped.
 pub const STRANGERS_MAX: usize = 8;
@@ -56,24 +57,30 @@ impl Callers {
     }
 
     /// A connection that has completed the handshake becomes a terminal. Returns the user it is counted for, which [`Callers::detach`]
-    /// needs; `Err` says in words for its operator why it may not attach.
-    pub fn attach(&mut self, user: u32, now: Duration) -> Result<u32, String> {
+    /// needs; `Err` says in words for its operator why it may not attach. `trusted`: the plant file lets the user in without a password.
+    pub fn attach(&mut self, user: u32, trusted: bool, now: Duration) -> Result<u32, String> {
         let all: usize = self.users.values().map(|caller| caller.terminals).sum();
+        // These two can end the station: a limit would only keep their scripts out.
         let host = self.hosts.contains(&user);
         let user = self.counted_as(user, now);
         let caller = self.users.entry(user).or_default();
-        if !caller.attaches.try_acquire(now) {
-            return Err("too many terminals of this user have attached recently, wait a moment".to_owned());
+        if !caller.attaches.try_acquire(now) && !host {
+            return Err(format!("too many terminals of this user have attached recently{TRY_AGAIN}"));
         }
         if TERMINALS_OF_USER_MAX <= caller.terminals && !host {
             return Err(format!("this user has {TERMINALS_OF_USER_MAX} terminals, no more can attach"));
         }
-        let most = if host { TERMINALS_MAX } else { TERMINALS_MAX - TERMINALS_KEPT };
+        let most = if host || trusted { TERMINALS_MAX } else { TERMINALS_MAX - TERMINALS_KEPT };
         if most <= all {
             return Err(format!("the station has {all} terminals, no more can attach"));
         }
         caller.terminals += 1;
         Ok(user)
+    }
+
+    /// Is it root, or the user who runs the station?
+    pub fn is_host(&self, user: u32) -> bool {
+        self.hosts.contains(&user)
     }
 
     /// A terminal has gone.
@@ -160,21 +167,29 @@ mod tests {
     #[test]
     fn endless_attaches_of_one_user_keep_no_other_user_out() {
         let mut callers = Callers::new(500);
-        let attached = (0..10_000).filter(|_| callers.attach(EVE, seconds(1)).is_ok()).count();
+        let attached = (0..10_000).filter(|_| callers.attach(EVE, false, seconds(1)).is_ok()).count();
         assert_eq!(attached, TERMINALS_OF_USER_MAX);
         let rest = TERMINALS_MAX - TERMINALS_OF_USER_MAX - TERMINALS_KEPT;
-        for (user, most) in [(PANEL, rest), (500, TERMINALS_KEPT)] {
-            assert_eq!((0..100).filter(|_| callers.attach(user, seconds(2)).is_ok()).count(), most);
+        for (user, trusted, most) in [(PANEL, false, rest), (PANEL, true, 1), (500, false, TERMINALS_KEPT - 1)] {
+            let wanted = if trusted { 1 } else { 100 };
+            assert_eq!((0..wanted).filter(|_| callers.attach(user, trusted, seconds(2)).is_ok()).count(), most);
         }
         (0..8).for_each(|_| callers.detach(PANEL));
-        assert_eq!(callers.attach(0, seconds(3)), Ok(0));
+        assert_eq!(callers.attach(0, false, seconds(3)), Ok(0));
         // Attaching and leaving again and again.
         callers.detach(EVE);
         let quick = (0..10_000).filter(|_| {
-            let attached = callers.attach(EVE, seconds(100)).is_ok();
+            let attached = callers.attach(EVE, false, seconds(100)).is_ok();
             attached.then(|| callers.detach(EVE)).is_some()
         });
         assert_eq!(quick.count(), ATTACHES_BURST as usize);
+        let why = callers.attach(EVE, true, seconds(100)).expect_err("its rate is used up");
+        assert!(why.ends_with(TRY_AGAIN), "its client tries again: {why}");
+        // A script of root that asks for the status again and again is not a flood.
+        (0..1_000).for_each(|_| {
+            let root = callers.attach(0, false, seconds(100)).expect("root is let in");
+            callers.detach(root);
+        });
     }
 
     #[test]

@@ -24,6 +24,8 @@ use crate::{
 pub const PROTOCOL: u32 = 19;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// A rejection that ends so may not be one a moment later: the terminal tries again by itself.
+pub const TRY_AGAIN: &str = "; try again in a moment";
 /// Longest handshake, bytes.
 pub const HANDSHAKE_BYTES_MAX: usize = 4 * 1024;
 /// Longest message of a terminal, bytes.

@@ -17,6 +17,8 @@ use crate::{
 const REQUESTS: usize = 256;
 /// Attach requests that may wait.
 const ATTACH_QUEUE_MAX: usize = 16;
+/// So many of them are kept for root, the user of the station and those that the plant file trusts.
+const ATTACH_KEPT: usize = 4;
 
 /// A terminal asks to attach.
 #[derive(Debug)]
@@ -51,6 +53,13 @@ impl SessionAcceptor {
         (SessionAcceptor { snapshots, attach_requests, requests, terminals: Arc::default() }, attach_queue, requested)
     }
 
+    /// Can one more terminal attach now? `kept`: one for whom places are kept.
+    pub fn has_room(&self, kept: bool) -> bool {
+        let kept = if kept { 0 } else { ATTACH_KEPT };
+        // Closed, it has no room and says so by itself.
+        self.attach_requests.is_closed() || kept < self.attach_requests.capacity()
+    }
+
     /// Attaches a terminal. It has no rights until its first status arrives, which never happens while the attach queue is full.
     pub fn attach(&self, peer: Peer) -> Session {
         self.open(peer, None)
@@ -71,5 +80,23 @@ impl SessionAcceptor {
         }
         let (snapshots, requests) = (self.snapshots.clone(), self.requests.clone());
         Session { snapshots, status, requests, terminal }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::fixture;
+
+    #[test]
+    fn a_crowd_of_one_kind_leaves_places_for_the_other() {
+        let (_publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
+        let (acceptor, attach_requests, _requests) = SessionAcceptor::new(snapshots);
+        let peer = || Peer { from: "test".into(), unix_user: None, in_process: false };
+        let crowd =
+            |kept: bool| (0..100).take_while(|_| acceptor.has_room(kept)).map(|_| acceptor.attach(peer())).count();
+        assert_eq!((crowd(false), crowd(true)), (ATTACH_QUEUE_MAX - ATTACH_KEPT, ATTACH_KEPT));
+        drop(attach_requests);
+        assert!(acceptor.has_room(false), "a station that has ended says so by itself");
     }
 }

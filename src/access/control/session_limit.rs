@@ -9,7 +9,7 @@ use crate::plant::time::elapsed;
 
 /// A terminal without login and without a request for so long is closed when another needs its place.
 const IDLE: Duration = Duration::from_secs(600);
-/// One of so many sessions is kept for root and the user of the station.
+/// One of so many sessions is kept for root, the user of the station and those that the plant file trusts.
 const KEPT: usize = 8;
 
 impl AccessControl {
@@ -20,7 +20,7 @@ impl AccessControl {
         }
         let most = usize::from(self.def.access.sessions_max);
         let is_owner = self.is_station_owner(&new.peer);
-        let all = if is_owner { most } else { most - most / KEPT };
+        let all = if is_owner || self.known(&new.peer).is_some() { most } else { most - most / KEPT };
         let mut effects = Vec::new();
         // Sessions of the same user first: a user at the limit closes none of others.
         if !is_owner {

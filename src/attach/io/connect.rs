@@ -13,7 +13,7 @@ use tokio::{
         unix::{OwnedReadHalf, OwnedWriteHalf},
     },
     sync::{mpsc, watch},
-    time::timeout,
+    time::{Instant, sleep, timeout},
 };
 
 use super::{
@@ -26,7 +26,7 @@ use crate::{
         assembly::{Assembly, OtherPlant},
         command_id_map::CommandIdMap,
         protocol::{
-            self, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, SERVER_MESSAGE_BYTES_MAX, ServerMessage,
+            self, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, SERVER_MESSAGE_BYTES_MAX, ServerMessage, TRY_AGAIN,
             TerminalOrigin,
         },
     },
@@ -35,6 +35,12 @@ use crate::{
 
 /// The station answers a handshake within this time, or is taken for stuck.
 pub const HANDSHAKE_REPLY_MAX: Duration = Duration::from_secs(5);
+/// A station that takes no more connections at the moment is tried again for so long.
+const BUSY_MAX: Duration = Duration::from_secs(8);
+/// First pause before that; doubled each time.
+const AGAIN_MIN: Duration = Duration::from_millis(20);
+/// Longest pause.
+const AGAIN_MAX: Duration = Duration::from_millis(500);
 /// Requests that may wait for the socket; more are refused.
 pub const REQUESTS: usize = 32;
 
@@ -49,6 +55,9 @@ pub enum AttachError {
         /// In the words of the system.
         error: io::Error,
     },
+    /// Too many connect at once: the system or the station takes no more.
+    #[error("the station at {} takes no more connections at the moment, too many are made at once{}", .0.display(), TRY_AGAIN)]
+    Busy(PathBuf),
     /// The station sends this terminal away.
     #[error("{0}")]
     Refused(String),
@@ -63,6 +72,19 @@ pub enum AttachError {
     OtherPlant(#[from] OtherPlant),
 }
 
+impl AttachError {
+    /// May the next try find it otherwise? A station that reloads its plant file closes what has begun with the plant as it was.
+    fn is_passing(&self) -> bool {
+        match self {
+            AttachError::Busy(_) | AttachError::Wire(WireError::Closed) => true,
+            AttachError::Refused(why) => why.ends_with(TRY_AGAIN),
+            AttachError::NoStation { .. } | AttachError::Silent | AttachError::Wire(_) | AttachError::OtherPlant(_) => {
+                false
+            }
+        }
+    }
+}
+
 /// A connection that the station has accepted.
 pub(super) struct Connection {
     pub read: OwnedReadHalf,
@@ -74,12 +96,7 @@ pub(super) struct Connection {
 /// status says so at once, and it is sought again for as long as a handle of the session exists.
 pub async fn connect(path: &Path) -> Result<Session, AttachError> {
     let origin = here();
-    let begun = match begin(path, &origin).await {
-        // A station that reloads its plant file closes what has begun with the plant as it was.
-        Err(AttachError::Wire(WireError::Closed)) => begin(path, &origin).await,
-        begun => begun,
-    };
-    let (connection, status, assembly) = begun?;
+    let (connection, status, assembly) = patiently(path, async || begin(path, &origin).await).await?;
     let HandshakeReply { run, terminal, .. } = connection.reply;
     let (publish, snapshots) = watch::channel(assembly.latest().clone());
     let (status_sender, status) = watch::channel(Arc::new(status));
@@ -89,6 +106,19 @@ pub async fn connect(path: &Path) -> Result<Session, AttachError> {
         ClientTask::new(path.to_owned(), origin, id_map, assembly, publish, status_sender).run(connection, requested),
     );
     Ok(Session { snapshots, status, requests, terminal })
+}
+
+/// Tries until the station does not turn this terminal away for the moment only.
+async fn patiently<T>(path: &Path, mut begin: impl AsyncFnMut() -> Result<T, AttachError>) -> Result<T, AttachError> {
+    let (until, mut pause) = (Instant::now() + BUSY_MAX, AGAIN_MIN);
+    loop {
+        match begin().await {
+            Err(why) if why.is_passing() && Instant::now() + pause < until => sleep(pause).await,
+            Err(AttachError::Wire(WireError::Closed)) => return Err(AttachError::Busy(path.to_owned())),
+            begun => return begun,
+        }
+        pause = (2 * pause).min(AGAIN_MAX);
+    }
 }
 
 /// Opens a connection and waits for what it begins with.
@@ -101,7 +131,11 @@ async fn begin(path: &Path, origin: &TerminalOrigin) -> Result<(Connection, Sess
 
 /// Sends the handshake and waits for the reply.
 pub(super) async fn open(path: &Path, origin: &TerminalOrigin) -> Result<Connection, AttachError> {
-    let no_station = |error| AttachError::NoStation { path: path.to_owned(), error };
+    let no_station = |error: io::Error| match error.kind() {
+        // Its queue of connections is full.
+        io::ErrorKind::WouldBlock => AttachError::Busy(path.to_owned()),
+        _ => AttachError::NoStation { path: path.to_owned(), error },
+    };
     let opened = async {
         let (mut read, mut write) = UnixStream::connect(path).await.map_err(no_station)?.into_split();
         let handshake = protocol::encode(&(Handshake::current(), origin), HANDSHAKE_BYTES_MAX);
@@ -143,4 +177,37 @@ fn here() -> TerminalOrigin {
     let variable = |name: &str| std::env::var(name).ok();
     let ssh = variable("SSH_CONNECTION").and_then(|words| words.split(' ').next().map(str::to_owned));
     TerminalOrigin { tty, ssh, term: variable("TERM") }.short()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// How often it is tried, and what comes of it, if each try ends so and the one after them succeeds.
+    async fn tried(ends: usize, end: fn() -> AttachError) -> (usize, Result<(), String>) {
+        let mut tries = 0;
+        let begin = async || {
+            tries += 1;
+            if ends < tries { Ok(()) } else { Err(end()) }
+        };
+        let begun = patiently(Path::new("/run/tank.sock"), begin).await;
+        (tries, begun.map_err(|error| error.to_string()))
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_terminal_turned_away_for_a_moment_tries_again() {
+        let busy = || AttachError::Busy("/run/tank.sock".into());
+        let closed = || AttachError::Wire(WireError::Closed);
+        let crowd = || AttachError::Refused(format!("too many terminals attach at once{TRY_AGAIN}"));
+        for end in [busy, closed, crowd] as [fn() -> AttachError; 3] {
+            assert_eq!(tried(5, end).await, (6, Ok(())));
+            let (tries, why) = tried(1_000, end).await;
+            assert!((10..40).contains(&tries), "{tries}");
+            let why = why.expect_err("it is busy for too long");
+            assert!(why.contains("too many") && why.ends_with(TRY_AGAIN), "{why}");
+        }
+        let limit = || AttachError::Refused("this user has 32 terminals, no more can attach".into());
+        assert_eq!(tried(9, limit).await.0, 1, "it would be the same");
+        assert_eq!(tried(9, || AttachError::Silent).await.0, 1);
+    }
 }

@@ -18,8 +18,8 @@ use crate::{
     attach::{
         check,
         protocol::{
-            self, ClientMessage, Handshake, HandshakeReply, ProtocolError, REQUEST_BYTES_MAX, SERVER_MESSAGE_BYTES_MAX,
-            ServerMessage,
+            self, ClientMessage, HANDSHAKE_BYTES_MAX, Handshake, HandshakeReply, ProtocolError, REQUEST_BYTES_MAX,
+            SERVER_MESSAGE_BYTES_MAX, ServerMessage,
         },
     },
     history::{HistoryError, Query, io::QueryRequest},
@@ -230,7 +230,15 @@ impl<W: AsyncWrite + Unpin> Outbound<W> {
         answered: &mut mpsc::Receiver<Reply>,
     ) -> Result<std::convert::Infallible, ConnectionEnd> {
         match timeout(STATUS_WAIT_MAX, self.session.status.changed()).await {
-            Ok(Ok(())) => {}
+            Ok(Ok(())) => {
+                let gone = self.session.status.borrow_and_update().gone.clone();
+                if let Some(why) = gone {
+                    // As the reply to its handshake: it has nothing that a status could be about.
+                    let rejection = protocol::encode(&Handshake::rejected(why.to_string()), HANDSHAKE_BYTES_MAX);
+                    self.write(&rejection.map_err(WireError::from)?, LAST_REPLIES_MAX).await?;
+                    return Err(ConnectionEnd::SentAway);
+                }
+            }
             Ok(Err(_)) => return Err(ConnectionEnd::SentAway),
             Err(_) => tracing::warn!(terminal = self.session.terminal, "no session status for a terminal"),
         }

@@ -91,7 +91,13 @@ impl SocketFolders {
             for path in sockets(folder) {
                 let Some(name) = path.file_stem().and_then(|name| name.to_str()) else { continue };
                 let is_new = found.iter().all(|other| other.path != path);
-                if is_new && matches!(timeout(TRY_MAX, UnixStream::connect(&path)).await, Ok(Ok(_))) {
+                // One with a full queue of connections lives.
+                let lives = match timeout(TRY_MAX, UnixStream::connect(&path)).await {
+                    Ok(Ok(_)) => true,
+                    Ok(Err(error)) => error.kind() == io::ErrorKind::WouldBlock,
+                    Err(_) => false,
+                };
+                if is_new && lives {
                     found.push(FoundStation { name: name.to_owned(), path });
                 }
             }

@@ -27,7 +27,7 @@ use crate::{
     access::Peer,
     attach::{
         callers::{Callers, makes_room},
-        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, ProtocolError, TerminalOrigin},
+        protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, ProtocolError, TRY_AGAIN, TerminalOrigin},
     },
     profile::io::atomic::with_suffix,
     station::SessionAcceptor,
@@ -307,7 +307,11 @@ impl Connections<'_> {
             Some(Err(_)) | None => return,
         };
         let from = peer.from.clone();
-        let counted_as = match self.callers.attach(user, now) {
+        let trusted = peer.unix_user.as_deref().is_some_and(|name| self.trusts(name));
+        let has_room = self.acceptor.has_room(trusted || self.callers.is_host(user));
+        let attached = has_room.then(|| self.callers.attach(user, trusted, now));
+        let counted_as = match attached.unwrap_or_else(|| Err(format!("too many terminals attach at once{TRY_AGAIN}")))
+        {
             Ok(counted_as) => counted_as,
             Err(why) => {
                 if self.callers.may_log(user, now) {
@@ -327,6 +331,12 @@ impl Connections<'_> {
             let why = connection::serve(read, write, session, snapshots).await;
             Left { user, counted_as, terminal, from, why }
         });
+    }
+
+    /// Does the plant file let this user of the operating system in without a password?
+    fn trusts(&self, name: &str) -> bool {
+        let snapshot = self.acceptor.snapshots.borrow();
+        snapshot.def.access.trusted.iter().any(|(trusted, _)| trusted == name)
     }
 
     fn on_left(&mut self, Left { user, counted_as, terminal, from, why }: Left) {

@@ -103,3 +103,20 @@ async fn a_reply_on_its_way_reaches_a_terminal_that_is_sent_away() {
     let done = ServerMessage::RequestDone { ticket: 7, answer: Ok(completion) };
     assert!(bytes.ends_with(&protocol::encode(&done, SERVER_MESSAGE_BYTES_MAX).unwrap()));
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_terminal_that_is_sent_away_is_told_why() {
+    let (_publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
+    let (_sender, shared) = SnapshotSender::new(snapshots.borrow().clone());
+    let (acceptor, mut attach_requests, _requests) = SessionAcceptor::new(snapshots);
+    let session = acceptor.attach(Peer { from: "test".into(), unix_user: None, in_process: false });
+    let why = "64 terminals are attached, no more may be";
+    let gone = SessionStatus { gone: Some(why.into()), ..SessionStatus::default() };
+    attach_requests.recv().await.unwrap().status.send_replace(Arc::new(gone));
+    let (near, mut far) = tokio::io::duplex(REQUEST_BYTES_MAX);
+    let (read, write) = tokio::io::split(near);
+    let ended = serve(read, write, session, shared).await;
+    assert!(matches!(ended, ConnectionEnd::SentAway));
+    let reply = wire::read(&mut far, SERVER_MESSAGE_BYTES_MAX).await.unwrap();
+    assert_eq!(protocol::handshake_reply(&reply).unwrap().unwrap_err(), why);
+}
