@@ -1,6 +1,9 @@
 //! Passwords: which are good enough, and the Argon2id hash that is kept of them.
 
-use std::sync::{Mutex, PoisonError};
+use std::{
+    collections::BTreeSet,
+    sync::{Mutex, PoisonError},
+};
 
 use argon2::{
     Algorithm, Argon2, Block, Params, Version,
@@ -13,6 +16,11 @@ use unicode_normalization::UnicodeNormalization;
 
 /// Most characters of a password: enough for a passphrase, too few to load the station.
 pub const CHARS_MAX: usize = 128;
+/// Letters and digits that must be left of a password without names and repetitions: more than the least password of NIST SP
+/// 800-63B has, so that a name does not do the work of a word.
+const OWN_CHARS_MIN: usize = 10;
+/// Shorter names are in too many words.
+const NAME_CHARS_MIN: usize = 3;
 /// Bytes of a salt.
 pub const SALT_BYTES: usize = 16;
 /// 19 MiB, twice, one lane: what OWASP recommends for Argon2id.
@@ -49,8 +57,9 @@ pub fn one_form(text: &str) -> String {
     text.nfc().collect()
 }
 
-/// Checks a new password of `user`. `Err` says what is expected.
-pub fn check(password: &str, user: &str, chars_min: u16) -> Result<(), String> {
+/// Checks a new password of a user. `names`: of the user and of the plant, which are the first that an attacker tries, and so
+/// are repetitions (NIST SP 800-63B, 5.1.1.2). `Err` says what is expected.
+pub fn check(password: &str, names: &[&str], chars_min: u16) -> Result<(), String> {
     let password = one_form(password);
     let chars = password.chars().count();
     if chars < usize::from(chars_min) {
@@ -64,17 +73,51 @@ pub fn check(password: &str, user: &str, chars_min: u16) -> Result<(), String> {
     if password.chars().any(char::is_control) {
         return Err("the password has a character that cannot be typed".to_owned());
     }
-    let plain = plain(&password);
-    let name = self::plain(user);
-    if !name.is_empty() && made_of(&plain, &name) {
-        return Err("the password must not be the name of the user".to_owned());
-    }
-    let letters: Vec<char> = plain.chars().collect();
-    let short = |count: usize| letters.chunks(count).all(|part| letters.starts_with(part));
-    if letters.is_empty() || (1..=3).any(short) || COMMON.iter().any(|common| made_of(&plain, common)) {
+    let is_common = |plain: &str| COMMON.iter().any(|common| made_of(plain, common));
+    let (whole, unnamed) = (plain(&password), without(&password.to_lowercase(), names));
+    if is_common(&whole) || is_common(&plain(&unnamed)) {
         return Err("this password is too common".to_owned());
     }
+    if own_chars(&password) < OWN_CHARS_MIN {
+        return Err("the password repeats itself; several different words are best".to_owned());
+    }
+    if own_chars(&unnamed) < OWN_CHARS_MIN {
+        return Err("the password is little more than the name of the user or of the plant".to_owned());
+    }
     Ok(())
+}
+
+/// A text in small letters with a gap in place of each name and each word of a name, however it is spaced.
+fn without(text: &str, names: &[&str]) -> String {
+    let letters: Vec<(usize, char)> = text.char_indices().filter(|(_, letter)| is_said(*letter)).collect();
+    let mut left: Vec<char> = text.chars().collect();
+    let places: Vec<usize> = text.char_indices().map(|(at, _)| at).collect();
+    let words = names.iter().flat_map(|name| name.split(|letter| !is_said(letter)).chain([*name]));
+    for word in words.map(plain).filter(|word| NAME_CHARS_MIN <= word.chars().count()) {
+        let word: Vec<char> = word.chars().collect();
+        for found in letters.windows(word.len()).filter(|part| part.iter().map(|(_, letter)| letter).eq(&word)) {
+            for (at, _) in found {
+                if let Ok(place) = places.binary_search(at) {
+                    left[place] = ' ';
+                }
+            }
+        }
+    }
+    left.into_iter().collect()
+}
+
+/// Letters and digits of a text that tell anything: each word and each number once, a letter that is held down once, and of
+/// what is the same again and again only the first.
+fn own_chars(text: &str) -> usize {
+    let text = text.to_lowercase();
+    let kind = |letter: char| (is_said(letter), letter.is_numeric());
+    let letters: Vec<char> = text.chars().collect();
+    let words: BTreeSet<&[char]> = letters.chunk_by(|one, other| kind(*one) == kind(*other)).collect();
+    let changes = |word: &[char]| 1 + word.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    let once = words.iter().filter(|word| is_said(word[0])).map(|word| changes(word)).sum();
+    let said: Vec<char> = letters.into_iter().filter(|letter| is_said(*letter)).collect();
+    let again = (1..=said.len() / 2).find(|period| said[*period..] == said[..said.len() - period]);
+    again.unwrap_or(said.len()).min(once)
 }
 
 /// Is it this word, once or several times, cut anywhere, with at most two more characters?
@@ -90,11 +133,12 @@ fn made_of(plain: &str, word: &str) -> bool {
 
 /// Without case, and without what is no letter, mark or digit of any script.
 fn plain(text: &str) -> String {
-    one_form(text)
-        .chars()
-        .filter(|letter| !letter.is_whitespace() && !letter.is_ascii_punctuation())
-        .collect::<String>()
-        .to_lowercase()
+    one_form(text).chars().filter(|letter| is_said(*letter)).collect::<String>().to_lowercase()
+}
+
+/// Is it a letter, mark or digit of any script?
+fn is_said(letter: char) -> bool {
+    !letter.is_whitespace() && !letter.is_ascii_punctuation()
 }
 
 /// Hashes a password, about 20 ms of work. `Err` only where memory is short.
@@ -162,12 +206,14 @@ fn argon2() -> Argon2<'static> {
 mod tests {
     use super::*;
 
+    const NAMES: &[&str] = &["anna", "tank"];
+
     #[test]
     fn any_language_is_accepted_and_common_passwords_are_not() {
         let good =
             ["four wet horses in a tank", "ปั๊มน้ำเสียทุกวันจันทร์", "grüße aus dem kesselhaus", "passwordless entry is fine"];
         for password in good {
-            assert_eq!(check(password, "anna", 15), Ok(()), "{password}");
+            assert_eq!(check(password, NAMES, 15), Ok(()), "{password}");
         }
         let bad = [
             "short",
@@ -182,9 +228,40 @@ mod tests {
             "with a bell \u{7} in the middle",
         ];
         for password in bad {
-            assert!(check(password, "anna", 15).is_err(), "{password}");
+            assert!(check(password, NAMES, 15).is_err(), "{password}");
         }
-        assert!(check(&"wet horses ".repeat(12), "anna", 15).is_err(), "too long");
+        assert!(check(&"wet horses ".repeat(12), NAMES, 15).is_err(), "too long");
+    }
+
+    #[test]
+    fn names_and_repetitions_do_no_work_in_a_password() {
+        let repeats = [
+            "boss boss boss boss",
+            "BossBossBossBossBoss",
+            "boss1boss2boss3boss4",
+            "horse, horse, horse, horse",
+            "wet horse wet horse wet",
+            "wethorsewethorsewethorse",
+            "11112222333344445555 11112222",
+            "ม้าเปียก ม้าเปียก ม้าเปียก",
+            "a b c d a b c d a b c d",
+        ];
+        let named = ["anna at the tank", "t.a.n.k.a.n.n.a 1234567", "ANNA kessel anna 12", "north works anna 99!!"];
+        for (passwords, why) in [(&repeats[..], "repeats itself"), (&named[..], "little more than the name")] {
+            for password in passwords {
+                let refused = check(password, &["anna", "tank", "Kessel North Works"], 15).expect_err(password);
+                assert!(refused.contains(why), "{password}: {refused}");
+            }
+        }
+        assert_eq!(check("anna password tank password", NAMES, 15), Err("this password is too common".into()));
+        for good in [
+            "anna is on a wet horse",
+            "the wet horse and the dry horse",
+            "boss second pass word",
+            "al is at the pumps al",
+        ] {
+            assert_eq!(check(good, &["anna", "tank", "al", ""], 15), Ok(()), "{good}");
+        }
     }
 
     #[test]

@@ -85,7 +85,12 @@ fn checksum(text: &str) -> String {
     digits
 }
 
-/// Reads a file. `Err` names what is damaged. The beginning of a line at the end was never confirmed: it is left out.
+/// Does a file end within a line? Nothing of that line was ever confirmed, unless more is missing.
+pub fn is_cut(bytes: &[u8]) -> bool {
+    bytes.last().is_some_and(|byte| *byte != b'\n')
+}
+
+/// Reads a file. `Err` names what is damaged. The beginning of a line at the end is left out, see [`is_cut`].
 pub fn parse(bytes: &[u8]) -> Result<LatestEvents, String> {
     let end = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |place| place + 1);
     let mut events = LatestEvents::default();

@@ -6,6 +6,7 @@ mod tests;
 use std::{collections::BTreeMap, sync::Arc};
 
 use jiff::Timestamp;
+use sha2::{Digest, Sha256};
 
 use super::{
     diagnostic::Problems,
@@ -28,6 +29,7 @@ toml_tables! {
         need "profile" profile: String,
         need "saved" saved: Moment,
         need "by" by: String,
+        opt "check" check: String,
         list "missing" missing: String,
         opt "units" units: Raw,
         opt "given" given: Raw,
@@ -50,6 +52,24 @@ impl Value for Moment {
         }
         parsed.map(Moment)
     }
+}
+
+/// How the line begins that says what the rest of the file is, after its first line.
+const CHECK: &str = "check = ";
+
+/// The line with the digest of all others.
+fn check_line(others: &[u8]) -> String {
+    let digest: String = Sha256::digest(others).iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    format!("{CHECK}\"{digest}\" # of all other lines: remove this one after a change by hand\n")
+}
+
+/// Is the file certainly not as it was written? A cut file may be a good one with fewer settings, and a changed digit is a
+/// setting too.
+fn is_damaged(bytes: &[u8]) -> bool {
+    let lines = || bytes.split_inclusive(|byte| *byte == b'\n');
+    let is_check = |line: &&[u8]| line.starts_with(CHECK.as_bytes());
+    let others = lines().filter(|line| !is_check(line)).collect::<Vec<_>>().concat();
+    lines().find(is_check).is_some_and(|line| line != check_line(&others).as_bytes())
 }
 
 /// The text of a set. Units and labels stand beside the values as comments.
@@ -77,12 +97,20 @@ pub fn text_of_set(set: &ParameterSet, def: &PlantDef) -> String {
         let tag = find(&value.tag);
         out.push_str(&row(value, tag, set.units.get(&value.tag).map_or("", String::as_str)));
     }
+    let check = check_line(out.as_bytes());
+    let first = out.find('\n').map_or(0, |end| end + 1);
+    out.insert_str(first, &check);
     out
 }
 
 /// Reads a set that is called `name`. `Err` has one line a problem: file, line, column, what was found, what was
 /// expected.
 pub fn read_set(name: &str, file: &str, bytes: &[u8], def: &PlantDef) -> Result<ParameterSet, Vec<String>> {
+    if is_damaged(bytes) {
+        return Err(vec![format!(
+            "{file} is damaged or was changed: restore it, or check its values and remove its line `check`"
+        )]);
+    }
     let mut problems = Problems::default();
     let read = reader::parse(file, bytes, &mut problems)
         .map(|raw| SetTable::of(&[raw], &mut problems))

@@ -105,7 +105,7 @@ impl AccessControl {
             return Err("the operating system identifies you here; there is no password to change".to_owned());
         }
         let user = session.acting().ok_or("log in, or unlock this terminal, first")?.user.clone();
-        password::check(&new.0, &user, self.def.access.password_chars_min)?;
+        self.check_password(&new, &user)?;
         if password::one_form(&new.0) == password::one_form(&old.0) {
             return Err("this is the current password, choose another one".to_owned());
         }
@@ -142,8 +142,13 @@ impl AccessControl {
     ) -> Result<Vec<Effect>, String> {
         // Checked before the hash and again after it.
         self.check_change(&change)?;
-        password::check(&password.0, change.user(), self.def.access.password_chars_min)?;
+        self.check_password(&password, change.user())?;
         self.hash(requester, password, change)
+    }
+
+    fn check_password(&self, password: &Secret, user: &str) -> Result<(), String> {
+        let names = [user, &self.def.name, &self.def.title];
+        password::check(&password.0, &names, self.def.access.password_chars_min)
     }
 
     fn check_change(&self, change: &UserChange) -> Result<crate::access::Users, String> {

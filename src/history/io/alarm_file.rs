@@ -11,7 +11,7 @@ use std::{
 use jiff::Timestamp;
 
 use crate::{
-    history::alarm_state::{HEADER, LatestEvents, line, parse},
+    history::alarm_state::{HEADER, LatestEvents, is_cut, line, parse},
     plant::record::AlarmRecord,
     profile::io::atomic,
 };
@@ -66,7 +66,14 @@ impl AlarmFile {
             Ok(bytes) => match parse_whole(&bytes) {
                 Ok(events) => {
                     alarms.events = events;
-                    RestoredAlarms { events: Some(alarms.events.iter().cloned().collect()), trouble: None }
+                    let cut = is_cut(&bytes).then(|| {
+                        let count = alarms.events.len();
+                        format!(
+                            "the state of the alarms ({name}) ends within a line: the power failed while it was \
+                             written, or it was cut; its first {count} events are used"
+                        )
+                    });
+                    RestoredAlarms { events: Some(alarms.events.iter().cloned().collect()), trouble: cut }
                 }
                 Err(why) => {
                     let aside = path.with_extension(format!("damaged-{}", now.strftime("%Y%m%dT%H%M%SZ")));
@@ -239,9 +246,10 @@ mod tests {
         let RestoredAlarms { events, trouble } = found(&path);
         assert_eq!(events, None);
         assert!(trouble.unwrap().contains("larger than 64 MiB"));
-        // The beginning of a line that was never confirmed is no damage.
+        // What is whole of a cut file counts, and that it was cut is said.
         fs::write(&path, &text[..text.len() - 9]).unwrap();
         let RestoredAlarms { events, trouble } = found(&path);
-        assert_eq!((events.map(|events| events.len()), trouble), (Some(1), None));
+        assert_eq!(events.map(|events| events.len()), Some(1));
+        assert!(trouble.unwrap().contains("ends within a line"));
     }
 }

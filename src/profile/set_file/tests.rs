@@ -65,6 +65,7 @@ fn two_devices_of_a_profile_may_have_tags_of_their_own() {
     assert!(text.contains("\"l\" = [\"RECIPE\"]\n"), "{text}");
     assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set.clone()));
     // The device has got another name since: any device of the profile that has the tag will do.
+    let text: String = text.split_inclusive('\n').filter(|line| !line.starts_with(CHECK)).collect();
     let renamed = text.replace("PLC-2", "PLC-9");
     let expect = ParameterSet { device: "PLC-9".into(), ..set };
     assert_eq!(read_set("winter", "winter.toml", renamed.as_bytes(), &def), Ok(expect));
@@ -151,4 +152,23 @@ proptest! {
             prop_assert_eq!(read_set("winter", "winter.toml", text.as_bytes(), &def), Ok(set.clone()), "{}", text);
         }
     }
+}
+
+#[test]
+fn a_set_that_was_cut_or_changed_is_no_set() {
+    let def = tank();
+    let text = text_of_set(&winter(&def), &def);
+    let damaged = |bytes: &[u8]| {
+        let why = read_set("winter", "winter.toml", bytes, &def).expect_err("it is not as it was written");
+        assert!(why[0].starts_with("winter.toml is damaged or was changed"), "{why:?}");
+    };
+    let first = text.find("check").expect("its check") + 40;
+    (first..text.len()).for_each(|end| damaged(&text.as_bytes()[..end]));
+    damaged(text.replace("SV = 70.5", "SV = 79.5").as_bytes());
+    let mut zeroed = text.clone().into_bytes();
+    zeroed[first + 40..first + 80].fill(0);
+    damaged(&zeroed);
+    let by_hand: String = text.split_inclusive('\n').filter(|line| !line.starts_with(CHECK)).collect();
+    let by_hand = read_set("winter", "winter.toml", by_hand.replace("SV = 70.5", "SV = 79.5").as_bytes(), &def);
+    assert!(by_hand.is_ok(), "{by_hand:?}");
 }
