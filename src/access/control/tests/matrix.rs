@@ -164,7 +164,7 @@ every!(requests: SessionRequest {
     SessionRequest::Reload => [SessionRequest::Reload],
 });
 
-/// How somebody comes in: a screen in the process of the station, a terminal or command with a name in two spellings, a command
+/// A way in: a screen in the process of the station, a terminal or command with a name in two spellings, a command
 /// of a trusted user of the operating system, a request over MQTT.
 #[derive(Debug, Clone, Copy)]
 enum Way {

@@ -105,7 +105,7 @@ async fn a_reply_on_its_way_reaches_a_terminal_that_is_sent_away() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_terminal_that_is_sent_away_is_told_why() {
+async fn a_terminal_that_is_sent_away_learns_why() {
     let (_publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
     let (_sender, shared) = SnapshotSender::new(snapshots.borrow().clone());
     let (acceptor, mut attach_requests, _requests) = SessionAcceptor::new(snapshots);
