@@ -2,6 +2,7 @@
 
 use std::{
     io::{self, Write},
+    os::unix::fs::FileTypeExt,
     path::{Path, PathBuf},
 };
 
@@ -93,6 +94,12 @@ fn appender(path: Option<&Path>) -> Result<RollingFileAppender, CliError> {
             (folder, builder.filename_suffix("log").max_log_files(DAYS))
         }
     };
+    // The appender would wait for whoever reads a pipe.
+    let today = jiff::Timestamp::now().strftime("sightglass.%Y-%m-%d.log").to_string();
+    let name = path.map_or_else(|| folder.join(today), Path::to_path_buf);
+    if std::fs::metadata(&name).is_ok_and(|there| there.file_type().is_fifo() || there.file_type().is_socket()) {
+        return Err(failed(&name, io::Error::other("not a regular file")));
+    }
     builder.build(&folder).map_err(|error| failed(&folder, io::Error::other(error)))
 }
 

@@ -1,12 +1,11 @@
 //! Finds and reads plant files and device profiles: beside the plant file, in configuration folders, or in the binary.
 
 pub mod atomic;
+pub mod regular;
 mod save;
 
 use std::{
     collections::BTreeMap,
-    fs::File,
-    io::Read,
     path::{Path, PathBuf},
 };
 
@@ -213,10 +212,7 @@ fn path_of(folder: &str, name: &str, search: &Search) -> Option<PathBuf> {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, String> {
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    file.take(BYTES_MAX + 1).read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-    if bytes.len() as u64 > BYTES_MAX { Err("larger than 4 MiB".to_owned()) } else { Ok(bytes) }
+    regular::read(path, BYTES_MAX).map_err(|error| error.to_string())
 }
 
 fn shipped_text(file: &include_dir::File) -> Text {

@@ -1,7 +1,7 @@
 //! What was found of devices on their lines, kept beside the history: it is not searched again at each start.
 
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -15,9 +15,11 @@ use crate::{
         line_finding::{DeviceFinding, LineFinding},
         snapshot::LineStatus,
     },
-    profile::io::atomic::write_atomic,
+    profile::io::{atomic::write_atomic, regular},
 };
 
+/// Far more than a plant of the greatest size has.
+const BYTES_MAX: u64 = 4 << 20;
 const HEAD: &str =
     "# What was found of the devices while they were polled, for the next start. Without it, it is searched again.\n";
 
@@ -47,7 +49,7 @@ struct FoundDevice {
 impl Found {
     /// What stands in the file. One that is damaged costs a search, and is said in the log. Blocks while the disk works.
     pub fn read(path: &Path) -> Found {
-        let text = match fs::read_to_string(path) {
+        let text = match regular::read_text(path, BYTES_MAX) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Found::default(),
             text => text.map_err(|error| error.to_string()),
         };
@@ -190,7 +192,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let history = folder.path().join("tank.duckdb");
         for text in ["[[device]]\nname = 3", "\u{0}", "[[device]]\nname = \"a\"\nwhat = 1"] {
-            fs::write(beside(&history), text).expect("a file");
+            std::fs::write(beside(&history), text).expect("a file");
             assert_eq!(FoundFile::open(&history).known, Found::default(), "{text}");
         }
     }

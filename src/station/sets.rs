@@ -1,8 +1,7 @@
 //! The folder of parameter sets: one readable file a set, beside the history of the plant.
 
 use std::{
-    fs::{self, File},
-    io::Read,
+    fs,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -13,7 +12,10 @@ use crate::{
         command::CommandId,
         parameter_set::{ParameterSet, StoredSet, check_name},
     },
-    profile::{io::atomic, read_set, text_of_set},
+    profile::{
+        io::{atomic, regular},
+        read_set, text_of_set,
+    },
 };
 
 /// Most sets that are read; an operator can choose among some dozens at most.
@@ -98,15 +100,7 @@ fn names(folder: &Path) -> std::io::Result<Vec<(String, PathBuf)>> {
 fn read(name: &str, path: &Path, def: &PlantDef) -> Result<ParameterSet, Vec<String>> {
     let file = format!("{name}.toml");
     let unreadable = |error: std::io::Error| vec![format!("{file} cannot be read: {error}")];
-    // Opening a pipe would wait for a writer.
-    if !fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(vec![format!("{file} is no file, expected a parameter set")]);
-    }
-    let mut bytes = Vec::new();
-    File::open(path).and_then(|file| file.take(BYTES_MAX + 1).read_to_end(&mut bytes)).map_err(unreadable)?;
-    if BYTES_MAX < bytes.len() as u64 {
-        return Err(vec![format!("{file} is larger than {} KiB, expected a parameter set", BYTES_MAX >> 10)]);
-    }
+    let bytes = regular::read(path, BYTES_MAX).map_err(unreadable)?;
     read_set(name, &file, &bytes, def)
 }
 

@@ -19,7 +19,7 @@ use crate::{
     },
     history::io::chain::CHAIN_HASHES_MAX,
     plant::record::{ActionRecord, ChainHash},
-    profile::io::atomic,
+    profile::io::{atomic, regular},
 };
 
 /// Why the files beside a history that another process has are left alone.
@@ -71,7 +71,7 @@ pub(super) fn verify_each(
     let failed = |error| VerifyError::Io { path: path.display().to_string(), error };
     // The note first: the audit log may be ahead of it, never behind.
     let head = read_head(path).map_err(failed)?;
-    let file = File::open(path).map_err(failed)?;
+    let file = regular::open(path).map_err(failed)?;
     let mut check = Check::new(head, rows);
     let scanned = scan(file, &mut check, |entry, chain_hash| each(&entry, chain_hash)).map_err(failed)?;
     check.end(scanned.torn).map_err(|bad| VerifyError::Bad { path: path.display().to_string(), bad })
@@ -250,11 +250,7 @@ impl AuditLog {
 
 /// Opens a file for the station's own user only; nothing but a plain file.
 fn own(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
-    let file = options.mode(0o600).custom_flags(rustix::fs::OFlags::NOFOLLOW.bits() as i32).open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(io::Error::other("not a file"));
-    }
-    Ok(file)
+    regular::open_no_link(options.mode(0o600), path)
 }
 
 /// Puts what stands behind the last whole line into a file beside the audit log.

@@ -1,7 +1,6 @@
 //! The edge of access: the file of users, the audit log on disk, and who the operating system says is here.
 
 use std::{
-    fs::File,
     io::{self, Read},
     path::{Path, PathBuf},
 };
@@ -10,6 +9,8 @@ pub mod audit_log;
 pub mod recorder;
 pub mod sealing;
 pub mod users;
+
+use crate::profile::io::regular;
 
 /// No more of a file is read whose text is one line.
 const LINE_BYTES_MAX: u64 = 1_000;
@@ -21,7 +22,7 @@ pub fn users_beside(history: &Path) -> PathBuf {
 
 /// Reads a text of one line; `None` where there is no such file.
 fn read_line_of(path: &Path) -> io::Result<Option<String>> {
-    let file = match File::open(path) {
+    let file = match regular::open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         file => file?,
     };

@@ -1,7 +1,7 @@
 //! The sealing key beside the audit log: made once, replaced after each seal, and the check of all seals.
 
 use std::{
-    fs::{self, File, OpenOptions},
+    fs::{self, OpenOptions},
     io,
     os::unix::fs::{FileExt, MetadataExt, fchown},
     path::{Path, PathBuf},
@@ -20,7 +20,10 @@ use crate::{
     },
     history::words::plain,
     plant::record::{ActionRecord, ChainHash},
-    profile::io::atomic::{self, write_atomic},
+    profile::io::{
+        atomic::{self, write_atomic},
+        regular,
+    },
 };
 
 /// The key beside a log: `tank.audit.key` beside `tank.audit.jsonl`.
@@ -38,7 +41,7 @@ pub fn read(path: &Path) -> io::Result<Option<Key>> {
 /// log has seals of an earlier key the numbers go on.
 pub fn make(log: &Path, made: Timestamp) -> io::Result<VerificationKey> {
     let path = beside(log);
-    let last = match File::open(log) {
+    let last = match regular::open(log) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
         file => audit_log::last_seal(file?)?,
     };
@@ -89,7 +92,7 @@ pub fn seal(audit_log: &mut AuditLog, log: &Path, at: Timestamp) -> (Option<Acti
 
 /// Replaces the key on disk and overwrites the old one, which would else stay readable in free blocks of the disk.
 fn replace(path: &Path, key: &Key) -> io::Result<()> {
-    let old = OpenOptions::new().write(true).open(path)?;
+    let old = regular::open_with(OpenOptions::new().write(true), path)?;
     write_atomic(path, key.text().as_bytes(), 0o600)?;
     old.write_all_at(&vec![0; key.text().len()], 0)?;
     old.sync_data()

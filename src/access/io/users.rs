@@ -1,6 +1,6 @@
 //! The file of users, beside the history: written whole or not at all, and never taken for empty when it is damaged.
 
-use std::{fs::File, io::Read, path::Path};
+use std::path::Path;
 
 use serde::Deserialize;
 use toml::Spanned;
@@ -11,7 +11,7 @@ use crate::{
         user::{self, User, Users},
     },
     plant::role::Role,
-    profile::io::atomic::write_atomic,
+    profile::io::{atomic::write_atomic, regular},
 };
 
 /// Some hundred users are some ten kilobytes; whatever is larger than this is something else.
@@ -47,19 +47,10 @@ pub enum UsersError {
 /// Reads the users; a missing file means no users.
 pub fn read(path: &Path) -> Result<Users, UsersError> {
     let unreadable = |why: String| UsersError::Unreadable { path: path.display().to_string(), why };
-    let file = match File::open(path) {
+    let text = match regular::read_text(path, BYTES_MAX) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Users::default()),
-        file => file.map_err(|error| unreadable(error.to_string()))?,
+        text => text.map_err(|error| unreadable(error.to_string()))?,
     };
-    if !file.metadata().map_err(|error| unreadable(error.to_string()))?.is_file() {
-        return Err(unreadable("not a file".to_owned()));
-    }
-    let mut bytes = Vec::new();
-    file.take(BYTES_MAX + 1).read_to_end(&mut bytes).map_err(|error| unreadable(error.to_string()))?;
-    if BYTES_MAX < bytes.len() as u64 {
-        return Err(unreadable(format!("it is larger than {} KiB", BYTES_MAX >> 10)));
-    }
-    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not UTF-8".to_owned()))?;
     parse(&text).map_err(|(offset, why)| {
         let before = text.get(..offset).unwrap_or(&text);
         let line = before.matches('\n').count() + 1;

@@ -13,7 +13,7 @@ use jiff::Timestamp;
 use crate::{
     history::alarm_state::{HEADER, LatestEvents, is_cut, line, parse},
     plant::record::AlarmRecord,
-    profile::io::atomic,
+    profile::io::{atomic, regular},
 };
 
 /// Largest file that is read: many times what a station writes.
@@ -147,10 +147,7 @@ fn parse_whole(bytes: &[u8]) -> Result<LatestEvents, String> {
 
 /// At most one byte more than the largest file has.
 fn read(path: &Path) -> io::Result<Vec<u8>> {
-    let file = File::open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(io::Error::other("not a file"));
-    }
+    let file = regular::open(path)?;
     let mut bytes = Vec::new();
     file.take(BYTES_MAX + 1).read_to_end(&mut bytes)?;
     Ok(bytes)

@@ -19,7 +19,7 @@ mod hour;
 mod merge;
 
 use std::{
-    fs::{self, File},
+    fs,
     ops::Range,
     path::{Path, PathBuf},
     time::Duration,
@@ -39,7 +39,7 @@ use crate::{
         retention::Deletion,
         tiers::{HOUR, Tier, floor},
     },
-    profile::io::atomic::with_suffix,
+    profile::io::{atomic::with_suffix, regular},
 };
 
 /// An hour is archived so long after its end: what a line sends late is in it by then.
@@ -340,7 +340,7 @@ pub(super) fn quoted(path: &Path) -> String {
 
 /// Bytes and SHA-256 of a file, which is on disk when this returns.
 pub fn sync_and_hash(path: &Path) -> std::io::Result<(u64, String)> {
-    let mut file = File::open(path)?;
+    let mut file = regular::open(path)?;
     disk::step("sync of the file")?;
     file.sync_all()?;
     let mut hash = Sha256::new();

@@ -22,9 +22,14 @@ use crate::{
             hashed, is_of_backup,
         },
     },
-    profile::io::atomic::{sync_folder, with_suffix, write_atomic},
+    profile::io::{
+        atomic::{sync_folder, with_suffix, write_atomic},
+        regular,
+    },
 };
 
+/// Many times the longest manifest.
+const MANIFEST_BYTES_MAX: u64 = 64 << 20;
 /// Instead of the hash in the name of a file that is not whole yet.
 const NO_HASH: &str = "0000000000000000";
 
@@ -183,7 +188,7 @@ impl Store {
 pub fn read_manifest(folder: &Path) -> Result<Option<Backup>, HistoryError> {
     let path = folder.join(MANIFEST);
     let refuse = |why: String| Err(HistoryError::Refused(format!("{}: {why}", path.display())));
-    let text = match fs::read(&path) {
+    let text = match regular::read(&path, MANIFEST_BYTES_MAX) {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         text => text.map_err(|error| failed(&path, &error))?,
     };
@@ -224,7 +229,7 @@ fn copy_file(
     }
     let unfinished = with_suffix(&to, UNFINISHED);
     new.push(unfinished.clone());
-    let done = fs::create_dir_all(to.parent().unwrap_or(folder)).and_then(|()| fs::copy(&from, &unfinished));
+    let done = fs::create_dir_all(to.parent().unwrap_or(folder)).and_then(|()| regular::copy(&from, &unfinished));
     match done.and_then(|_| is_sound(&unfinished)) {
         Ok(true) => {
             fs::rename(&unfinished, &to).map_err(|error| failed(&to, &error))?;
@@ -249,19 +254,19 @@ fn copy_growing(from: &Path, folder: &Path, path: &str, new: &mut Vec<PathBuf>) 
     let unfinished = folder.join(hashed(path, NO_HASH) + UNFINISHED);
     new.push(unfinished.clone());
     fs::create_dir_all(unfinished.parent().unwrap_or(folder))
-        .and_then(|()| fs::copy(from, &unfinished))
+        .and_then(|()| regular::copy(from, &unfinished))
         .and_then(|_| if path == AUDIT_LOG { cut_last_line(&unfinished) } else { Ok(()) })
         .map_err(|error| failed(&unfinished, &error))?;
     named(&unfinished, folder, path, new)
 }
 
 fn cut_last_line(path: &Path) -> std::io::Result<()> {
-    let (mut reader, mut line, mut whole) = (BufReader::new(File::open(path)?), Vec::new(), 0);
+    let (mut reader, mut line, mut whole) = (BufReader::new(regular::open(path)?), Vec::new(), 0);
     while reader.read_until(b'\n', &mut line)? > 0 {
         whole += if line.ends_with(b"\n") { line.len() as u64 } else { 0 };
         line.clear();
     }
-    File::options().write(true).open(path)?.set_len(whole)
+    regular::open_with(File::options().write(true), path)?.set_len(whole)
 }
 
 /// Syncs a file that is whole and gives it the name that says so.

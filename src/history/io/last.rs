@@ -2,14 +2,14 @@
 //! or replaced, differs from it.
 
 use std::{
-    fs::{self, File},
+    fs::File,
     os::unix::fs::FileExt,
     path::{Path, PathBuf},
 };
 
 use jiff::Timestamp;
 
-use crate::profile::io::atomic::with_suffix;
+use crate::profile::io::{atomic::with_suffix, regular};
 
 /// A commit as both the database and the file beside it know it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,6 +33,9 @@ pub enum Noted {
     Commit(LastCommit),
 }
 
+/// Far more than its one line.
+const BYTES_MAX: u64 = 1 << 10;
+
 /// Where the file lies.
 pub fn path(db: &Path) -> PathBuf {
     with_suffix(db, ".last")
@@ -40,14 +43,14 @@ pub fn path(db: &Path) -> PathBuf {
 
 /// Writes the last commit down, on disk when it returns. It overwrites its one line, so that a full disk hinders it least.
 pub fn write(db: &Path, last: &LastCommit) -> std::io::Result<()> {
-    let file = File::options().write(true).create(true).truncate(false).open(path(db))?;
+    let file = regular::open_with(File::options().write(true).create(true), &path(db))?;
     file.write_all_at(line(last).as_bytes(), 0)?;
     file.sync_data()
 }
 
 /// Reads what was written down.
 pub fn read(db: &Path) -> Noted {
-    match fs::read_to_string(path(db)) {
+    match regular::read_text(&path(db), BYTES_MAX) {
         Ok(text) => parse(&text).map_or(Noted::Unreadable, Noted::Commit),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Noted::Nothing,
         Err(_) => Noted::Unreadable,
@@ -113,15 +116,15 @@ mod tests {
             write(&db, &last).unwrap();
             assert_eq!(read(&db), Noted::Commit(last));
         }
-        let whole = fs::read(path(&db)).unwrap();
+        let whole = std::fs::read(path(&db)).unwrap();
         for cut in 0..whole.len() - 1 {
-            fs::write(path(&db), &whole[..cut]).unwrap();
+            std::fs::write(path(&db), &whole[..cut]).unwrap();
             assert_eq!(read(&db), Noted::Unreadable, "cut at {cut}");
         }
         for place in 0..whole.len() - 1 {
             let mut flipped = whole.clone();
             flipped[place] ^= 1;
-            fs::write(path(&db), flipped).unwrap();
+            std::fs::write(path(&db), flipped).unwrap();
             assert_eq!(read(&db), Noted::Unreadable, "flipped at {place}");
         }
     }

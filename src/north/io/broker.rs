@@ -25,6 +25,7 @@ use crate::{
         request::{self, PACKET_MAX, Received},
     },
     plant::def::{MqttDef, PasswordSource, TlsRoots},
+    profile::io::regular,
 };
 
 /// A broker that is asked to accept the station has so long.
@@ -220,10 +221,14 @@ fn options(def: &MqttDef) -> Result<MqttOptions, String> {
     Ok(options)
 }
 
+/// Of the file of a password, and of certificates.
+const PASSWORD_BYTES_MAX: u64 = 64 << 10;
+const ROOTS_BYTES_MAX: u64 = 16 << 20;
+
 fn password(source: &PasswordSource) -> Result<String, String> {
     match source {
         PasswordSource::File(path) => {
-            let text = std::fs::read_to_string(path);
+            let text = regular::read_text(path, PASSWORD_BYTES_MAX);
             let text = text.map_err(|error| format!("the password in {}: {error}", path.display()))?;
             Ok(text.lines().next().unwrap_or_default().to_owned())
         }
@@ -236,7 +241,8 @@ fn password(source: &PasswordSource) -> Result<String, String> {
 fn tls(roots: &TlsRoots) -> Result<TlsConfiguration, String> {
     match roots {
         TlsRoots::File(path) => {
-            let ca = std::fs::read(path).map_err(|error| format!("the certificates in {}: {error}", path.display()))?;
+            let ca = regular::read(path, ROOTS_BYTES_MAX)
+                .map_err(|error| format!("the certificates in {}: {error}", path.display()))?;
             Ok(TlsConfiguration::Simple { ca, alpn: None, client_auth: None })
         }
         TlsRoots::System => TlsConfiguration::try_default_rustls().map_err(|error| error.to_string()),

@@ -1,13 +1,16 @@
 //! The cursor file: one line with the instant up to which the history was read for the broker.
 
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
 use jiff::Timestamp;
 
-use crate::profile::io::atomic::write_atomic;
+use crate::profile::io::{atomic::write_atomic, regular};
+
+/// Far more than an instant takes.
+const BYTES_MAX: u64 = 1 << 10;
 
 /// The file beside a history.
 pub fn beside(history: &Path) -> PathBuf {
@@ -16,10 +19,10 @@ pub fn beside(history: &Path) -> PathBuf {
 
 /// `None` where nothing was sent yet.
 pub fn read(path: &Path) -> Result<Option<Timestamp>, String> {
-    match fs::read_to_string(path) {
+    match regular::read_text(path, BYTES_MAX) {
         Ok(text) => match text.trim().parse() {
             Ok(cursor) => Ok(Some(cursor)),
-            Err(_) => Err(format!("{}: expected an instant, found `{}`", path.display(), text.trim())),
+            Err(_) => Err(format!("{}: expected an instant", path.display())),
         },
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(format!("{}: {error}", path.display())),
@@ -43,7 +46,7 @@ mod tests {
         let cursor = Timestamp::from_microsecond(1_700_000_000_123_456).expect("in range");
         write(&path, cursor).expect("a writable folder");
         assert_eq!(read(&path), Ok(Some(cursor)));
-        fs::write(&path, "yesterday\n").expect("a writable file");
-        assert!(read(&path).is_err_and(|why| why.contains("tank.mqtt-cursor") && why.contains("`yesterday`")));
+        std::fs::write(&path, "yesterday\n").expect("a writable file");
+        assert!(read(&path).is_err_and(|why| why.ends_with("tank.mqtt-cursor: expected an instant")));
     }
 }

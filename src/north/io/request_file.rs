@@ -1,11 +1,17 @@
 //! The file of the latest requests, beside the history.
 
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
-use crate::{north::request_log::RequestLog, profile::io::atomic::write_atomic};
+use crate::{
+    north::request_log::RequestLog,
+    profile::io::{atomic::write_atomic, regular},
+};
+
+/// Many times the longest list.
+const BYTES_MAX: u64 = 16 << 20;
 
 /// The file beside a history.
 pub fn beside(history: &Path) -> PathBuf {
@@ -14,7 +20,7 @@ pub fn beside(history: &Path) -> PathBuf {
 
 /// An empty list where there was no request yet; `Err` where it cannot be read.
 pub fn read(path: &Path) -> Result<RequestLog, String> {
-    let bytes = match fs::read(path) {
+    let bytes = match regular::read(path, BYTES_MAX) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(RequestLog::default()),
         Err(error) => return Err(format!("{}: {error}", path.display())),

@@ -10,6 +10,8 @@ use std::{
 
 use rustix::{io::Errno, process};
 
+use super::regular;
+
 /// Writes a file with these rights: a loss of power now leaves the old one or the new one. Blocks while the disk works.
 ///
 /// A link stays a link, and what is no file, such as `/dev/null`, is written as it is.
@@ -55,7 +57,8 @@ pub fn write_for_user(path: &Path, bytes: &[u8]) -> io::Result<()> {
 pub fn copy_for_user(from: &Path, path: &Path) -> io::Result<()> {
     fs::create_dir_all(folder(path))?;
     let new = beside(path);
-    let copied = fs::copy(from, &new).and_then(|_| File::open(&new)?.sync_all()).and_then(|()| fs::rename(&new, path));
+    let copied =
+        regular::copy(from, &new).and_then(|_| File::open(&new)?.sync_all()).and_then(|()| fs::rename(&new, path));
     // After a rename there is nothing left to remove.
     let _ = fs::remove_file(&new);
     copied?;
@@ -83,7 +86,8 @@ pub fn beside(path: &Path) -> PathBuf {
     path.with_file_name(format!("{start}{own}"))
 }
 
-fn is_gone(process: i32) -> bool {
+/// Whether no process has this number.
+pub fn is_gone(process: i32) -> bool {
     let process = process::Pid::from_raw(process.max(0));
     process.is_none_or(|process| process::test_kill_process(process) == Err(Errno::SRCH))
 }

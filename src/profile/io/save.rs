@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{atomic, read};
+use super::{atomic, read, regular};
 use crate::{plant::def::LineDef, profile::edit};
 
 /// The plant file as it was when the plant was loaded or last saved.
@@ -53,7 +53,7 @@ impl PlantFile {
     /// Whoever loses power now finds the old file or the new one, never half of one. Owner, group and mode stay.
     fn replace(&self, bytes: &[u8]) -> std::io::Result<()> {
         // A file that may not be written is not to be replaced either, although its folder would allow it.
-        let metadata = File::options().append(true).open(&self.path)?.metadata()?;
+        let metadata = regular::open_with(File::options().append(true), &self.path)?.metadata()?;
         if metadata.permissions().readonly() {
             return Err(std::io::Error::new(std::io::ErrorKind::PermissionDenied, "it is read-only"));
         }
@@ -90,7 +90,7 @@ fn write_whole(path: &Path, bytes: &[u8], old: &fs::Metadata) -> std::io::Result
 }
 
 fn overwrite(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = File::options().write(true).truncate(true).open(path)?;
+    let mut file = regular::open_with(File::options().write(true).truncate(true), path)?;
     file.write_all(bytes)?;
     file.sync_all()
 }

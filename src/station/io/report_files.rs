@@ -8,7 +8,10 @@ use std::{
 use crate::{
     access::audit_log::sha256,
     history::io::disk::step,
-    profile::io::atomic::{sync_folder, with_suffix, write_for_user, write_new},
+    profile::io::{
+        atomic::{sync_folder, with_suffix, write_for_user, write_new},
+        regular,
+    },
 };
 
 /// Names that are tried where one is taken: `NAME.csv`, `NAME-2.csv`, …
@@ -26,6 +29,13 @@ pub fn write_checksum(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_for_user(&with_suffix(path, CHECKSUM), checksum_line(path, &sha256(bytes)).as_bytes())
 }
 
+/// Many times the longest report.
+const BYTES_MAX: u64 = 256 << 20;
+
+/// What is larger than any report, a folder or a pipe belongs to someone else.
+const NONE_OF_OURS: [io::ErrorKind; 3] =
+    [io::ErrorKind::FileTooLarge, io::ErrorKind::InvalidInput, io::ErrorKind::IsADirectory];
+
 /// What lies at a path.
 #[derive(PartialEq)]
 enum There {
@@ -35,11 +45,11 @@ enum There {
 }
 
 fn there(path: &Path, bytes: &[u8]) -> io::Result<There> {
-    match fs::read(path) {
+    match regular::read(path, BYTES_MAX) {
         Ok(found) if found == bytes => Ok(There::Same),
         Ok(_) => Ok(There::Other),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(There::Nothing),
-        Err(error) if error.kind() == io::ErrorKind::IsADirectory => Ok(There::Other),
+        Err(error) if NONE_OF_OURS.contains(&error.kind()) => Ok(There::Other),
         Err(error) => Err(error),
     }
 }
@@ -83,15 +93,18 @@ fn put(path: &Path, bytes: &[u8]) -> io::Result<bool> {
 /// Deletes a report with its checksum; `false` leaves alone what is not as the station wrote it. A file that is gone is deleted.
 pub fn delete(path: &Path, sha: &str) -> io::Result<bool> {
     step("delete report")?;
-    match fs::read(path) {
+    match regular::read(path, BYTES_MAX) {
         Ok(bytes) if sha256(&bytes) != sha => return Ok(false),
         Ok(_) => fs::remove_file(path)?,
         Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+        Err(error) if NONE_OF_OURS.contains(&error.kind()) => {
+            return Ok(false);
+        }
         Err(error) => return Err(error),
     }
     step("delete checksum")?;
     let checksum = with_suffix(path, CHECKSUM);
-    if fs::read(&checksum).is_ok_and(|line| line == checksum_line(path, sha).as_bytes()) {
+    if regular::read(&checksum, BYTES_MAX).is_ok_and(|line| line == checksum_line(path, sha).as_bytes()) {
         fs::remove_file(&checksum)?;
     }
     // Where the folder is gone too, nothing is left to sync.

@@ -5,19 +5,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::profile::io::atomic::{write_for_user, write_new};
+use crate::profile::io::{
+    atomic::{write_for_user, write_new},
+    regular,
+};
 
 /// Most bytes of a file that is loaded.
 const LOAD_MAX: u64 = 4 << 20;
 
 /// A text of the user; one of another encoding is read as well as it can be.
 pub(super) fn load(path: &Path) -> io::Result<String> {
-    let mut bytes = Vec::new();
-    io::Read::read_to_end(&mut io::Read::take(std::fs::File::open(path)?, LOAD_MAX + 1), &mut bytes)?;
-    if LOAD_MAX < bytes.len() as u64 {
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "more than 4 MiB"));
-    }
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(String::from_utf8_lossy(&regular::read(path, LOAD_MAX)?).into_owned())
 }
 
 /// A half-written report never has the name of a whole one.

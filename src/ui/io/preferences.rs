@@ -1,14 +1,13 @@
 //! Reads and writes the file of preferences in the user's configuration folder.
 
 use std::{
-    fs::File,
-    io::{self, Read},
+    io,
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
 
 use crate::{
-    profile::io::{atomic::write_for_user, config_folder},
+    profile::io::{atomic::write_for_user, config_folder, regular},
     t,
     ui::preferences::{Kept, PreferencesFile},
 };
@@ -48,12 +47,7 @@ fn load_from(path: &Path) -> PreferencesFile {
 }
 
 fn read(path: &Path) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)?.take(BYTES_MAX + 1).read_to_end(&mut bytes)?;
-    if BYTES_MAX < bytes.len() as u64 {
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, "more than 1 MiB"));
-    }
-    Ok(bytes)
+    regular::read(path, BYTES_MAX)
 }
 
 /// A file with a problem is never written over: what is wrong in it was meant to be something.

@@ -35,7 +35,7 @@ impl Store {
     pub(in crate::history::io) fn adopt_tags(&self, now: Timestamp) -> Result<Option<String>, HistoryError> {
         let folder = self.archive_folder();
         let tags = folder.join(TAGS);
-        if !tags.exists() {
+        if !tags.is_file() {
             return Ok(None);
         }
         let from = format!("read_parquet({})", quoted(&tags));
@@ -157,7 +157,8 @@ impl Store {
 
 /// The files of an archive, by their path from there.
 fn parquet_files(archive: &Path) -> Vec<String> {
-    let files = folders(archive).flat_map(|folder| entries(&folder));
+    // The engine would wait for a pipe.
+    let files = folders(archive).flat_map(|folder| entries(&folder)).filter(|path| path.is_file());
     files.filter_map(|path| Some(path.strip_prefix(archive).ok()?.to_str()?.to_owned())).collect()
 }
 
