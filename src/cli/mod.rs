@@ -42,6 +42,7 @@ mod times;
 mod tools;
 mod systemd_unit;
 mod terminal;
+mod work_folder;
 
 use std::{
     io::Write,

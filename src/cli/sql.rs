@@ -1,19 +1,19 @@
 //! `sightglass sql`: SELECT over the history, read only, in an engine of this process.
 
 use std::{
-    fs,
-    os::unix::fs::DirBuilderExt,
     path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, Instant},
 };
 
 use jiff::Timestamp;
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::{
     CliError, StationArgs, client, in_runtime, load, own_files, run, say, say_error,
     source::{Source, unexpected},
     span,
+    work_folder::WorkFolder,
 };
 use crate::{
     history::{
@@ -36,8 +36,10 @@ use crate::{
 const SHOWN_MAX: usize = 1_000;
 /// Rows of a list that are asked for at a time.
 const PAGE: usize = 10_000;
-/// The longest piece of samples that is asked for at a time.
-const PIECE_MAX: Duration = Duration::from_secs(7 * 86_400);
+/// An engine that works on so long after it was interrupted computes one value, and is left behind.
+const STOP_MAX: Duration = Duration::from_secs(2);
+/// Of this process: its engine has 256 MiB, and libraries and stacks need as much again, of which most is never used.
+const ADDRESS_SPACE_MAX: u64 = 2 << 30;
 /// How long it may work without a word.
 const SILENT: Duration = Duration::from_millis(500);
 
@@ -97,6 +99,9 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if let Some(file) = &args.parquet {
         own_files::refuse(file, &run::history_file(&def, &args.station))?;
     }
+    // One value can need more than any machine has, and the engine does not count it.
+    let most = Rlimit { current: Some(ADDRESS_SPACE_MAX), ..getrlimit(Resource::As) };
+    let _ = setrlimit(Resource::As, most);
     in_runtime(async {
         let source = Source::open(&def, &args.station, &args.login).await?;
         let tables = HistoryTables::load(&def, &source).await?;
@@ -134,7 +139,7 @@ impl HistoryTables {
         let folder = WorkFolder::new()?;
         loop {
             let overview = overview(source).await?;
-            let tables = Tables::new(def, &overview, &folder.0)?;
+            let tables = Tables::new(def, &overview, folder.path())?;
             tables.add_alarms(journal(source).await?)?;
             tables.add_actions(actions(source).await?)?;
             tables.add_batches(batches(source).await?)?;
@@ -160,7 +165,7 @@ impl HistoryTables {
         to: &Path,
         timeout: Duration,
     ) -> Result<(), CliError> {
-        let (file, sql) = (self.folder.0.join("result"), sql.to_owned());
+        let (file, sql) = (self.folder.path().join("result"), sql.to_owned());
         let written = file.clone();
         let rows = work(self.tables, timeout, move |tables| tables.write(&sql, &written, format)).await?;
         source.export_file(to, &file).await?;
@@ -185,22 +190,25 @@ async fn work<T: Send + 'static>(
         tokio::select! {
             done = &mut working => {
                 return match ended {
-                    Some(why) => Err(CliError::Failed(why)),
+                    Some((why, _)) => Err(CliError::Failed(why)),
                     None => done.map_err(|panic| CliError::Failed(panic.to_string()))?.map_err(refused),
                 };
             }
-            _ = tokio::signal::ctrl_c() => ended = Some("cancelled".to_owned()),
+            _ = tokio::signal::ctrl_c() => ended = ended.or_else(|| Some(("cancelled".to_owned(), Instant::now()))),
             _ = ticks.tick() => {
-                if limit < began.elapsed() {
+                if limit < began.elapsed() && ended.is_none() {
                     let (most, hint) = (limit.as_secs_f64(), "ask for less, or use m1 or h1, or a longer --timeout");
-                    ended = Some(format!("no result within {most} s: {hint}"));
+                    ended = Some((format!("no result within {most} s: {hint}"), Instant::now()));
                 } else if SILENT < began.elapsed() && began.elapsed().as_millis() % 5_000 < SILENT.as_millis() {
                     say_error(&format!("working for {} s, Ctrl-C cancels", began.elapsed().as_secs()));
                 }
             }
         }
-        if ended.is_some() {
+        if let Some((why, at)) = &ended {
             interrupt.interrupt();
+            if STOP_MAX < Instant::elapsed(at) {
+                return Err(CliError::Failed(why.clone()));
+            }
         }
     }
 }
@@ -232,7 +240,8 @@ async fn unarchived(
         let to = from.checked_add(span).unwrap_or(end).min(end);
         match source.query(Query::Unarchived { from, to }).await {
             Ok(Answer::Unarchived(samples)) => {
-                span = if samples.len() < PAGE { (span * 4).min(PIECE_MAX) } else { span };
+                // Without a bound: after a start with a wrong clock there is nothing for half a century.
+                span = if samples.len() < PAGE { span.saturating_mul(4) } else { span };
                 each(samples)?;
                 from = to;
             }
@@ -311,26 +320,6 @@ fn add_page<T>(all: &mut Vec<T>, mut page: Vec<T>, at: fn(&T) -> Timestamp) -> O
     }
     all.extend(page);
     None
-}
-
-/// A folder that is removed with this.
-struct WorkFolder(PathBuf);
-
-impl WorkFolder {
-    fn new() -> Result<WorkFolder, CliError> {
-        let path = std::env::temp_dir().join(format!("sightglass-{}", std::process::id()));
-        let made = fs::DirBuilder::new().mode(0o700).create(&path);
-        made.map_err(CliError::io(format!("cannot create {}", path.display())))?;
-        Ok(WorkFolder(path))
-    }
-}
-
-impl Drop for WorkFolder {
-    fn drop(&mut self) {
-        if let Err(error) = fs::remove_dir_all(&self.0) {
-            say_error(&format!("{} is not removed: {error}", self.0.display()));
-        }
-    }
 }
 
 /// Columns side by side.

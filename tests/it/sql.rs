@@ -123,3 +123,34 @@ fn the_help_names_the_columns_that_there_are() {
         assert!(listed.starts_with(columns.strip_prefix("utc, ").unwrap()), "{tier}: {columns}");
     }
 }
+
+#[test]
+fn samples_of_a_wrong_clock_are_answered_like_others() {
+    let folder = folder();
+    let history = folder.path().join("tank.duckdb");
+    archived(&history, ParquetVersion::V1);
+    let import = folder.path().join("1970.csv");
+    let old = "1970-01-01T00:00:10Z";
+    std::fs::write(&import, format!("tag,time,value\nTIC-1.PV,{old},1\n")).unwrap();
+    let (code, text) = run_at(&history, &["history", "import", "tank", import.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{text}");
+    // With the end of its curve.
+    let count = "SELECT count(*) AS n FROM sample WHERE tag = 'TIC-1.PV'";
+    assert_eq!(run(&history, &["sql", count, "--csv"]), (Some(0), "n\n93602\n".to_owned()));
+}
+
+#[test]
+fn a_value_of_any_size_is_bounded() {
+    let folder = folder();
+    let history = folder.path().join("tank.duckdb");
+    archived(&history, ParquetVersion::V1);
+    for select in ["SELECT repeat('x', 4000000000)", "SELECT repeat(repeat('x', 100000), 60000) AS a FROM range(3)"] {
+        for format in ["--csv", "--json"] {
+            let (code, text) = run(&history, &["sql", select, format, "--timeout", "5s"]);
+            assert!(code == Some(1) || code == Some(2), "{code:?} {}", &text[..text.len().min(300)]);
+        }
+    }
+    // On a screen a long value is cut.
+    let (code, text) = run(&history, &["sql", "SELECT repeat('x', 100000)"]);
+    assert!(code == Some(0) && text.len() < 10_000, "{code:?}, {} bytes", text.len());
+}

@@ -42,6 +42,9 @@ use crate::{
 /// Of the engine; what does not fit is kept in its folder.
 const MEMORY: &str = "256MB";
 
+/// Letters of a value in a table for a screen.
+const CELL_MAX: usize = 2_000;
+
 /// An engine with the tables.
 pub struct Tables {
     open: Open,
@@ -234,7 +237,8 @@ impl Tables {
     /// The names of the columns and at most so many rows of a SELECT.
     pub fn rows(&self, sql: &str, limit: usize) -> Result<(Vec<String>, Vec<Row>), HistoryError> {
         let wrong = |error: duckdb::Error| HistoryError::Sql(error.to_string());
-        let texts = format!("SELECT COLUMNS(*)::VARCHAR FROM ({sql}\n) LIMIT {limit}");
+        // A screen shows no more of a value.
+        let texts = format!("SELECT left(COLUMNS(*)::VARCHAR, {CELL_MAX}) FROM ({sql}\n) LIMIT {limit}");
         let mut statement = self.db.prepare(&texts).map_err(wrong)?;
         let mut rows = statement.query([]).map_err(wrong)?;
         let mut all = Vec::new();
