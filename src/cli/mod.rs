@@ -58,7 +58,11 @@ use self::{
     times::{span, speed},
 };
 use crate::{
-    access::io::users::UsersError, attach::io::serve, history::HistoryError, plant::visible::visible, profile, ui,
+    access::io::users::UsersError,
+    attach::io::serve,
+    history::{HistoryError, io::probe},
+    plant::visible::visible,
+    profile, ui,
 };
 
 const EXIT_CODES: &str = "\
@@ -235,6 +239,9 @@ pub fn main() -> ExitCode {
     // Histories, logs and reports are for the user and the group, whatever the shell says.
     let mask = rustix::process::umask(rustix::fs::Mode::empty());
     rustix::process::umask(mask | rustix::fs::Mode::from_raw_mode(0o027));
+    if let Some(db) = probe::requested(&std::env::args_os().collect::<Vec<_>>()) {
+        return probe::child(db);
+    }
     if let Some(message) = std::env::args_os().nth(1).and_then(|word| mistyped::renamed(word.to_str()?)) {
         say_error(&message);
         return ExitCode::from(2);

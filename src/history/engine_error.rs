@@ -30,7 +30,7 @@ use EngineFault::{
 
 /// By the words of the engine or of the system: what is wrong, and what an operator reads where its own words do not
 /// serve. A message may have several; an operator reads the first.
-const FAULTS: [(&str, EngineFault, Option<&str>); 21] = [
+const FAULTS: [(&str, EngineFault, Option<&str>); 24] = [
     ("Could not set lock", Locked, None),
     ("No space left", DiskFull, Some("the disk is full")),
     ("Disk quota exceeded", DiskFull, Some("the disk quota is exhausted")),
@@ -43,6 +43,9 @@ const FAULTS: [(&str, EngineFault, Option<&str>); 21] = [
     ("in read-only mode", NoAccess, None),
     ("Out of Memory", OutOfMemory, Some("not enough memory")),
     ("Cannot allocate memory", OutOfMemory, Some("not enough memory")),
+    ("bad_alloc", OutOfMemory, Some("not enough memory")),
+    ("memory allocation of", OutOfMemory, Some("not enough memory")),
+    ("Resource temporarily unavailable", OutOfMemory, Some("not enough memory or threads")),
     ("newer version", NewerVersion, None),
     ("newer DuckDB", NewerVersion, None),
     ("checksum", Damage, Some("a damaged block, its checksum is wrong")),

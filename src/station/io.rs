@@ -59,6 +59,8 @@ const EVENTS: usize = 256;
 const COMMANDS_MAX: usize = 64;
 /// At the end the safe state of a procedure is waited for so long: a write that gets no answer takes some timeouts.
 const SAFE_STATE_MAX: Duration = Duration::from_secs(10);
+/// The disk is waited for so long at the end: with the safe state less than systemd waits (`TimeoutStopSec`).
+const STOP_MAX: Duration = Duration::from_secs(15);
 /// Said of the users file where the audit log knows of users.
 pub(super) const USERS_MISSING: &str = "the users file is missing although users existed: restore it from a backup";
 
@@ -155,8 +157,7 @@ fn begin(
     let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
     let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
     let jobs = (history.jobs.clone(), path.clone());
-    let no_thread = |error: std::io::Error| HistoryError::Engine(format!("thread of the audit log: {error}"));
-    let recorder = recorder::start(&path, clock, records.clone()).map_err(no_thread)?;
+    let recorder = recorder::start(&path, clock, records.clone());
     let mut audit_queue = AuditQueue::new(&recorder);
     // Without such a file, at the first start or after it was damaged, the journal has the state.
     let from_journal = recorder.alarms.events.is_none();
@@ -169,7 +170,7 @@ fn begin(
     let past = Some(Past::new(history.restored.take(), from_journal));
     let (records, audit) = (Some(records), Some(audit_queue));
     let persistence = Persistence { records, store, past, audit, sets: Some(sets), found: Some(found), observer };
-    let threads = Threads { queries, jobs, history: Some(history), audit_writer: Some(recorder.join) };
+    let threads = Threads { queries, jobs, history: Some(history), audit_writer: recorder.join };
     Ok(assemble(def, clock, connectors, plant, file, persistence, threads, guarded))
 }
 
@@ -350,8 +351,17 @@ impl Station {
 
     /// Writes the safe state of a procedure at work, stops downstream and waits until the last record is on disk. Gives the last
     /// entry of the audit log.
+    ///
+    /// What a disk that hangs holds up is left behind after [`STOP_MAX`]: a station can always be ended.
     pub async fn stop(self) -> Option<ChainHash> {
         self.abort_procedure().await;
+        tokio::time::timeout(STOP_MAX, self.end()).await.unwrap_or_else(|_| {
+            tracing::error!("the disk hangs: the station ends, and its last records may be lost");
+            None
+        })
+    }
+
+    async fn end(self) -> Option<ChainHash> {
         // The links may have ended already.
         self.lines.iter().for_each(Line::stop);
         let outlets = [self.north, self.reports];

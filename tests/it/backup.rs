@@ -114,6 +114,44 @@ fn a_backup_of_a_running_station_is_restored() {
 }
 
 #[test]
+fn a_history_survives_kills_and_comes_back_when_set_aside() {
+    let home = Home { folder: folder(), sockets: sockets() };
+    let (_devices, port) = simulated_tank();
+    let line = format!("L1={port}");
+    let run = |time: &str| Process::start(home.command().args(["run", "tank", "--port", &line, "--for", time])).end();
+    assert_eq!(run("3s"), Some(0));
+    let db = home.folder.path().join("sightglass/tank.duckdb");
+    let with = |suffix: &str| format!("{}{suffix}", db.display());
+    let samples = || {
+        let (code, said) = home.said(home.command().args(["sql", "tank", "SELECT count(*) FROM sample"]));
+        assert_eq!(code, Some(0), "{said}");
+        said.lines().nth(1).unwrap().trim().parse::<u64>().unwrap()
+    };
+    let first = samples();
+    // As many kills as one likes.
+    fs::write(with(".opening"), "7").unwrap();
+    assert_eq!(run("2s"), Some(0));
+    assert!(first <= samples() && !fs::exists(with(".opening")).unwrap());
+    let entries = || fs::read_dir(db.parent().unwrap()).unwrap().flatten().map(|entry| entry.file_name());
+    assert!(entries().all(|name| !name.to_string_lossy().contains("damaged")));
+    // As an earlier version set it aside.
+    let before = samples();
+    fs::rename(&db, with(".damaged-20261127T120000Z")).unwrap();
+    assert_eq!(run("2s"), Some(0));
+    let since = samples();
+    let restore = ["history", "restore", "tank", "--set-aside"];
+    let (code, said) = home.said(home.command().args(restore));
+    assert!(code == Some(0) && said.contains("with those recorded since"), "{said}");
+    // One more for each curve that had not ended.
+    assert!((before + since..=before + since + 200).contains(&samples()), "{before} + {since}: {}", samples());
+    let (code, said) = home.said(home.command().args(restore));
+    assert!(code == Some(1) && said.contains("nothing sound is set aside"), "{said}");
+    assert_eq!(run("1s"), Some(0));
+    let (code, said) = home.said(home.command().args(["audit", "verify", "tank"]));
+    assert_eq!(code, Some(0), "{said}");
+}
+
+#[test]
 fn a_full_disk_is_said_and_nothing_is_left_on_it() {
     let Some(disk) = crate::support::SmallDisk::mount() else { return };
     let home = folder();

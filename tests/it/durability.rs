@@ -244,3 +244,28 @@ fn a_disk_that_is_read_only_at_the_start_costs_no_record() {
 fn a_disk_that_becomes_read_only_costs_no_record() {
     check_an_outage_in_the_middle(&PROTECTED);
 }
+
+/// A station under a limit of the shell, from its first answer to SIGTERM: its exit code.
+fn end_of_limited(limit: &str) -> Option<i32> {
+    let (state, sockets) = (folder(), crate::support::sockets());
+    let (_devices, port) = simulated_tank();
+    let program = sightglass();
+    let run = format!("ulimit {limit}; exec {} run tank --port L1={port} --log -", program.get_program().display());
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", &run]).env("XDG_STATE_HOME", state.path()).env("XDG_RUNTIME_DIR", &sockets);
+    let mut station = Process::start(shell.env_remove("STATE_DIRECTORY"));
+    station.wait_for("(unit 2): responding");
+    station.signal("TERM");
+    let files = std::fs::read_dir(state.path().join("sightglass")).unwrap().flatten();
+    let aside = files.filter(|file| file.file_name().to_string_lossy().contains("damaged")).count();
+    assert_eq!(aside, 0, "{limit}");
+    station.end()
+}
+
+#[test]
+fn without_descriptors_or_memory_polling_goes_on() {
+    // Descriptors, then address space in KiB.
+    for limit in ["-n 24", "-n 20", "-n 18", "-v 450000"] {
+        assert_eq!(end_of_limited(limit), Some(0), "{limit}");
+    }
+}

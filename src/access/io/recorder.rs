@@ -92,21 +92,22 @@ pub struct Handle {
     pub opened: Opened,
     /// What was found when the alarm-state file was opened.
     pub alarms: RestoredAlarms,
-    /// The thread; ends with the last entry of the log.
-    pub join: JoinHandle<Option<ChainHash>>,
+    /// The thread; ends with the last entry of the log. `None` where the system gave none: then nothing is written.
+    pub join: Option<JoinHandle<Option<ChainHash>>>,
 }
 
 /// Opens both files beside a history and starts the thread. A file that cannot be opened is trouble, and no reason not to
-/// start. `Err` only where the system gives no thread.
-pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<HistoryInput>) -> io::Result<Handle> {
+/// start; nor is a system that gives no thread: the station goes on, and says that the audit log is not written.
+pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<HistoryInput>) -> Handle {
     let (groups, queue) = queue::sync_channel(WRITE_GROUPS_MAX);
     let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
     let mut opened = recorder.open();
     recorder.tail = std::mem::take(&mut opened.tail);
     recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.chain_hash).unwrap_or(START);
     let (status, recorded) = watch::channel(recorder.status());
-    let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &status))?;
-    Ok(Handle { groups, recorded, opened, alarms, join })
+    let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &status));
+    let join = join.inspect_err(|error| tracing::error!(%error, "no thread for the audit log")).ok();
+    Handle { groups, recorded, opened, alarms, join }
 }
 
 /// An action that waits for the log.
@@ -263,6 +264,7 @@ impl Recorder {
                 if !broken.is_empty() {
                     self.found.push(format!("the audit log was tampered with: {}", broken.join("; ")));
                 }
+                self.drop_written(&opened);
                 let notes: Vec<_> = opened.wrong.iter().map(|wrong| self.note(wrong)).collect();
                 // In front of what waits.
                 self.pending.splice(0..0, notes.into_iter().map(|action| Pending { action, stored: false }));
@@ -275,6 +277,19 @@ impl Recorder {
                 Opened::default()
             }
         }
+    }
+
+    /// Of what waits, drops what the log has: the disk took it although it reported a failure. The history gets it from there.
+    fn drop_written(&mut self, opened: &Opened) {
+        let (mut pending, mut written) = (std::mem::take(&mut self.pending), Vec::new());
+        pending.retain(|Pending { action, .. }| {
+            let same = |entry: &&ActionRecord| ActionRecord { chain_hash: None, ..(*entry).clone() } == *action;
+            let found = opened.tail.iter().rev().find(same);
+            written.extend(found.cloned());
+            found.is_none()
+        });
+        self.pending = pending;
+        self.store(written);
     }
 
     /// Into the log, and on to the history; without a chain hash while the log cannot be written.

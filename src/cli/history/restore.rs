@@ -1,4 +1,5 @@
-//! `sightglass history restore PLANT DIR`: a backup in the place of the history, which is set aside.
+//! `sightglass history restore PLANT DIR`: a backup in the place of the history, which is set aside; with `--set-aside` what a
+//! station has set aside, joined with the history.
 
 use std::{
     os::unix::fs::PermissionsExt,
@@ -13,7 +14,11 @@ use crate::{
     cli::{CliError, run, say},
     history::{
         backup::{AUDIT_LOG, Backup},
-        io::{files::Exclusive, restore},
+        io::{
+            files::Exclusive,
+            restore,
+            reunite::{self, Reunited},
+        },
     },
     plant::record::RESTORE,
     profile::io::atomic::write_atomic,
@@ -26,8 +31,11 @@ pub struct Args {
     #[command(flatten)]
     plant: StoredPlant,
     /// The folder of a backup
-    #[arg(value_name = "DIR")]
-    from: PathBuf,
+    #[arg(value_name = "DIR", required_unless_present = "set_aside", conflicts_with = "set_aside")]
+    from: Option<PathBuf>,
+    /// Bring back what a station has set aside as damaged and is sound, with what was recorded since
+    #[arg(long)]
+    set_aside: bool,
 }
 
 /// Restores, or finishes a restore that was interrupted. Refused while a station records to the history.
@@ -38,13 +46,42 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     if let Some(folder) = db.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder.display().to_string()))?;
     }
-    let _exclusive = Exclusive::acquire(&db)?;
+    // What was set aside is joined with the history, which this process opens for it.
+    let _exclusive = if args.set_aside { Exclusive::hold(&db)? } else { Exclusive::acquire(&db)? };
     if let Some(before) = restore::finish(&db)? {
         say(&format!("the restore that was interrupted is finished{}", set_aside(&before)));
         return Ok(());
     }
-    let sound = restore::verify(&args.from)?;
-    let log = audit_log::beside(&db);
+    match &args.from {
+        Some(from) => from_backup(from, &def.name, &db, now),
+        None => from_set_aside(&db, now),
+    }
+}
+
+/// Histories that were set aside, in front of the present one.
+fn from_set_aside(db: &Path, now: Timestamp) -> Result<(), CliError> {
+    let Reunited { sound, damaged, rows, aside } = reunite::prepare(db, now)?;
+    for (path, why) in &damaged {
+        say(&format!("{} is damaged and stays: {why}", path.display()));
+    }
+    if sound.is_empty() {
+        return Err(CliError::Failed(format!("{}: nothing sound is set aside", db.display())));
+    }
+    let target = sound.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
+    let mut log = open_log(&audit_log::beside(db))?;
+    let outcome = |word: &str| format!("{word}: {rows} rows that were set aside");
+    record(&mut log, RESTORE, &target, &outcome("begun"), now)?;
+    restore::commit(db)?;
+    restore::finish(db)?;
+    record(&mut log, RESTORE, &target, &outcome("done"), now)?;
+    say(&format!("brought back {target}: {rows} rows, with those recorded since{}", set_aside(&aside)));
+    Ok(())
+}
+
+/// A backup in the place of the history.
+fn from_backup(from: &Path, plant: &str, db: &Path, now: Timestamp) -> Result<(), CliError> {
+    let sound = restore::verify(from)?;
+    let log = audit_log::beside(db);
     // The log goes on, and says so; where it is not the one of the backup, that of the backup takes its place.
     let is_kept = log.exists() && audit_log::verify(&log, &sound.chain_hashes).is_ok();
     let present = if log.exists() { Some(open_log(&log)?) } else { None };
@@ -53,21 +90,21 @@ pub fn main(args: &Args) -> Result<(), CliError> {
         also.push(log.clone());
     }
     let replaced = (!is_kept).then_some(log.as_path());
-    let aside = restore::prepare(&args.from, &sound.backup, &db, replaced, &also, now)?;
-    let (target, what) = (args.from.display().to_string(), sound.backup.summary());
+    let aside = restore::prepare(from, &sound.backup, db, replaced, &also, now)?;
+    let (target, what) = (from.display().to_string(), sound.backup.summary());
     let outcome = |word: &str| format!("{word}: {what}{}", set_aside(&aside));
     let mut kept = present.filter(|_| is_kept);
     if let Some(log) = &mut kept {
         record(log, RESTORE, &target, &outcome("begun"), now)?;
     }
-    let (restored, present) = restore_companions(&args.from, &sound.backup, &db, &def.name)?;
-    restore::commit(&db)?;
-    restore::finish(&db)?;
+    let (restored, present) = restore_companions(from, &sound.backup, db, plant)?;
+    restore::commit(db)?;
+    restore::finish(db)?;
     let mut log = kept.map_or_else(|| open_log(&log), Ok)?;
     record(&mut log, RESTORE, &target, &outcome("done"), now)?;
     say(&format!(
         "restored {}: {what}{}",
-        args.from.display(),
+        from.display(),
         if aside.exists() { set_aside(&aside) } else { String::new() }
     ));
     if restored + present != 0 {

@@ -1,5 +1,7 @@
 //! The store beside the audit log: which entries it holds, and each of them once.
 
+use std::collections::HashSet;
+
 use duckdb::params;
 
 use super::store::{Store, engine, utc};
@@ -20,6 +22,12 @@ const UNCHAINED: &str = "SELECT count(*) FROM (SELECT 1 FROM operator_action WHE
 const REMOVE_UNSEALED: &str = "DELETE FROM operator_action WHERE number IS NULL AND utc = ? AND by_whom = ?
     AND action = ? AND target = ? AND outcome = ? AND coalesce(new_value, '') = ?";
 
+/// What distinguishes an action from others, as [`REMOVE_UNSEALED`] has it.
+fn key(action: &ActionRecord) -> (i64, &str, &str, &str, &str, &str) {
+    let ActionRecord { at, by, action, target, outcome, new, .. } = action;
+    (at.as_microsecond(), by, action, target, outcome, new.as_deref().unwrap_or_default())
+}
+
 impl Store {
     /// The chain hashes of the latest entries, at most [`CHAIN_HASHES_MAX`].
     pub fn chain_hashes(&self) -> Result<Vec<ChainHash>, HistoryError> {
@@ -34,8 +42,12 @@ impl Store {
         rows.map(chain_hash).collect()
     }
 
-    /// Makes room for actions that come with their chain hashes and were stored without before. Part of a transaction.
-    pub(super) fn remove_unsealed(&self, actions: &[&ActionRecord]) -> duckdb::Result<()> {
+    /// Makes room for actions that come with their chain hashes and were stored without before, or come without among these:
+    /// the disk took neither for a while. Part of a transaction.
+    pub(super) fn remove_unsealed(&self, actions: &mut Vec<&ActionRecord>) -> duckdb::Result<()> {
+        let chained = actions.iter().filter(|action| action.chain_hash.is_some()).map(|action| key(action));
+        let chained: HashSet<_> = chained.collect();
+        actions.retain(|action| action.chain_hash.is_some() || !chained.contains(&key(action)));
         let mut chained = actions.iter().filter(|action| action.chain_hash.is_some()).peekable();
         if chained.peek().is_none() || self.db.query_row(UNCHAINED, [], |row| row.get::<_, u64>(0))? == 0 {
             return Ok(());

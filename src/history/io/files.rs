@@ -14,19 +14,21 @@ use jiff::{Timestamp, tz::TimeZone};
 use crate::{
     history::{HistoryError, engine_error, retention::Disk},
     plant::def::HistoryDef,
-    profile::io::atomic::with_suffix,
+    profile::io::{atomic::with_suffix, regular},
 };
 
-/// Opens that never ended before the log is set aside, as the part that is replayed; after one more, the file too.
-pub const FAILED_OPENS_MAX: u32 = 2;
+/// Of the text of a count.
+const COUNT_BYTES_MAX: u64 = 20;
 
 /// A file beside the database that exists only while it is being opened. Replaying a damaged log can abort the whole
-/// process: then the file stays behind and counts.
+/// process: then the file stays behind and counts. So it does where the process was killed.
 pub struct Opening {
     path: PathBuf,
     file: File,
     /// Earlier opens that never ended.
     pub failed: u32,
+    /// The next one must still know of them.
+    suspected: bool,
 }
 
 /// Refuses a file that is certainly no history, so that no other file is ever set aside as a damaged one. Reads it
@@ -37,11 +39,19 @@ pub fn refuse_foreign(db: &Path) -> Result<(), HistoryError> {
     }
     // A DuckDB file has these letters behind the check sum of its first block.
     let mut head = [0; 12];
-    let read = File::open(db).and_then(|mut file| file.read_exact(&mut head));
+    let read = regular::open(db).and_then(|mut file| file.read_exact(&mut head));
     match read {
         Ok(()) if &head[8..] == b"DUCK" => Ok(()),
         Ok(()) | Err(_) => Err(HistoryError::Foreign { path: db.display().to_string() }),
     }
+}
+
+/// Refuses what is no file: the engine would wait for a pipe, and for whoever writes to it.
+pub fn refuse_special(db: &Path) -> Result<(), HistoryError> {
+    let mut paths = LOGS.into_iter().chain([""]).map(|suffix| with_suffix(db, suffix));
+    paths.try_for_each(|path| {
+        regular::check(&path).map_err(|error| HistoryError::Engine(format!("{}: {error}", path.display())))
+    })
 }
 
 impl Opening {
@@ -52,8 +62,7 @@ impl Opening {
         if let Some(folder) = db.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             fs::create_dir_all(folder).map_err(wrong)?;
         }
-        let mut file =
-            File::options().read(true).write(true).create(true).truncate(false).open(&path).map_err(wrong)?;
+        let file = regular::open_with(File::options().read(true).write(true).create(true), &path).map_err(wrong)?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(locked(db, "another process, which is just starting".into())),
@@ -61,11 +70,16 @@ impl Opening {
         }
         let mut text = String::new();
         // What cannot be read counts as nothing: the guard must not keep a good store closed.
-        let _ = file.read_to_string(&mut text);
+        let _ = (&file).take(COUNT_BYTES_MAX).read_to_string(&mut text);
         let failed = text.trim().parse().unwrap_or(0);
-        let mut opening = Opening { path, file, failed };
-        opening.count(failed + 1);
+        let mut opening = Opening { path, file, failed, suspected: false };
+        opening.count(failed.saturating_add(1));
         Ok(opening)
+    }
+
+    /// Ends without having opened the store: why the opens before it never ended is still unknown.
+    pub fn keep_suspicion(&mut self) {
+        self.suspected = true;
     }
 
     /// A full disk must not keep the store closed either: a count that cannot be written is not kept.
@@ -88,7 +102,7 @@ impl Exclusive {
     pub fn hold(db: &Path) -> Result<Exclusive, HistoryError> {
         let guard = with_suffix(db, ".opening");
         let wrong = |error: std::io::Error| HistoryError::Engine(format!("{}: {error}", guard.display()));
-        let file = File::options().write(true).create(true).truncate(false).open(&guard).map_err(wrong)?;
+        let file = regular::open_with(File::options().write(true).create(true), &guard).map_err(wrong)?;
         match file.try_lock() {
             Ok(()) => Ok(Exclusive { guard, _files: vec![file] }),
             Err(TryLockError::WouldBlock) => Err(locked(db, "another process, which is just starting".into())),
@@ -101,7 +115,7 @@ impl Exclusive {
     pub fn acquire(db: &Path) -> Result<Exclusive, HistoryError> {
         let mut held = Exclusive::hold(db)?;
         let wrong = |error: std::io::Error| HistoryError::Engine(format!("{}: {error}", db.display()));
-        match File::options().read(true).write(true).open(db) {
+        match regular::open_with(File::options().read(true).write(true), db) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             Err(error) => return Err(wrong(error)),
             Ok(file) => {
@@ -127,7 +141,7 @@ impl Drop for Exclusive {
 impl Drop for Opening {
     /// The open came to an orderly end, good or not.
     fn drop(&mut self) {
-        if !std::thread::panicking() {
+        if !std::thread::panicking() && !self.suspected {
             let _ = fs::remove_file(&self.path);
         }
     }
@@ -175,13 +189,37 @@ pub fn set_aside(db: &Path, part: SetAside, now: Timestamp) -> Result<PathBuf, H
     Ok(target)
 }
 
+/// Copies the logs of `from`, synced, as those of `db`.
+pub fn copy_logs(from: &Path, db: &Path) -> Result<(), HistoryError> {
+    each_log(from, db, |from, to| regular::copy(from, to).and_then(|_| File::open(to)?.sync_all()))
+}
+
+/// Moves the logs of `from` back to `db`.
+pub fn put_logs_back(from: &Path, db: &Path) -> Result<(), HistoryError> {
+    remove_logs(db);
+    each_log(from, db, |from, to| fs::rename(from, to))
+}
+
+/// Removes the logs of a database, of which there is a copy.
+pub fn remove_logs(db: &Path) {
+    for log in LOGS {
+        // One that cannot be removed is found when the database is opened.
+        let _ = fs::remove_file(with_suffix(db, log));
+    }
+}
+
+fn each_log(from: &Path, to: &Path, each: impl Fn(&Path, &Path) -> std::io::Result<()>) -> Result<(), HistoryError> {
+    let paths = LOGS.map(|log| (with_suffix(from, log), with_suffix(to, log)));
+    paths.iter().filter(|(from, _)| from.exists()).try_for_each(|(from, to)| {
+        each(from, to).map_err(|error| HistoryError::Engine(format!("{}: {error}", from.display())))
+    })
+}
+
 /// Removes a database that was never more than begun, as a full disk leaves it.
 pub fn remove(db: &Path) {
     for suffix in LOGS.into_iter().chain([""]) {
-        let path = with_suffix(db, suffix);
-        if path.is_file() {
-            let _ = fs::remove_file(path);
-        }
+        // A folder of that name is none of the station's.
+        let _ = fs::remove_file(with_suffix(db, suffix));
     }
 }
 

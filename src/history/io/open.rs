@@ -10,8 +10,9 @@ use super::{
     compact,
     files::{self, Failure, Opening, SetAside},
     last::{self, LastCommit, Noted},
+    probe::{self, Probe, Proven},
     read::action,
-    restore, sql,
+    restore, room, sql,
     store::{Store, after, engine},
 };
 use crate::{
@@ -66,22 +67,36 @@ impl Store {
     pub fn open_at_start(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened<Restored>, HistoryError> {
         Store::open_and(path, def, now, |store| {
             store.end_curves_left_behind(now)?;
-            let events = store.restore()?;
-            let recent = match store.recent(now) {
-                // A plant must start even if its journal is too long to be measured.
-                Err(error @ HistoryError::TooManyRows { .. }) => {
-                    tracing::warn!(%error, "the alarm figures of the last day begin at zero");
-                    Recent::default()
-                }
-                recent => recent?,
-            };
-            let chain_hashes = store
-                .chain_hashes()
-                .inspect_err(|error| tracing::warn!(%error, "not compared with the audit log"))
-                .ok();
-            let procedure = store.list(&sql::latest_procedure(), &[], action)?.pop();
-            Ok(Restored { events, recent, chain_hashes, procedure, ..store.restore_followed()? })
+            store.read_at_start(now)
         })
+    }
+
+    fn read_at_start(&self, now: Timestamp) -> Result<Restored, HistoryError> {
+        let events = self.restore()?;
+        let recent = match self.recent(now) {
+            // A plant must start even if its journal is too long to be measured.
+            Err(error @ HistoryError::TooManyRows { .. }) => {
+                tracing::warn!(%error, "the alarm figures of the last day begin at zero");
+                Recent::default()
+            }
+            recent => recent?,
+        };
+        let chain_hashes =
+            self.chain_hashes().inspect_err(|error| tracing::warn!(%error, "not compared with the audit log")).ok();
+        let procedure = self.list(&sql::latest_procedure(), &[], action)?.pop();
+        Ok(Restored { events, recent, chain_hashes, procedure, ..self.restore_followed()? })
+    }
+
+    /// Does to the files what may end the process at a start: replays the log, writes it into the file, reads, adds a row.
+    pub(super) fn try_out(path: &Path, now: Timestamp) -> Result<(), HistoryError> {
+        let store = Store::around(connect(path, AccessMode::ReadWrite).map_err(engine)?, path, &Arc::default());
+        store.migrate().map_err(engine)?;
+        store.checkpoint()?;
+        store.adopt_tags(now)?;
+        store.adopt_files()?;
+        store.read_last_commit().map_err(engine)?;
+        store.db.execute_batch(sql::TRY_A_TAG).map_err(engine)?;
+        store.read_at_start(now).map(drop)
     }
 
     /// What a plant goes on from in what it follows: batches, control runs and totals.
@@ -101,7 +116,8 @@ impl Store {
     /// Opens or creates the store.
     ///
     /// A damaged log is set aside: the file is then as old as its last checkpoint, some minutes. A damaged file is set
-    /// aside with its log and a new store is begun. So it is with files whose opening never ended twice before.
+    /// aside with its log and a new store is begun. Files whose opening never ended are examined by a [`probe`] first, and
+    /// what the engine says of damage must be found there too.
     /// [`HistoryError::Locked`] if another process has it, [`HistoryError::Engine`] for any other obstacle.
     pub fn open(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<Opened, HistoryError> {
         Store::open_and(path, def, now, |_| Ok(()))
@@ -115,7 +131,9 @@ impl Store {
         read: impl Fn(&Store) -> Result<T, HistoryError>,
     ) -> Result<Opened<T>, HistoryError> {
         files::refuse_foreign(path)?;
-        let opening = Opening::begin(path)?;
+        files::refuse_special(path)?;
+        room::check()?;
+        let mut opening = Opening::begin(path)?;
         if let Some(before) = restore::finish(path)? {
             tracing::warn!(before = %before.display(), "a restore that was interrupted is finished");
         }
@@ -126,21 +144,11 @@ impl Store {
         if fresh {
             files::remove(path);
         }
-        let mut trouble = None;
-        let mut set_aside = |part: SetAside, why: &str| -> Result<(), HistoryError> {
-            tracing::error!(why, ?part, "the history is damaged");
-            let target = files::set_aside(path, part, now)?;
-            let what = match part {
-                SetAside::Log => "the last minutes of the history are",
-                SetAside::Everything => "the history is",
-            };
-            trouble = Some(format!("{what} damaged ({}) and set aside as {}", plain(why), target.display()));
-            Ok(())
-        };
-        match opening.failed {
-            0..files::FAILED_OPENS_MAX => {}
-            files::FAILED_OPENS_MAX if files::has_log(path) => set_aside(SetAside::Log, "opening it never ended")?,
-            _ => set_aside(SetAside::Everything, "opening it never ended")?,
+        let (mut trouble, mut repaired) = (None, None);
+        let mut report = |proven| trouble = Some(said_of(proven));
+        if 0 < opening.failed && !fresh {
+            let examined = probe::examine(path, now, &probe::in_child);
+            examined.inspect_err(|_| opening.keep_suspicion())?.into_iter().for_each(&mut report);
         }
         let try_open = || {
             let unclean = files::has_log(path);
@@ -155,8 +163,17 @@ impl Store {
         let mut opened = try_open();
         for part in [SetAside::Log, SetAside::Everything] {
             let Err(Failure::Damaged(why)) = &opened else { break };
-            if part == SetAside::Everything || files::has_log(path) && !engine_error::is_of_database(why) {
-                set_aside(part, why)?;
+            if part == SetAside::Log && (!files::has_log(path) || engine_error::is_of_database(why)) {
+                continue;
+            }
+            match probe::in_child(path) {
+                Probe::Obstacle(error) => return Err(error),
+                // What the engine has stumbled over is gone, or the log had what could not be read.
+                Probe::Sound => (repaired, opened) = (Some(unread_at_first(why)), try_open()),
+                Probe::Untried(_) | Probe::Damaged(_) => {}
+            }
+            if let Err(Failure::Damaged(why)) = &opened {
+                report(Proven { part, why: why.clone(), target: files::set_aside(path, part, now)? });
                 opened = try_open();
             }
         }
@@ -170,7 +187,7 @@ impl Store {
             }
         })?;
         let missing = missing(&noted, &store.last_commit(), trouble.is_some());
-        let trouble = joined([&trouble, &missing, &archive]);
+        let trouble = joined([&trouble.or(repaired), &missing, &archive]);
         store.note_last_commit();
         drop(opening);
         Ok(Opened { store, trouble, read })
@@ -184,6 +201,7 @@ impl Store {
             return Err(HistoryError::Missing { path: path.display().to_string() });
         }
         files::refuse_foreign(path)?;
+        files::refuse_special(path)?;
         let failed = |message: String| match files::diagnose(path, &message) {
             Failure::Obstacle(error) => error,
             Failure::Damaged(why) => HistoryError::Engine(why),
@@ -202,6 +220,7 @@ impl Store {
 
     /// Opens a database that no station writes, whatever its plant is, to see what is in it.
     pub(super) fn peek(path: &Path) -> Result<Store, HistoryError> {
+        files::refuse_special(path)?;
         let db = connect(path, AccessMode::ReadOnly).map_err(engine)?;
         let store = Store::around(db, path, &Arc::default());
         let version = store.version().map_err(engine)?;
@@ -298,6 +317,21 @@ fn failure(path: &Path, error: HistoryError) -> Failure {
         HistoryError::Engine(words) => files::diagnose(path, &words),
         other => Failure::Obstacle(other),
     }
+}
+
+/// What an operator reads of damage that was gone at the second try.
+fn unread_at_first(why: &str) -> String {
+    format!("a part of the history could not be read at first ({})", plain(why))
+}
+
+/// What an operator reads of what was set aside.
+fn said_of(Proven { part, why, target }: Proven) -> String {
+    tracing::error!(why, ?part, "the history is damaged");
+    let what = match part {
+        SetAside::Log => "the last minutes of the history are",
+        SetAside::Everything => "the history is",
+    };
+    format!("{what} damaged ({}) and set aside as {}", plain(&why), target.display())
 }
 
 /// What is missing; a file that was set aside itself is not said to be missing as well.

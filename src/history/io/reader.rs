@@ -40,6 +40,9 @@ const COMMIT_MAX: Duration = Duration::from_secs(2);
 /// Real time between two attempts to interrupt: one that comes between two statements has no effect.
 const INTERRUPT_EVERY: Duration = Duration::from_millis(10);
 
+/// Interrupted work that goes on for so long hangs in the disk, which the engine cannot know.
+pub const HANG_MAX: Duration = Duration::from_secs(5);
+
 /// Queries on their way, each with the number of its terminal.
 pub type Queries = mpsc::Receiver<(u32, QueryRequest)>;
 
@@ -222,14 +225,17 @@ async fn commit_first(writer: &mpsc::Sender<WriterRequest>) {
     }
 }
 
-/// Interrupts work until it has ended.
-pub(super) async fn stop<T>(work: &mut JoinHandle<T>, interrupt: impl Fn()) {
-    loop {
-        interrupt();
-        if timeout(INTERRUPT_EVERY, &mut *work).await.is_ok() {
-            break;
+/// Interrupts work until it has ended; `false` for what hangs in the disk, which is left behind.
+pub(super) async fn stop<T>(work: &mut JoinHandle<T>, interrupt: impl Fn()) -> bool {
+    let ended = timeout(HANG_MAX, async {
+        loop {
+            interrupt();
+            if timeout(INTERRUPT_EVERY, &mut *work).await.is_ok() {
+                break;
+            }
         }
-    }
+    });
+    ended.await.inspect_err(|_| tracing::error!("work on the history hangs in the disk and is abandoned")).is_ok()
 }
 
 #[cfg(test)]

@@ -26,11 +26,15 @@ use crate::{
         backup::{AUDIT_LOG, Backup, BackupFile, DATABASE, UNFINISHED},
     },
     plant::record::ChainHash,
-    profile::io::atomic::{sync_folder, with_suffix},
+    profile::io::{
+        atomic::{sync_folder, with_suffix},
+        regular,
+    },
 };
 
 /// In the folder of a restore: what becomes of the history before it. The last to go.
 const PLAN: &str = "plan.json";
+const PLAN_BYTES_MAX: u64 = 1 << 20;
 /// Files that are not sound and are named.
 const NAMED_MAX: usize = 3;
 
@@ -91,10 +95,7 @@ pub fn prepare(
     also: &[PathBuf],
     now: Timestamp,
 ) -> Result<PathBuf, HistoryError> {
-    let new = with_suffix(&ready(db), UNFINISHED);
-    if new.exists() {
-        fs::remove_dir_all(&new).map_err(|error| failed(&new, &error))?;
-    }
+    let new = begin(db)?;
     if files::disk(db).is_some_and(|disk| disk.free < backup.bytes()) {
         let needed = (backup.bytes() >> 20) + 1;
         return Err(HistoryError::Refused(format!("{}: expected {needed} MiB free on its disk", db.display())));
@@ -111,13 +112,7 @@ pub fn prepare(
             };
             copy(&from.join(file.stored()), &to, file)?;
         }
-        let beside = files::LOGS.map(|log| with_suffix(db, log)).into_iter().chain([last::path(db)]);
-        let also = beside.chain(also.iter().cloned()).map(|path| name(&path)).collect();
-        let aside = aside(db, now);
-        let plan = serde_json::to_vec(&Plan { aside: name(&aside), also }).expect("its keys are words");
-        let written = fs::write(new.join(PLAN), plan).and_then(|()| sync_and_hash(&new.join(PLAN)));
-        written.and_then(|_| sync_folders(&new)).map_err(|error| failed(&new, &error))?;
-        Ok(aside)
+        plan(&new, db, also, now)
     };
     prepared().inspect_err(|_| {
         // A leftover is removed by the next one.
@@ -125,8 +120,27 @@ pub fn prepare(
     })
 }
 
+/// The folder that a new history is put together in, empty.
+pub(super) fn begin(db: &Path) -> Result<PathBuf, HistoryError> {
+    let new = with_suffix(&ready(db), UNFINISHED);
+    let cleared = if new.exists() { fs::remove_dir_all(&new) } else { Ok(()) };
+    cleared.and_then(|()| fs::create_dir_all(&new)).map_err(|error| failed(&new, &error))?;
+    Ok(new)
+}
+
+/// Completes that folder: `also` is set aside with the history. Returns where that goes.
+pub(super) fn plan(new: &Path, db: &Path, also: &[PathBuf], now: Timestamp) -> Result<PathBuf, HistoryError> {
+    let beside = files::LOGS.map(|log| with_suffix(db, log)).into_iter().chain([last::path(db)]);
+    let also = beside.chain(also.iter().cloned()).map(|path| name(&path)).collect();
+    let aside = aside(db, now);
+    let plan = serde_json::to_vec(&Plan { aside: name(&aside), also }).expect("its keys are words");
+    let written = fs::write(new.join(PLAN), plan).and_then(|()| sync_and_hash(&new.join(PLAN)));
+    written.and_then(|_| sync_folders(new)).map_err(|error| failed(new, &error))?;
+    Ok(aside)
+}
+
 fn copy(from: &Path, to: &Path, file: &BackupFile) -> Result<(), HistoryError> {
-    let copied = fs::create_dir_all(to.parent().unwrap_or(to)).and_then(|()| fs::copy(from, to));
+    let copied = fs::create_dir_all(to.parent().unwrap_or(to)).and_then(|()| regular::copy(from, to));
     let (bytes, sha256) = copied.and_then(|_| sync_and_hash(to)).map_err(|error| failed(to, &error))?;
     match bytes == file.bytes && sha256 == file.sha256 {
         true => Ok(()),
@@ -154,7 +168,7 @@ pub(super) fn finish_in_steps(db: &Path, steps: Steps) -> Result<Option<PathBuf>
     }
     let home = db.parent().unwrap_or(Path::new(""));
     let wrong = |error: std::io::Error| failed(&ready, &error);
-    let plan: Plan = match fs::read(ready.join(PLAN)) {
+    let plan: Plan = match regular::read(&ready.join(PLAN), PLAN_BYTES_MAX) {
         Ok(text) => serde_json::from_slice(&text).map_err(|error| HistoryError::Refused(error.to_string()))?,
         // Everything is in place.
         Err(_) => {

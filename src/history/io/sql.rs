@@ -42,6 +42,8 @@ pub const VERSION: &str = "SELECT coalesce(max(version), 0) FROM schema_version"
 /// One more is done.
 pub const SET_VERSION: &str = "INSERT INTO schema_version VALUES (?)";
 
+/// Adds a tag, and does not.
+pub const TRY_A_TAG: &str = "BEGIN; INSERT INTO tag VALUES (65535, '', ''); ROLLBACK";
 /// The dictionary of tags.
 pub const TAGS: &str = "SELECT id, name, unit FROM tag";
 

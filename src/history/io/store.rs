@@ -19,6 +19,7 @@ use super::{
     interrupt::{Interrupt, Open},
     last::{self, LastCommit},
     reports::append_report,
+    room,
     runs::append_run,
     samples::PIECE,
     sql,
@@ -67,6 +68,7 @@ pub struct Store {
 impl Store {
     /// The same store through a connection of its own, to read beside the one that writes.
     pub fn try_clone(&self) -> Result<Store, HistoryError> {
+        room::check()?;
         let db = self.db.try_clone().map_err(engine)?;
         Ok(Store {
             extent: self.extent.clone(),
@@ -135,6 +137,7 @@ impl Store {
 
     /// Writes the log into the file.
     pub fn checkpoint(&self) -> Result<(), HistoryError> {
+        room::check()?;
         self.db.execute_batch("CHECKPOINT").map_err(engine)
     }
 
@@ -239,6 +242,7 @@ impl Store {
     }
 
     pub(super) fn transaction<T>(&self, work: impl FnOnce() -> duckdb::Result<T>) -> Result<T, HistoryError> {
+        room::check()?;
         disk::step("transaction").map_err(|error| HistoryError::Engine(error.to_string()))?;
         let rollback = || self.db.execute_batch("ROLLBACK");
         let begin = || self.db.execute_batch("BEGIN");
@@ -287,7 +291,7 @@ impl Store {
             to.append_row((utc(in_milliseconds(at)), id, value, quality.code(), epoch, rest))
         })?;
         self.append_rows("alarm_journal", alarms, |to, alarm| append_alarm(to, alarm, epoch))?;
-        self.remove_unsealed(&actions)?;
+        self.remove_unsealed(&mut actions)?;
         self.append_rows("operator_action", actions, |to, action| append_action(to, action, epoch))?;
         self.append_rows("line_minute", lines, |to, minute| append_line(to, minute, epoch))?;
         self.append_rows("batch", batches, |to, BatchRecord { at, batch, number, place, event, phase }| {

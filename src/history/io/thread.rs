@@ -13,7 +13,7 @@ use super::{
     archiver::Archiver,
     files,
     open::{Opened, Restored},
-    reader::{Answerer, QUERIES_IN_WORK_MAX, Queries, Reader, WriterRequest},
+    reader::{Answerer, HANG_MAX, QUERIES_IN_WORK_MAX, Queries, Reader, WriterRequest},
     store::Store,
     writer::Writer,
 };
@@ -75,8 +75,8 @@ pub struct Handle {
     pub status: watch::Receiver<HistoryStatus>,
     /// What the plant restores from its history, as soon as it is open for the first time.
     pub restored: Option<oneshot::Receiver<Restored>>,
-    /// The thread.
-    pub join: JoinHandle<()>,
+    /// The thread; `None` where the system gave none.
+    pub join: Option<JoinHandle<()>>,
 }
 
 impl Handle {
@@ -85,7 +85,16 @@ impl Handle {
         let Handle { records, queries, jobs, status, restored: _, join } = self;
         drop((records, queries, jobs, status));
         // A panic of the thread has already been reported by the panic hook.
-        let _ = join.join();
+        let _ = join.map(JoinHandle::join);
+    }
+
+    /// Of a station without a history: every record is lost and counted, and the status says why.
+    fn without_thread(why: &HistoryError) -> Handle {
+        tracing::error!(%why, "the station runs without its history");
+        let (records, queries, jobs) = (mpsc::channel(1).0, mpsc::channel(1).0, mpsc::channel(1).0);
+        let failing = Some(format!("{}; restart the station", why.words()));
+        let status = HistoryStatus { trouble: failing.clone(), failing, ..HistoryStatus::default() };
+        Handle { records, queries, jobs, status: watch::channel(status).1, restored: None, join: None }
     }
 }
 
@@ -104,7 +113,11 @@ pub fn offer(queue: &mpsc::Sender<HistoryInput>, mut records: Vec<Record>) -> u6
 /// Starts the threads, which open the store while the station already polls. [`HistoryError::Foreign`] for a file that is
 /// something else; what can change, such as a full disk, is retried and shown.
 pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, HistoryError> {
-    start_with(path, def, clock, COMMIT_EVERY, Arc::new(Store::answer))
+    match start_with(path, def, clock, COMMIT_EVERY, Arc::new(Store::answer)) {
+        // The system gives no thread: polls and alarms go on.
+        Err(error @ HistoryError::Engine(_)) => Ok(Handle::without_thread(&error)),
+        started => started,
+    }
 }
 
 /// The same with another interval between commits and other answers.
@@ -135,7 +148,7 @@ pub(super) fn start_with(
         finish(&mut writer, clock, opening, &mut outputs).await;
     };
     let join = spawn("history", writing).map_err(trouble)?;
-    Ok(Handle { records, queries, jobs, status, restored: Some(restored), join })
+    Ok(Handle { records, queries, jobs, status, restored: Some(restored), join: Some(join) })
 }
 
 /// Records until the last sender is dropped, on the runtime of the caller: for virtual time, where no other thread may
@@ -176,7 +189,11 @@ fn spawn<F: Future<Output = ()>>(
         // One for a query of the station.
         .max_blocking_threads(QUERIES_IN_WORK_MAX + 1)
         .build()?;
-    std::thread::Builder::new().name(name.into()).spawn(move || runtime.block_on(work()))
+    std::thread::Builder::new().name(name.into()).spawn(move || {
+        runtime.block_on(work());
+        // What hangs in the disk does not keep the station from ending.
+        runtime.shutdown_timeout(HANG_MAX);
+    })
 }
 
 /// What the thread publishes.

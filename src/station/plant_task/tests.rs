@@ -44,7 +44,7 @@ impl Station {
         let plant = Plant::new(def.clone(), clock.now(), 1.0);
         let (records, blocked) = mpsc::channel(1);
         records.try_send(Vec::new().into()).unwrap();
-        let recorder = recorder::start(history, clock, records.clone()).unwrap();
+        let recorder = recorder::start(history, clock, records.clone());
         let (_, store) = watch::channel(HistoryStatus::default());
         let audit = Some(AuditQueue::new(&recorder));
         let persistence =
@@ -57,7 +57,7 @@ impl Station {
         let task = PlantTask::new(plant, clock, vec![request], None, persistence, publish);
         let inputs = Inputs { events: event_queue, commands: command_queue, messages: message_queue, reloads };
         let task = tokio::spawn(task.run(inputs));
-        let recorder = recorder.join;
+        let recorder = recorder.join.unwrap();
         let station =
             Station { events, commands, snapshots, task, recorder, _blocked: blocked, messages, _requests: requests };
         let tags: Vec<TagId> = def.tags_of(fixture::TIC).map(|tag| tag.id).collect();

@@ -64,12 +64,12 @@ fn stored(rows: &mut mpsc::Receiver<HistoryInput>) -> Vec<ActionRecord> {
 /// One life of a station beside `tank.duckdb`: opens the log, writes each of these actions, ends.
 fn life(history_file: &Path, actions: &[&str]) -> (Vec<ActionRecord>, Recorded, Opened) {
     let (history, mut rows) = mpsc::channel(64);
-    let Handle { groups, recorded, opened, alarms: _, join } = start(history_file, clock(), history).unwrap();
+    let Handle { groups, recorded, opened, alarms: _, join } = start(history_file, clock(), history);
     for what in actions {
         groups.send(Message::WriteGroup(group(&[what], &[]))).unwrap();
     }
     drop(groups);
-    join.join().unwrap();
+    join.unwrap().join().unwrap();
     (stored(&mut rows), recorded.borrow().clone(), opened)
 }
 
@@ -200,6 +200,27 @@ fn refused_writes_are_unrecorded_until_the_disk_is_back() {
 }
 
 #[test]
+fn what_the_disk_took_despite_its_error_is_not_written_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("tank.duckdb");
+    let (history, mut rows) = mpsc::channel(64);
+    let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
+    recorder.on_group(group(&["write", "acknowledge"], &[]));
+    recorder.write();
+    assert!(chain_hashes(&stored(&mut rows)).is_empty());
+    // The first of both has come to the disk.
+    life(&history_file, &["start", "write"]);
+    recorder.opened_at -= REOPEN;
+    recorder.write();
+    let log = fs::read_to_string(beside(&history_file)).unwrap();
+    let counts = ["start", "write", "acknowledge"].map(|what| log.matches(&format!("\"{what}\"")).count());
+    assert_eq!(counts, [1, 1, 1], "{log}");
+    let numbers: Vec<u64> = chain_hashes(&stored(&mut rows)).iter().map(|chain_hash| chain_hash.number).collect();
+    assert_eq!(numbers, [2, 3]);
+    assert_eq!(recorder.status().log, None);
+}
+
+#[test]
 fn a_long_fault_keeps_the_latest_actions_and_counts_the_rest() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("later").join("tank.duckdb");
@@ -259,7 +280,7 @@ fn acknowledgements_survive_without_a_history() {
     let history_file = folder.path().join("tank.duckdb");
     let (history, rows) = mpsc::channel(1);
     drop(rows);
-    let Handle { groups, mut recorded, join, .. } = start(&history_file, clock(), history).unwrap();
+    let Handle { groups, mut recorded, join, .. } = start(&history_file, clock(), history);
     let done = group(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]);
     groups.send(Message::WriteGroup(done)).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
@@ -268,7 +289,7 @@ fn acknowledgements_survive_without_a_history() {
     let found = AlarmFile::open(&alarm_file::beside(&history_file), clock().now()).1;
     assert_eq!(found.events.unwrap(), group(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).events);
     drop(groups);
-    join.join().unwrap();
+    join.unwrap().join().unwrap();
 }
 
 /// What a station that was killed had written into the log and not into the history.
@@ -279,10 +300,10 @@ fn the_history_is_completed_and_differences_are_reported() {
     let (rows, ..) = life(&history_file, &["start", "write", "acknowledge"]);
     let compared = |known: Vec<ChainHash>| {
         let (history, mut stored_rows) = mpsc::channel(64);
-        let Handle { groups, recorded, join, .. } = start(&history_file, clock(), history).unwrap();
+        let Handle { groups, recorded, join, .. } = start(&history_file, clock(), history);
         groups.send(Message::Stored(known)).unwrap();
         drop(groups);
-        join.join().unwrap();
+        join.unwrap().join().unwrap();
         (stored(&mut stored_rows), recorded.borrow().log.clone())
     };
     let (sent, log) = compared(chain_hashes(&rows[..1]));

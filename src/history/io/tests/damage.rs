@@ -1,13 +1,21 @@
 //! The store against damage, a dead station and a second process.
 
 use std::{
+    cell::Cell,
     fs,
     io::{BufRead, BufReader, Write},
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
 };
 
-use super::{super::store::Store, PV, def, folder, good, means, open, series, step};
+use super::{
+    super::{
+        files::{self, SetAside},
+        probe::{self, Probe, examine},
+        store::Store,
+    },
+    PV, def, folder, good, means, open, series, step,
+};
 use crate::{
     history::HistoryError,
     plant::record::{AlarmEvent, Record},
@@ -93,26 +101,62 @@ fn a_log_torn_at_any_length_never_keeps_the_station_down() {
 }
 
 #[test]
-fn files_that_twice_never_opened_are_set_aside() {
+fn only_files_that_fail_by_themselves_are_set_aside() {
+    let (_folder, db) = folder();
+    die_after_writing(&db);
+    let log = with_suffix(&db, ".wal");
+    let killed = || Probe::Obstacle(HistoryError::Engine("opening it was ended by signal 9".into()));
+    let crash = || Probe::Damaged("signal 6".into());
+    let files = || [&db, &log].map(|path| fs::read(path).ok());
+    let examine = |probe: &dyn Fn(&Path) -> Probe| examine(&db, sec(0), probe).map(|proven| proven.map(|p| p.part));
+    let before = files();
+    // What ends processes from outside proves nothing, however often; nor does one crash.
+    for _ in 0..10 {
+        assert!(matches!(examine(&|_| killed()), Err(HistoryError::Engine(_))));
+    }
+    let once = Cell::new(false);
+    assert_eq!(examine(&|_| if once.replace(true) { Probe::Sound } else { crash() }), Ok(None));
+    // A copy of the log opens; a kill while the copy is tried.
+    let tries = Cell::new(0);
+    let count = || tries.replace(tries.get() + 1);
+    assert_eq!(examine(&|_| if count() < 2 { crash() } else { Probe::Sound }), Ok(None));
+    assert_eq!(files(), before);
+    tries.set(0);
+    assert!(examine(&|_| if count() < 3 { crash() } else { killed() }).is_err());
+    assert_eq!(files(), before);
+    assert_eq!(fs::read_dir(db.parent().unwrap()).unwrap().count(), 3, "file, log and last commit");
+    // Whatever is tried with the log fails: it is the log.
+    assert_eq!(examine(&|db| if files::has_log(db) { crash() } else { Probe::Sound }), Ok(Some(SetAside::Log)));
+    assert_eq!(files(), [before[0].clone(), None]);
+    assert_eq!(fs::read(with_suffix(&db, ".damaged-19700101T000000Z.wal")).ok(), before[1]);
+    // The file with it: they stay together.
+    fs::write(&log, before[1].as_ref().unwrap()).unwrap();
+    assert_eq!(examine(&|_| crash()), Ok(Some(SetAside::Everything)));
+    let aside = with_suffix(&db, ".damaged-19700101T000000Z-2");
+    assert_eq!([&aside, &with_suffix(&aside, ".wal")].map(|path| fs::read(path).ok()), before);
+    assert_eq!(files(), [None, None]);
+}
+
+#[test]
+fn a_sound_history_survives_any_number_of_kills() {
     let (_folder, db) = folder();
     open(&db, 0).append(&[good(PV, 0, 27.0)]).unwrap();
-    fs::write(with_suffix(&db, ".opening"), "1").unwrap();
+    let guard = with_suffix(&db, ".opening");
+    for kills in ["1", "2", "3", "4294967295"] {
+        fs::write(&guard, kills).unwrap();
+        assert_eq!(means(&open(&db, 0), PV, 0, 1, 1), [Some(27.0)], "{kills}");
+        assert!(!guard.exists());
+    }
+    // Where nothing can be known it stays as it is, and so does the suspicion.
+    fs::write(&guard, "3").unwrap();
+    let aside = with_suffix(&db, ".elsewhere");
+    fs::rename(&db, &aside).unwrap();
+    fs::create_dir(&db).unwrap();
+    assert!(Store::open(&db, &def(), sec(0)).is_err());
+    assert!(guard.exists() && db.is_dir());
+    fs::remove_dir(&db).unwrap();
+    fs::rename(&aside, &db).unwrap();
     assert_eq!(means(&open(&db, 0), PV, 0, 1, 1), [Some(27.0)]);
-    // First the log, because it is what is replayed; the file keeps what it has.
-    let log = with_suffix(&db, ".wal");
-    fs::write(&log, "poison").unwrap();
-    fs::write(with_suffix(&db, ".opening"), "2").unwrap();
-    let opened = Store::open(&db, &def(), sec(0)).unwrap();
-    assert!(opened.trouble.unwrap().contains("the last minutes of the history are damaged (opening it never ended)"));
-    assert_eq!(means(&opened.store, PV, 0, 1, 1), [Some(27.0)]);
-    assert_eq!(fs::read(with_suffix(&db, ".damaged-19700101T000000Z.wal")).unwrap(), b"poison");
-    drop(opened.store);
-    // If that did not help, the file.
-    fs::write(with_suffix(&db, ".opening"), "3").unwrap();
-    let opened = Store::open(&db, &def(), sec(0)).unwrap();
-    assert!(opened.trouble.unwrap().contains("the history is damaged (opening it never ended)"));
-    assert!(with_suffix(&db, ".damaged-19700101T000000Z-2").exists());
-    assert!(!with_suffix(&db, ".opening").exists());
 }
 
 #[test]
@@ -148,15 +192,20 @@ const JOB: &str = "SIGHTGLASS_TEST_JOB";
 pub(super) const FILE: &str = "SIGHTGLASS_TEST_FILE";
 
 pub(super) fn child(job: &str, db: &Path) -> Child {
-    Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "history::io::tests::damage::job_of_a_child_process", "--nocapture"])
-        .env(JOB, job)
-        .env(FILE, db)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap()
+    let mut command = job_command(job, db);
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+fn job_command(job: &str, db: &Path) -> Command {
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.args(["--exact", "history::io::tests::damage::job_of_a_child_process", "--nocapture"]);
+    command.env(JOB, job).env(FILE, db);
+    command
+}
+
+/// What this test program is started with to open a history as [`probe`](super::super::probe) does.
+pub(in super::super) fn probe_command(db: &Path) -> Command {
+    job_command("probe", db)
 }
 
 /// A child commits a few seconds of records and dies without closing anything.
@@ -178,6 +227,10 @@ fn job_of_a_child_process() {
     };
     let db = PathBuf::from(std::env::var(FILE).unwrap());
     if super::flips::job(&job) {
+        return;
+    }
+    if job == "probe" {
+        let _ = probe::child(&db);
         return;
     }
     let store = Store::open(&db, &def(), sec(20)).unwrap().store;

@@ -236,3 +236,19 @@ fn a_short_list_of_reports_has_the_newest_with_their_state() {
         assert_eq!(found.reports, expect);
     }
 }
+
+#[test]
+fn an_action_of_a_full_disk_stands_once_in_the_history() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let chained = |at, number| ActionRecord { chain_hash: Some(ChainHash { number, hash: [7; 32] }), ..action(at) };
+    let records = |actions: &[ActionRecord]| -> Vec<Record> { actions.iter().cloned().map(Record::Action).collect() };
+    // Both disks were full: what was sent without its chain hash and with it waits together, also over a step of the clock.
+    store.append(&records(&[action(1), action(2), chained(1, 1), action(3)])).unwrap();
+    let clock_set = [records(&[action(4)]), vec![Record::ClockSet], records(&[chained(4, 4), chained(2, 2)])];
+    store.append(&clock_set.concat()).unwrap();
+    // One that was stored before.
+    store.append(&records(&[chained(3, 3)])).unwrap();
+    let sql = "SELECT string_agg(coalesce(number::VARCHAR, 'none'), ' ' ORDER BY utc) FROM operator_action";
+    assert_eq!(store.db.query_row(sql, [], |row| row.get::<_, String>(0)).unwrap(), "1 2 3 4");
+}
