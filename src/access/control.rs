@@ -39,7 +39,7 @@ use crate::{
     plant::{
         PlantDef,
         command::{CommandStatus, Refusal},
-        record::{ActionRecord, BACKUP, IMPORT},
+        record::ActionRecord,
         role::Role,
     },
 };
@@ -284,8 +284,8 @@ impl AccessControl {
                 let new = Some(clean(&sha256).into());
                 self.record_and_reply(requester, "export", &file, new, at)
             }
-            SessionRequest::Backup { folder } => self.begin_history_job(requester, BACKUP, folder, Effect::Backup, at),
-            SessionRequest::Import { file } => self.begin_history_job(requester, IMPORT, file, Effect::Import, at),
+            SessionRequest::Backup { folder } => self.begin_backup(requester, folder, at),
+            SessionRequest::Import { file } => self.begin_import(requester, file, at),
             SessionRequest::Stop => {
                 let mut effects = self.record_and_reply(requester, "stop station", &self.plant_name(), None, at);
                 effects.push(Effect::Stop);

@@ -105,7 +105,7 @@ pub enum SessionRequest {
     },
     /// Fill gaps of the history with the samples of a CSV file.
     Import {
-        /// The file, absolute.
+        /// Its name in the import folder beside the history.
         file: String,
     },
     /// End the station.

@@ -76,7 +76,7 @@ pub async fn wait_for<T>(work: impl Future<Output = T>) -> T {
             done = &mut work => return done,
             _ = next.tick() => {
                 let seconds = began.elapsed().as_secs();
-                say_error(&format!("the station works on it for {seconds} s; it goes on if this command is ended"));
+                say_error(&format!("the station works on it for {seconds} s; Ctrl-C cancels it"));
             }
         }
     }

@@ -124,9 +124,10 @@ pub fn parse(
 fn columns(header: &csv::StringRecord, decimal_comma: bool) -> Result<Columns, String> {
     let named = |name: &str| header.iter().position(|column| column.eq_ignore_ascii_case(name));
     let known = || TIMES.into_iter().chain(OTHERS);
-    if let Some(other) = header.iter().find(|column| !known().any(|known| column.eq_ignore_ascii_case(known))) {
+    if let Some(other) = header.iter().position(|column| !known().any(|known| column.eq_ignore_ascii_case(known))) {
         let known: Vec<&str> = known().collect();
-        return Err(format!("found the column `{other}`, expected {}", known.join(", ")));
+        // Not in its own words: until its columns are known, a file may be any file, even one of passwords.
+        return Err(format!("column {} is none of samples, expected {}", other + 1, known.join(", ")));
     }
     let needed = |what: &str| named(what).ok_or_else(|| format!("found no column `{what}`"));
     Ok(Columns {

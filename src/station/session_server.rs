@@ -1,19 +1,19 @@
 //! The task between terminals and plant: owns the sessions and routes what access control permits.
 
+mod history_jobs;
 mod reload;
 
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Duration};
 
 use tokio::{
     sync::{mpsc, oneshot, watch},
-    task::JoinSet,
+    task::{AbortHandle, JoinSet},
     time::MissedTickBehavior,
 };
 
 use super::{
     audit_queue::AuditMessage,
     blocking_jobs::{BlockingJobs, Done},
-    companions,
     session::Request,
     session_acceptor::AttachRequest,
 };
@@ -22,7 +22,7 @@ use crate::{
     bus::io::{clock::Clock, live_reads::LiveRequest},
     history::{
         Answer, HistoryError, Query,
-        io::{HistoryJob, JobRequest, QueryRequest},
+        io::{JobRequest, QueryRequest},
     },
     plant::command::CommandStatus,
 };
@@ -91,6 +91,7 @@ pub struct SessionServer {
     reloads: JoinSet<(u64, Result<String, String>)>,
     /// The same of backups and imports.
     history_jobs: JoinSet<(u64, Result<String, String>)>,
+    jobs_of_tickets: BTreeMap<u64, AbortHandle>,
     last_ticket: u64,
     jobs: BlockingJobs,
     /// Actions that did not reach the audit log, not reported yet.
@@ -109,6 +110,7 @@ impl SessionServer {
             tickets: BTreeMap::new(),
             reloads: JoinSet::new(),
             history_jobs: JoinSet::new(),
+            jobs_of_tickets: BTreeMap::new(),
             last_ticket: 0,
             jobs: BlockingJobs::new(users),
             lost: 0,
@@ -169,8 +171,7 @@ impl SessionServer {
                     if self.lost > 0 && self.outputs.audit.try_send(AuditMessage::Lost(self.lost)).is_ok() {
                         self.lost = 0;
                     }
-                    // Who has left waits for no answer any more.
-                    self.tickets.retain(|_, reply| !reply.is_closed());
+                    self.forget_closed_tickets();
                     let mut effects = self.access.follow_clock(self.clock.behind_utc());
                     effects.extend(self.access.tick(self.clock.now()));
                     self.apply_effects(effects);
@@ -312,11 +313,7 @@ impl SessionServer {
                     self.send_lifecycle(LifecycleRequest::Reload(users, reply));
                 }
                 Effect::Backup(ticket, folder) => self.back_up(ticket, folder),
-                Effect::Import(ticket, file) => {
-                    let jobs = self.outputs.history_jobs.clone();
-                    let job = HistoryJob::Import { file: file.into() };
-                    self.history_jobs.spawn(async move { (ticket, done_by_history(jobs, job).await) });
-                }
+                Effect::Import(ticket, file) => self.import(ticket, &file),
                 Effect::HangUp(terminal, why) => {
                     // The audit log holds it, in bounded rate; attempts without end must not fill this one.
                     tracing::debug!(terminal, why, "a terminal was disconnected");
@@ -332,16 +329,6 @@ impl SessionServer {
         for (ticket, answer) in answers {
             self.reply(ticket, answer.map(|()| None), entry);
         }
-    }
-
-    fn back_up(&mut self, ticket: u64, folder: String) {
-        let (history, plant) = (self.outputs.history.clone(), self.outputs.plant.clone());
-        let jobs = self.outputs.history_jobs.clone();
-        self.history_jobs.spawn(async move {
-            let companions =
-                tokio::task::spawn_blocking(move || companions::companions(&history, &plant)).await.unwrap_or_default();
-            (ticket, done_by_history(jobs, HistoryJob::Backup { to: folder.into(), companions }).await)
-        });
     }
 
     fn reply(&mut self, ticket: u64, answer: Result<Option<String>, String>, entry: EntryDelivery) {
@@ -375,12 +362,4 @@ impl SessionServer {
 async fn has_stopped(stopped: &mut watch::Receiver<bool>) {
     // A station that is gone has stopped.
     let _ = stopped.wait_for(|stopped| *stopped).await;
-}
-
-/// Waits for the outcome of a job, in words.
-async fn done_by_history(jobs: mpsc::Sender<JobRequest>, job: HistoryJob) -> Result<String, String> {
-    let (reply, done) = oneshot::channel();
-    // Refused by dropping the reply.
-    let _ = jobs.try_send(JobRequest { job, reply });
-    done.await.unwrap_or(Err(HistoryError::NotOpen)).map_err(|error| error.to_string())
 }

@@ -49,6 +49,7 @@ fn words() -> &'static [&'static str] {
         "{name} must choose a new password first",
         "{name} cannot approve this: it is for a {needed}",
         "found the path `{path}`, expected an absolute one",
+        "found the path `{path}`, expected the name of a file in the import folder",
         "this tag requires your password again",
         "this tag requires your own password",
         "this tag requires a second user",

@@ -93,6 +93,13 @@ impl Guarded {
         Guarded { def, truth, tap, station, clock, audit_log, path, socket, _simulated: simulated, _folder: folder }
     }
 
+    /// A file with one sample of a tag, where the station imports files from.
+    pub fn place_samples(&self, tag: &str, name: &str) {
+        let folder = self.audit_log.with_file_name("tank.import");
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::write(folder.join(name), format!("tag,time,value\n{tag},2024-03-20T06:00:00Z,1\n")).unwrap();
+    }
+
     /// A terminal at the socket without a login.
     pub async fn anonymous(&self) -> Session {
         let session = connect(&self.path).await.unwrap();

@@ -28,6 +28,7 @@
 //! | `outstanding` | stations killed and started again, with a slow device: a late reply to the old one is no value |
 //! | `tampering` | the audit log changed by hand: what `sightglass audit verify` says |
 //! | `hostile` | text of others, by every command: nothing of it acts on a terminal |
+//! | `special_files` | pipes and devices where the station expects files, and secrets of its user: nothing waits, nothing is shown |
 //! | `tools` | the tools for a line against peers that echo, chatter and lie |
 //! | `odd_answers` | the same against odd answers, pasted bytes and a port that others have open; all functions of pymodbus |
 //! | `logs` | logs of registers by `sightglass open`: killed, ended, shown again |
@@ -78,6 +79,7 @@ mod reports;
 mod rights;
 mod settings;
 mod shift;
+mod special_files;
 mod support;
 mod tampering;
 mod tasks;

@@ -182,7 +182,7 @@ fn requests() -> Vec<SessionRequest> {
         SessionRequest::DeleteUser { user: user("paul") },
         SessionRequest::Exported { file: user("shift.csv"), sha256: user("00") },
         SessionRequest::Backup { folder: user(crate::support::sockets().join("backup").to_str().unwrap()) },
-        SessionRequest::Import { file: user(crate::support::samples_of("TIC-1.PV").to_str().unwrap()) },
+        SessionRequest::Import { file: user("samples.csv") },
         SessionRequest::Reload,
         SessionRequest::Stop,
     ]
@@ -206,6 +206,7 @@ async fn every_request_is_granted_or_refused_as_the_table_says() {
         }
         heard
     });
+    guarded.place_samples("TIC-1.PV", "samples.csv");
     for request in requests() {
         let (action, answers) = of_request(&request);
         for person in 0..USERS.len() {

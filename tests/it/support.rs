@@ -37,13 +37,6 @@ pub fn sockets() -> PathBuf {
     folder
 }
 
-/// A file with one sample of a tag, as `history import` takes it.
-pub fn samples_of(tag: &str) -> PathBuf {
-    let file = sockets().join("samples.csv");
-    std::fs::write(&file, format!("tag,time,value\n{tag},2024-03-20T06:00:00Z,1\n")).unwrap();
-    file
-}
-
 /// A folder of its own for the state of a program.
 pub fn folder() -> tempfile::TempDir {
     tempfile::tempdir().unwrap()

@@ -1,6 +1,6 @@
 //! Backups and imports: permitted here, done by the history, on record before and after.
 
-use std::path::Path;
+use std::path::{Component, Path};
 
 use jiff::Timestamp;
 
@@ -8,20 +8,26 @@ use super::{
     AccessControl, Effect, Requester,
     audit_entries::{clean, record},
 };
-use crate::plant::record::ActionRecord;
+use crate::plant::record::{ActionRecord, BACKUP, IMPORT};
 
 impl AccessControl {
-    pub(super) fn begin_history_job(
+    pub(super) fn begin_backup(&mut self, requester: Requester, folder: String, at: Timestamp) -> Vec<Effect> {
+        self.begin_history_job(requester, BACKUP, (folder, absolute), Effect::Backup, at)
+    }
+
+    pub(super) fn begin_import(&mut self, requester: Requester, file: String, at: Timestamp) -> Vec<Effect> {
+        self.begin_history_job(requester, IMPORT, (file, plain_name), Effect::Import, at)
+    }
+
+    fn begin_history_job(
         &mut self,
         requester: Requester,
         action: &str,
-        path: String,
+        (path, check): (String, fn(&str) -> Result<(), String>),
         effect: fn(u64, String) -> Effect,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if !Path::new(&path).is_absolute() {
-            // The station stands in a folder of its own.
-            let why = format!("found the path `{path}`, expected an absolute one");
+        if let Err(why) = check(&path) {
             return self.refuse(requester, action, &clean(&path), why, at);
         }
         let Some(session) = self.sessions.get(&requester.terminal) else { return Vec::new() };
@@ -39,5 +45,22 @@ impl AccessControl {
         };
         let entry = ActionRecord { at, outcome: clean(&outcome).into(), ..entry };
         vec![Effect::Record(entry), Effect::Reply(ticket, done.map(drop))]
+    }
+}
+
+/// The station stands in a folder of its own.
+fn absolute(path: &str) -> Result<(), String> {
+    match Path::new(path).is_absolute() {
+        true => Ok(()),
+        false => Err(format!("found the path `{path}`, expected an absolute one")),
+    }
+}
+
+/// A file of the import folder: the station reads no other of its user's files for whoever asks.
+fn plain_name(path: &str) -> Result<(), String> {
+    let mut parts = Path::new(path).components();
+    match (parts.next(), parts.next()) {
+        (Some(Component::Normal(name)), None) if name == path => Ok(()),
+        _ => Err(format!("found the path `{path}`, expected the name of a file in the import folder")),
     }
 }

@@ -18,9 +18,12 @@ use crate::{
         source::query_station,
     },
     history::{
-        Answer, Query,
-        import::{Import, Rows},
-        io::{import::read_rows, store::Store},
+        Answer, Overview, Query,
+        import::Rows,
+        io::{
+            import::{self, read_rows},
+            store::Store,
+        },
     },
     plant::{PlantDef, record::IMPORT},
     station::Session,
@@ -52,16 +55,25 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     })
 }
 
-/// The station reads the file again; what is wrong with it is said before, to who may read it.
+/// The station reads the file again, from its import folder: it opens no other for whoever asks. What is wrong with the file is
+/// said before, to who may read it.
 async fn through_station(args: &Args, def: &Arc<PlantDef>, file: &Path) -> Result<(), CliError> {
     let rows = count(&read_rows(file, def, Timestamp::UNIX_EPOCH, Timestamp::now()).map_err(refused)?);
     let session = client::attach(Some(&def.name), &args.plant.login).await?;
-    let before = imports(&session).await.map(|imports| imports.len());
-    let request = SessionRequest::Import { file: file.display().to_string() };
-    let durability = wait_for(session.request(request)).await.map_err(CliError::Failed)?;
-    client::warn_not_recorded("imported", durability);
-    match imports(&session).await.zip(before) {
-        Some((imports, before)) => match imports[before..].iter().rfind(|import| Path::new(&import.file) == file) {
+    let overview = overview(&session).await;
+    let history =
+        overview.as_ref().map_or_else(|| run::history_file(def, &args.plant.station), |all| all.database.clone());
+    let placed = import::place(file, &history).map_err(|error| {
+        let folder = import::folder(&history);
+        CliError::Failed(format!("the station imports files of {}: {error}; have it put there first", folder.display()))
+    })?;
+    let name = placed.name();
+    let done = wait_for(session.request(SessionRequest::Import { file: name.clone() })).await;
+    drop(placed);
+    client::warn_not_recorded("imported", done.map_err(CliError::Failed)?);
+    let before = overview.map(|overview| overview.imports.len());
+    match self::overview(&session).await.map(|overview| overview.imports).zip(before) {
+        Some((imports, before)) => match imports[before..].iter().rfind(|import| import.file == name) {
             Some(import) => say(&format!("imported {}", import.summary(rows, &def.time_zone))),
             None => nothing(rows),
         },
@@ -70,10 +82,10 @@ async fn through_station(args: &Args, def: &Arc<PlantDef>, file: &Path) -> Resul
     Ok(())
 }
 
-/// What was imported so far, for who may look.
-async fn imports(session: &Session) -> Option<Vec<Import>> {
+/// What is stored, for who may look.
+async fn overview(session: &Session) -> Option<Overview> {
     match query_station(session, Query::Overview).await {
-        Ok(Answer::Overview(overview)) => Some(overview.imports),
+        Ok(Answer::Overview(overview)) => Some(*overview),
         Ok(_) | Err(_) => None,
     }
 }

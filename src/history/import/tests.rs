@@ -63,12 +63,14 @@ fn what_is_wrong_is_said_with_line_and_expectation() {
     }
     for (header, expect) in [
         ("tag,value", "found no column time_utc or utc"),
-        ("tag,time,value,price", "found the column `price`, expected time_utc"),
+        ("tag,time,value,price", "line 1: column 4 is none of samples, expected time_utc"),
+        ("argon2id$secret", "line 1: column 1 is none of samples, expected time_utc"),
         ("time,value", "found no column `tag`"),
         ("tag,time,value", "found no row behind the header"),
     ] {
         let problems = read(header).unwrap_err();
         assert!(problems[0].contains(expect), "{problems:?}");
+        assert!(!problems.concat().contains("secret"), "{problems:?}");
     }
     for (rest, expect) in [
         ("1,worse,", "found the quality `worse`"),

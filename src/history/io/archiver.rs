@@ -4,7 +4,7 @@ use std::{
     path::Path,
     sync::{
         Arc,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU32, Ordering},
     },
     time::Duration,
 };
@@ -18,7 +18,7 @@ use tokio::{
 use super::{
     HistoryJob, JobRequest,
     archive::{Job, LeftOut},
-    import::{Importing, read_rows},
+    import::{Importing, read_placed_rows},
     interrupt::Interrupt,
     reader::stop,
     store::{Store, instant},
@@ -30,31 +30,61 @@ const LOOK_EVERY: Duration = Duration::from_secs(60);
 /// The same after a failure.
 const RETRY_AFTER: Duration = Duration::from_secs(600);
 
+/// A job that was asked for and takes no step for so long is given up; a step is a file, or the database.
+const STEP_MAX: Duration = Duration::from_secs(600);
+
 /// What became of a look.
 pub enum ArchiveOutcome {
     /// A job was due, and is done.
     Did(Job),
     /// Nothing was due; this is missing of the archive.
     Idle(Option<String>),
-    /// A job that a station was asked for has ended: who asked for it knows how.
-    Answered,
+    /// A job that a station was asked for has ended, and how.
+    Answered(Result<String, HistoryError>),
     /// These samples of a file are to be stored.
-    ToImport(Box<Importing>, JobReply),
+    ToImport(Box<Importing>),
 }
 
 type JobReply = oneshot::Sender<Result<String, HistoryError>>;
 
 type Done = Result<ArchiveOutcome, (Option<Job>, HistoryError)>;
 
+/// Work beside the writer.
+struct Running {
+    work: JoinHandle<Done>,
+    interrupt: Interrupt,
+    /// For a job that was asked for.
+    reply: Option<JobReply>,
+    watched: Arc<Watched>,
+    /// The step that it was at, and commits since.
+    step: u32,
+    commits: u32,
+}
+
+/// What a job and whoever watches it share.
+#[derive(Default)]
+struct Watched {
+    steps: AtomicU32,
+    cancelled: AtomicBool,
+}
+
+impl Watched {
+    /// A step begins; none does any more of a job that is cancelled.
+    fn step(&self) -> Result<(), HistoryError> {
+        self.steps.fetch_add(1, Ordering::Relaxed);
+        if self.cancelled.load(Ordering::Relaxed) { Err(HistoryError::NotOpen) } else { Ok(()) }
+    }
+}
+
 /// Works on the archive of one store after the other.
 pub struct Archiver {
-    running: Option<(JoinHandle<Done>, Interrupt)>,
+    running: Option<Running>,
+    /// A job that was given up and hangs in the disk.
+    hung: Option<JoinHandle<Done>>,
     /// What the station is asked for, to begin next: the archive is not worked on meanwhile.
     asked: Option<JobRequest>,
     /// An import that is being stored, a piece with each commit.
     import: Option<(Box<Importing>, JobReply)>,
-    /// A backup that is being written ends.
-    stopped: Arc<AtomicBool>,
     /// Commits until the next look: a start is not the time for it.
     wait: u32,
     commit_every: Duration,
@@ -72,7 +102,7 @@ impl Archiver {
             running: None,
             asked: None,
             import: None,
-            stopped: Arc::default(),
+            hung: None,
             wait: commits(LOOK_EVERY, commit_every),
             commit_every,
             left: LeftOut::default(),
@@ -84,7 +114,7 @@ impl Archiver {
     pub fn begin(&mut self, store: Option<&Store>, now: Timestamp) {
         self.wait = self.wait.saturating_sub(1);
         if self.running.is_some() {
-            return;
+            return self.watch();
         }
         if let Some((importing, reply)) = self.import.take() {
             return self.import_piece(store, importing, reply);
@@ -107,7 +137,32 @@ impl Archiver {
                 Err(error) => Err((Some(job), error)),
             }
         };
-        self.running = Some((spawn_blocking(work), interrupt));
+        self.run(spawn_blocking(work), interrupt, None, Arc::default());
+    }
+
+    fn run(&mut self, work: JoinHandle<Done>, interrupt: Interrupt, reply: Option<JobReply>, watched: Arc<Watched>) {
+        self.running = Some(Running { work, interrupt, reply, watched, step: 0, commits: 0 });
+    }
+
+    /// Cancels a job that was asked for and whose answer is not awaited any more, and gives up one that hangs.
+    fn watch(&mut self) {
+        let step_max = commits(STEP_MAX, self.commit_every);
+        let Some(running) = self.running.as_mut().filter(|running| running.reply.is_some()) else { return };
+        let step = running.watched.steps.load(Ordering::Relaxed);
+        running.commits = if step == running.step { running.commits + 1 } else { 0 };
+        running.step = step;
+        let hangs = step_max <= running.commits;
+        if hangs || running.reply.as_ref().is_some_and(JobReply::is_closed) {
+            running.watched.cancelled.store(true, Ordering::Relaxed);
+            running.interrupt.interrupt();
+        }
+        if hangs && let Some(Running { work, reply, .. }) = self.running.take() {
+            let why = format!("given up: nothing was done for {} min, does the disk hang?", STEP_MAX.as_secs() / 60);
+            tracing::error!(why, "a job of the history");
+            // Who has left needs no answer.
+            let _ = reply.map(|reply| reply.send(Err(HistoryError::Refused(why))));
+            self.hung = Some(work);
+        }
     }
 
     /// Begins a job with the next commit; one at a time.
@@ -120,35 +175,41 @@ impl Archiver {
     }
 
     fn begin_asked(&mut self, store: Option<&Store>, JobRequest { job, reply }: JobRequest, now: Timestamp) {
-        let store = match store.ok_or(HistoryError::NotOpen).and_then(Store::try_clone) {
+        self.hung = self.hung.take().filter(|hung| !hung.is_finished());
+        let free = match &self.hung {
+            Some(_) => Err(HistoryError::Refused("an earlier backup or import still hangs in the disk".to_owned())),
+            None => store.ok_or(HistoryError::NotOpen).and_then(Store::try_clone),
+        };
+        let store = match free {
             Ok(store) => store,
             // Who has left needs no answer.
             Err(error) => return drop(reply.send(Err(error))),
         };
-        let (interrupt, stopped) = (store.interrupt_handle(), Arc::clone(&self.stopped));
+        let (interrupt, watched) = (store.interrupt_handle(), Arc::<Watched>::default());
+        let steps = Arc::clone(&watched);
         let work = move || {
             let ended = match job {
                 HistoryJob::Backup { to, companions } => {
-                    let mut step =
-                        |_| if stopped.load(Ordering::Relaxed) { Err(HistoryError::NotOpen) } else { Ok(()) };
-                    let written = store.back_up(&to, &companions, now, &mut step);
+                    let written = store.back_up(&to, &companions, now, &mut |_| steps.step());
                     log(&written.map(|backup| backup.summary()), "backup", &to)
                 }
                 HistoryJob::Import { file } => match to_import(&store, &file, now) {
-                    Ok(Some(importing)) => return Ok(ArchiveOutcome::ToImport(Box::new(importing), reply)),
+                    Ok(Some(importing)) => return Ok(ArchiveOutcome::ToImport(Box::new(importing))),
                     Ok(None) => Ok("nothing: a value is stored already at each of its rows".to_owned()),
                     Err(error) => log(&Err(error), "import", &file),
                 },
             };
-            // Who has left needs no answer.
-            let _ = reply.send(ended);
-            Ok(ArchiveOutcome::Answered)
+            Ok(ArchiveOutcome::Answered(ended))
         };
-        self.running = Some((spawn_blocking(work), interrupt));
+        self.run(spawn_blocking(work), interrupt, Some(reply), watched);
     }
 
     /// On the connection that writes: two would not see each other's last commit.
     fn import_piece(&mut self, store: Option<&Store>, mut importing: Box<Importing>, reply: JobReply) {
+        if reply.is_closed() {
+            tracing::info!(done = importing.done(), "an import was cancelled");
+            return;
+        }
         let ended = match store.ok_or(HistoryError::NotOpen).and_then(|store| {
             let more = store.import_piece(&mut importing)?;
             Ok((more, importing.summary(&store.def)))
@@ -167,9 +228,9 @@ impl Archiver {
 
     /// Waits for the end of a look, for ever without one. Returns what came of it, or why the archive stands still.
     pub async fn ended(&mut self) -> Result<ArchiveOutcome, HistoryError> {
-        let Some((work, _)) = &mut self.running else { return std::future::pending().await };
-        let done = work.await;
-        self.running = None;
+        let Some(running) = &mut self.running else { return std::future::pending().await };
+        let done = (&mut running.work).await;
+        let reply = self.running.take().and_then(|running| running.reply);
         let (again, looked) = match done {
             Ok(Ok(ArchiveOutcome::Did(job))) => {
                 tracing::info!(?job, "archived");
@@ -182,11 +243,15 @@ impl Archiver {
                 self.left.merges.clear();
                 (LOOK_EVERY, Ok(ArchiveOutcome::Idle(missing)))
             }
-            Ok(Ok(ArchiveOutcome::ToImport(importing, reply))) => {
-                self.import = Some((importing, reply));
-                (Duration::ZERO, Ok(ArchiveOutcome::Answered))
+            Ok(Ok(ArchiveOutcome::ToImport(importing))) => {
+                self.import = reply.map(|reply| (importing, reply));
+                return Ok(ArchiveOutcome::Answered(Ok(String::new())));
             }
-            Ok(Ok(ArchiveOutcome::Answered)) => (Duration::ZERO, Ok(ArchiveOutcome::Answered)),
+            Ok(Ok(ArchiveOutcome::Answered(ended))) => {
+                // Who has left needs no answer.
+                let _ = reply.map(|reply| reply.send(ended.clone()));
+                (Duration::ZERO, Ok(ArchiveOutcome::Answered(ended)))
+            }
             Ok(Err((Some(Job::Hour(hour)), error))) if error.is_damage() => {
                 self.left.before = instant(hour + HOUR);
                 self.skipped = Some(error.clone());
@@ -212,8 +277,8 @@ impl Archiver {
 
     /// Ends what is running: a station that stops does not wait for it, and the next one does it again.
     pub async fn stop(mut self) {
-        self.stopped.store(true, Ordering::Relaxed);
-        if let Some((work, interrupt)) = &mut self.running {
+        if let Some(Running { work, interrupt, watched, .. }) = &mut self.running {
+            watched.cancelled.store(true, Ordering::Relaxed);
             stop(work, || interrupt.interrupt()).await;
         }
     }
@@ -222,8 +287,9 @@ impl Archiver {
 /// Reads a file and decides what of it fills a gap.
 fn to_import(store: &Store, file: &Path, now: Timestamp) -> Result<Option<Importing>, HistoryError> {
     let refused = |problems: Vec<String>| HistoryError::Refused(problems.join("; "));
-    let rows = read_rows(file, &store.def, store.importable_from()?, now).map_err(refused)?;
-    store.importing(rows, &file.display().to_string(), now)
+    let rows = read_placed_rows(file, &store.def, store.importable_from()?, now).map_err(refused)?;
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    store.importing(rows, &name, now)
 }
 
 fn log(ended: &Result<String, HistoryError>, job: &str, path: &Path) -> Result<String, HistoryError> {

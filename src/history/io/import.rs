@@ -2,9 +2,10 @@
 
 use std::{
     collections::{HashMap, HashSet},
-    fs::File,
+    fs::{self, File},
     io::{BufRead, BufReader, Read},
-    path::Path,
+    os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, chown},
+    path::{Path, PathBuf},
 };
 
 use duckdb::params;
@@ -21,11 +22,68 @@ use crate::{
         tiers::Tier,
     },
     plant::{def::PlantDef, sample::Sample},
+    profile::io::regular,
     report::step_series::HOLD_MAX,
 };
 
+/// The folder beside a history that a station imports files from, and no other: `tank.import` beside `tank.duckdb`. Whoever
+/// asks for an import must be able to put the file there.
+pub fn folder(history: &Path) -> PathBuf {
+    history.with_extension("import")
+}
+
+/// A file in the import folder; a copy that was made for one import is removed with this.
+#[derive(Debug)]
+pub struct Placed {
+    path: PathBuf,
+    is_copy: bool,
+}
+
+impl Placed {
+    /// Its name there.
+    pub fn name(&self) -> String {
+        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    }
+}
+
+impl Drop for Placed {
+    fn drop(&mut self) {
+        if self.is_copy {
+            // A copy that stays takes room and does no harm.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Puts a file where the station of a history reads it; one that is there already stays.
+pub fn place(file: &Path, history: &Path) -> std::io::Result<Placed> {
+    let folder = folder(history);
+    let own = fs::metadata(history).or_else(|_| fs::metadata(history.parent().unwrap_or(history)))?;
+    match fs::DirBuilder::new().mode(0o750).create(&folder) {
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+        made => made.and_then(|()| give(&folder, &own))?,
+    }
+    let path = folder.join(file.file_name().unwrap_or_default());
+    if fs::canonicalize(file)?.parent() == fs::canonicalize(&folder).ok().as_deref() {
+        return Ok(Placed { path, is_copy: false });
+    }
+    let mut from = regular::open(file)?;
+    let mut to = regular::open_no_link(File::options().write(true).create_new(true).mode(0o640), &path)?;
+    let placed = Placed { path, is_copy: true };
+    std::io::copy(&mut from, &mut to)?;
+    give(&placed.path, &own)?;
+    Ok(placed)
+}
+
+/// What root makes belongs to the user of the station.
+fn give(path: &Path, own: &fs::Metadata) -> std::io::Result<()> {
+    let is_other = fs::metadata(path)?.uid() != own.uid();
+    if is_other { chown(path, Some(own.uid()), Some(own.gid())) } else { Ok(()) }
+}
+
 /// Longest file.
 const BYTES_MAX: u64 = 512 << 20;
+const HEADER_BYTES_MAX: u64 = 4 << 10;
 /// Rows of an import that are stored with one commit: a station records meanwhile.
 const IMPORT_PIECE: usize = 10_000;
 
@@ -54,9 +112,23 @@ impl Importing {
 
 /// Reads a file of samples with times from `oldest` to `now`. `Err`: every problem, with file and line.
 pub fn read_rows(path: &Path, def: &PlantDef, oldest: Timestamp, now: Timestamp) -> Result<Rows, Vec<String>> {
+    rows_of(path, regular::open(path), def, [oldest, now])
+}
+
+/// The same of a file that others have put into the import folder: a link could lead out of it.
+pub fn read_placed_rows(path: &Path, def: &PlantDef, oldest: Timestamp, now: Timestamp) -> Result<Rows, Vec<String>> {
+    rows_of(path, regular::open_no_link(File::options().read(true), path), def, [oldest, now])
+}
+
+fn rows_of(
+    path: &Path,
+    opened: std::io::Result<File>,
+    def: &PlantDef,
+    [oldest, now]: [Timestamp; 2],
+) -> Result<Rows, Vec<String>> {
     let named = |problem: String| format!("{}: {problem}", path.display());
     let failed = |error: std::io::Error| vec![named(error.to_string())];
-    let file = File::open(path).map_err(failed)?;
+    let file = opened.map_err(failed)?;
     if BYTES_MAX < file.metadata().map_err(failed)?.len() {
         return Err(vec![named(format!("expected at most {} MiB: split the file", BYTES_MAX >> 20))]);
     }
@@ -68,7 +140,8 @@ pub fn read_rows(path: &Path, def: &PlantDef, oldest: Timestamp, now: Timestamp)
 pub fn parse(def: &PlantDef, mut text: impl BufRead, oldest: Timestamp, now: Timestamp) -> Result<Rows, Vec<String>> {
     let mut first = Vec::new();
     let first_line = |why: String| vec![format!("line 1: {why}")];
-    text.read_until(b'\n', &mut first).map_err(|error| first_line(error.to_string()))?;
+    // A header has some columns: what is no file of samples may have no line at all.
+    (&mut text).take(HEADER_BYTES_MAX).read_until(b'\n', &mut first).map_err(|error| first_line(error.to_string()))?;
     let first = first.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&first);
     let separator = if first.contains(&b';') { b';' } else { b',' };
     let mut reader = csv::ReaderBuilder::new().delimiter(separator).trim(csv::Trim::All).from_reader(first.chain(text));

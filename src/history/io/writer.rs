@@ -260,7 +260,7 @@ impl Writer {
     pub fn archived(&mut self, looked: Result<ArchiveOutcome, HistoryError>) {
         match looked {
             Ok(ArchiveOutcome::Did(_)) => self.unarchived = None,
-            Ok(ArchiveOutcome::Answered | ArchiveOutcome::ToImport(..)) => {}
+            Ok(ArchiveOutcome::Answered(_) | ArchiveOutcome::ToImport(_)) => {}
             Ok(ArchiveOutcome::Idle(missing)) => (self.missing, self.unarchived) = (missing, None),
             Err(error) => self.unarchived = Some(format!("it is not archived: {}", error.words())),
         }
