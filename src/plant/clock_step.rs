@@ -119,7 +119,7 @@ impl Snapshot {
         });
         self.runs.iter_mut().flatten().for_each(|run| Arc::make_mut(run).move_by(by));
         self.procedures.iter_mut().flatten().for_each(|run| {
-            Arc::make_mut(run).times().into_iter().for_each(|at| move_by(at, by));
+            Arc::make_mut(run).times().for_each(|at| move_by(at, by));
         });
     }
 }

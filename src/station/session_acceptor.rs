@@ -93,8 +93,14 @@ mod tests {
         let (_publish, snapshots) = watch::channel(Arc::new(Snapshot::blank(fixture::shared())));
         let (acceptor, attach_requests, _requests) = SessionAcceptor::new(snapshots);
         let peer = || Peer { from: "test".into(), unix_user: None, in_process: false };
-        let crowd =
-            |kept: bool| (0..100).take_while(|_| acceptor.has_room(kept)).map(|_| acceptor.attach(peer())).count();
+        let crowd = |kept: bool| {
+            let mut attached = 0;
+            while acceptor.has_room(kept) && attached < 100 {
+                acceptor.attach(peer());
+                attached += 1;
+            }
+            attached
+        };
         assert_eq!((crowd(false), crowd(true)), (ATTACH_QUEUE_MAX - ATTACH_KEPT, ATTACH_KEPT));
         drop(attach_requests);
         assert!(acceptor.has_room(false), "a station that has ended says so by itself");

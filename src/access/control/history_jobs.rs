@@ -12,22 +12,23 @@ use crate::plant::record::{ActionRecord, BACKUP, IMPORT};
 
 impl AccessControl {
     pub(super) fn begin_backup(&mut self, requester: Requester, folder: String, at: Timestamp) -> Vec<Effect> {
-        self.begin_history_job(requester, BACKUP, (folder, absolute), Effect::Backup, at)
+        self.begin_history_job(requester, BACKUP, absolute(&folder), folder, Effect::Backup, at)
     }
 
     pub(super) fn begin_import(&mut self, requester: Requester, file: String, at: Timestamp) -> Vec<Effect> {
-        self.begin_history_job(requester, IMPORT, (file, plain_name), Effect::Import, at)
+        self.begin_history_job(requester, IMPORT, plain_name(&file), file, Effect::Import, at)
     }
 
     fn begin_history_job(
         &mut self,
         requester: Requester,
         action: &str,
-        (path, check): (String, fn(&str) -> Result<(), String>),
+        checked: Result<(), String>,
+        path: String,
         effect: fn(u64, String) -> Effect,
         at: Timestamp,
     ) -> Vec<Effect> {
-        if let Err(why) = check(&path) {
+        if let Err(why) = checked {
             return self.refuse(requester, action, &clean(&path), why, at);
         }
         let Some(session) = self.sessions.get(&requester.terminal) else { return Vec::new() };

@@ -223,6 +223,13 @@ pub fn remove(db: &Path) {
     }
 }
 
+/// Is this a file of the engine whose creation has not ended? It begins with three headers of 4096 bytes.
+pub fn is_unfinished(db: &Path) -> bool {
+    let mut beginning = [0; 12];
+    let is_begun = regular::open(db).is_ok_and(|mut file| file.read_exact(&mut beginning).is_ok());
+    is_begun && beginning.ends_with(b"DUCK") && size(db) < 3 * 4096
+}
+
 /// Bytes of the database and its log.
 pub fn size(db: &Path) -> u64 {
     let bytes = |suffix| fs::metadata(with_suffix(db, suffix)).map_or(0, |meta| meta.len());

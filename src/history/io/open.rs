@@ -139,8 +139,8 @@ impl Store {
         }
         files::remove(&with_suffix(path, compact::UNFINISHED));
         let noted = last::read(path);
-        // An empty file is what is left of a creation that failed: nothing is in it, and it is not damaged.
-        let fresh = files::size(path) == 0;
+        // What is left of a creation that failed has nothing in it, and is not damaged.
+        let fresh = files::size(path) == 0 || (noted == Noted::Nothing && files::is_unfinished(path));
         if fresh {
             files::remove(path);
         }

@@ -53,6 +53,26 @@ fn a_file_that_is_no_database_is_set_aside() {
 }
 
 #[test]
+fn a_file_whose_creation_was_ended_is_begun_anew() {
+    let (_folder, db) = folder();
+    drop(open(&db, 0));
+    let whole = fs::read(&db).unwrap();
+    for length in [4_096, 8_192, 12_287] {
+        let (folder, db) = folder();
+        fs::write(&db, &whole[..length]).unwrap();
+        let opened = Store::open(&db, &def(), sec(0)).unwrap();
+        assert_eq!(opened.trouble, None, "{length}");
+        opened.store.append(&[good(PV, 0, 27.0)]).unwrap();
+        drop(opened);
+        let is_aside = |entry: fs::DirEntry| entry.file_name().to_string_lossy().contains("damaged");
+        assert!(!fs::read_dir(folder.path()).unwrap().flatten().any(is_aside), "{length}");
+        // One that has held records is no new one.
+        fs::write(&db, &whole[..length]).unwrap();
+        assert!(Store::open(&db, &def(), sec(0)).unwrap().trouble.unwrap().contains("set aside as"), "{length}");
+    }
+}
+
+#[test]
 fn a_file_cut_or_scribbled_over_is_set_aside() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
@@ -61,7 +81,7 @@ fn a_file_cut_or_scribbled_over_is_set_aside() {
     let whole = fs::read(&db).unwrap();
     let mut scribbled = whole.clone();
     scribbled[4096..12_288].fill(0x5A);
-    for damaged in [whole[..whole.len() / 2].to_vec(), whole[..4096].to_vec(), scribbled] {
+    for damaged in [whole[..whole.len() / 2].to_vec(), whole[..16_384].to_vec(), scribbled] {
         fs::write(&db, &damaged).unwrap();
         // In a process of its own, because DuckDB may end the process.
         let opens = open_until_it_lives(&db);
