@@ -61,8 +61,8 @@ class Station:
 
     def call(self, *args, timeout=30):
         done = subprocess.run([self.binaries / "sightglass", *map(str, args)], env=self.environment, text=True, cwd=self.folder,
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=timeout)
-        return done.returncode, done.stdout
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=timeout)
+        return done.returncode, done.stdout if done.returncode == 0 else done.stdout + done.stderr
 
     def start(self, crash_at=0, full=None):
         environment = dict(self.environment)
@@ -166,7 +166,7 @@ def operate(station, dice, tag, acknowledged, stored):
         if what < 0.75:
             note = f"{tag}-{number}"
             code, text = station.call("write", "TIC-1.SV", 50 + number % 20, "--note", note)
-            if code == 0 and "not recorded" not in text:
+            if code == 0:
                 acknowledged.append(note)
         elif what < 0.85:
             station.call("ack", "--all")

@@ -53,7 +53,7 @@ fn a_file_that_is_no_database_is_set_aside() {
 }
 
 #[test]
-fn a_file_whose_creation_was_ended_is_begun_anew() {
+fn a_file_whose_creation_was_ended_is_no_damage() {
     let (_folder, db) = folder();
     drop(open(&db, 0));
     let whole = fs::read(&db).unwrap();
