@@ -153,7 +153,7 @@ mod tests {
         let pipe = home.path().join("pipe.toml");
         rustix::fs::mkfifoat(rustix::fs::CWD, pipe, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
         let (_, sets) = work(home.path(), &def, SetWork::Read);
-        assert_eq!(sets, [unreadable("pipe", "pipe.toml is no file, expected a parameter set".into())]);
+        assert_eq!(sets, [unreadable("pipe", "pipe.toml cannot be read: not a regular file".into())]);
     }
 
     #[test]
