@@ -70,7 +70,7 @@ class Station:
             environment |= dict(LD_PRELOAD=str(self.shim), CRASH_FOLDER=str(self.state), CRASH_SHADOW=str(self.shadow), CRASH_AT=str(crash_at))
         if full:
             environment["CRASH_FULL"] = "{}-{}".format(*full)
-        self.process = subprocess.Popen([self.binaries / "sightglass", "run", self.plant, "--port", f"L1=127.0.0.1:{self.port}"], env=environment,
+        self.process = subprocess.Popen([self.binaries / "sightglass", "run", self.plant, "--log", "-", "--port", f"L1=127.0.0.1:{self.port}"], env=environment,
                                         cwd=self.folder, stdout=self.output, stderr=self.output)
 
     def is_alive(self):
@@ -192,13 +192,13 @@ def run(station, seed):
         full = sorted(dice.sample(range(OPERATIONS), 2)) if dice.random() < 0.3 else None
         station.start(crash_at, full)
         if station.is_reached(20):
-            operate(station, dice, f"s{seed}r{round_number}", acknowledged, stored)
+            operate(station, random.Random(f"{seed} {round_number}"), f"s{seed}r{round_number}", acknowledged, stored)
         if station.is_alive():
             station.process.kill()
         station.process.wait()
         what = f"ended at {crash_at}, full {full}"
         if dice.random() < 0.5:
-            lose_power(station, dice)
+            lose_power(station, random.Random(f"{seed} {round_number} lost"))
             what, power_lost = what + ", power lost", True
         station.output.write(f"--- {what}\n".encode())
         station.output.flush()

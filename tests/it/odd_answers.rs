@@ -180,9 +180,10 @@ fn every_function_of_pymodbus_is_answered_as_it_should_be() {
 
 #[test]
 fn libmodbus_is_identified_on_one_connection() {
-    // Its server ends with its first connection.
+    // Its server ends with its first connection, and takes half a second to refuse a function that it does not know.
     let Some(_server) = libmodbus_server() else { return };
-    let output = sightglass().args(["probe", "127.0.0.1:1502", "--unit", "17"]).output().unwrap();
+    let probe = ["probe", "127.0.0.1:1502", "--unit", "17", "--timeout", "3000"];
+    let output = sightglass().args(probe).output().unwrap();
     let said = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
     assert!(said.contains("exception 01, illegal function") && said.contains("ServerId"), "{said}");
 }
