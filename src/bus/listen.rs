@@ -13,7 +13,7 @@
 //! after a lost response the roles are right again with the next frame that is not the same, or that comes after the
 //! response timeout. What is not a frame is noise: counted, recorded, and bounded like everything that is kept here.
 //!
-//! Bytes and whole frames may be lost on the way here, so a response behind a request may be that of another: see [`evidence`].
+//! Bytes and whole frames may be lost on the way here, so a response behind a request may be that of another: see `evidence`.
 
 mod evidence;
 mod follow;

@@ -352,7 +352,7 @@ impl Station {
     /// Writes the safe state of a procedure at work, stops downstream and waits until the last record is on disk. Gives the last
     /// entry of the audit log.
     ///
-    /// What a disk that hangs holds up is left behind after [`STOP_MAX`]: a station can always be ended.
+    /// What a disk that hangs holds up is left behind after `STOP_MAX`: a station can always be ended.
     pub async fn stop(self) -> Option<ChainHash> {
         self.abort_procedure().await;
         tokio::time::timeout(STOP_MAX, self.end()).await.unwrap_or_else(|_| {

@@ -54,7 +54,7 @@ impl Follower {
 /// noise can do to a device that lives.
 const LOST_MAX: u32 = 9;
 
-/// What came of the requests to each device since its last response: see [`LOST_MAX`].
+/// What came of the requests to each device since its last response: see `LOST_MAX`.
 pub struct Losses(Vec<u32>);
 
 impl Losses {
