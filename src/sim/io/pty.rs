@@ -77,7 +77,16 @@ mod tests {
         ));
         for _ in 0..3 {
             let name = path.to_str().expect("the path is ASCII");
-            let mut port = tokio_serial::new(name, 9600).open_native_async().expect("the port opens");
+            // A process that another test starts keeps the lock of before until it is its program.
+            let opened = async {
+                loop {
+                    match tokio_serial::new(name, 9600).open_native_async() {
+                        Ok(port) => break port,
+                        Err(_) => tokio::task::yield_now().await,
+                    }
+                }
+            };
+            let mut port = timeout(Duration::from_secs(5), opened).await.expect("the port opens");
             // Bytes that a terminal would translate: 0x0A and 0x0D as register values.
             for value in [0x0A, 0x0D, 0x11, 0x13] {
                 let request = with_crc(&[2, 6, 4, 0x40, 0x03, value]);
