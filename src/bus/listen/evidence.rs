@@ -70,6 +70,8 @@ pub(super) struct Evidence {
     losses: u32,
     /// So often the master seemed to leave out a request: more than one frame was lost.
     gaps: u32,
+    /// Requests since the last of either.
+    whole: u32,
     /// The last request and the last response of all; and whether a request before the next may have been without response.
     last: Key,
     answered_at: Timestamp,
@@ -81,8 +83,8 @@ pub(super) struct Evidence {
 impl Evidence {
     pub fn new(timeout: Duration) -> Evidence {
         let (order, units, answered_at) = (Order::default(), BTreeMap::new(), Timestamp::MIN);
-        let (last, hidden, requests, losses, gaps) = (Key::default(), false, 0, 0, 0);
-        Evidence { order, units, requests, losses, gaps, last, answered_at, hidden, timeout }
+        let (last, hidden, requests, losses, gaps, whole) = (Key::default(), false, 0, 0, 0, 0);
+        Evidence { order, units, requests, losses, gaps, whole, last, answered_at, hidden, timeout }
     }
 
     fn unit(&mut self, unit: u8, at: Timestamp) -> &mut Unit {
@@ -92,6 +94,7 @@ impl Evidence {
     /// A request was heard that began at `first`, `previous` and its response directly before it.
     pub fn ask(&mut self, request: &[u8], first: Timestamp, previous: Option<&[u8]>) {
         self.requests += 1;
+        self.whole = self.whole.saturating_add(1);
         if self.requests == COUNT_MAX {
             (self.requests, self.losses, self.gaps) = (self.requests / 2, self.losses / 2, self.gaps / 2);
         }
@@ -100,7 +103,9 @@ impl Evidence {
         let gap = previous.map(key).map(|previous| {
             let pause = elapsed(self.answered_at, first);
             let usual = self.order.pause(&previous);
-            self.gaps += u32::from(self.order.is_unusual(&previous, &asked));
+            if self.order.is_unusual(&previous, &asked) {
+                (self.gaps, self.whole) = (self.gaps + 1, 0);
+            }
             self.order.follow(&previous, &asked, pause);
             // What is longer may be but a delay on the way here.
             usual.map_or(pause, |usual| pause.min(2 * usual))
@@ -122,13 +127,14 @@ impl Evidence {
     /// units that hardly ever are silent, does not do both.
     fn suspect(&mut self) {
         let missed = self.units.values().map(Unit::may_miss).fold(0.0, f64::max);
-        if RISK_MAX < self.of_requests(self.losses + 1) * missed {
+        if RISK_MAX < self.rate(self.losses) * missed {
             self.hide();
         }
     }
 
-    fn of_requests(&self, count: u32) -> f64 {
-        f64::from(count) / f64::from(self.requests + 1)
+    /// How often something is lost, of 1, which has happened so often lately; a line that loses nothing for long has a small one.
+    fn rate(&self, count: u32) -> f64 {
+        (f64::from(count + 1) / f64::from(self.requests + 1)).min(1.0 / f64::from(self.whole + 1))
     }
 
     /// A response to a request that was not heard may still come.
@@ -139,7 +145,7 @@ impl Evidence {
 
     /// A frame of the line was not heard, or only in part.
     pub fn lose(&mut self) {
-        self.losses = self.losses.saturating_add(1);
+        (self.losses, self.whole) = (self.losses.saturating_add(1), 0);
     }
 
     /// Was this request heard more than once?
@@ -176,8 +182,8 @@ impl Evidence {
             return Verdict::Proven;
         }
         // Two frames are lost one by one, where nothing is left as noise; or at once, which there may be a first time for.
-        let lost = self.of_requests(self.losses + 1) + unit.map_or(0.0, Unit::missed);
-        let (one_by_one, at_once) = (lost.powi(2), self.of_requests(self.gaps + 1));
+        let lost = self.rate(self.losses) + unit.map_or(0.0, Unit::missed);
+        let (one_by_one, at_once) = (lost.powi(2), self.rate(self.gaps));
         let in_time = time <= self.timeout.max(self.patience(request[0]));
         if clean && in_time && self.order.is_only(&request, pair.response) {
             let is_new = self.order.times(&request) < 2 && RISK_MAX < one_by_one;

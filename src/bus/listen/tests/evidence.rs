@@ -335,3 +335,23 @@ fn a_request_that_looks_like_an_answer_stays_one() {
     let of_others = line.ended.iter().filter(|ended| ended.request != asked && ended.outcome.is_ok());
     assert_eq!(of_others.count(), 0, "{:?}", line.ended);
 }
+
+#[test]
+fn a_line_that_loses_nothing_for_long_is_believed() {
+    // Nothing else proves it: two blocks of one length, each as often behind itself as behind the other, and all at once.
+    let mut line = Line::new(Framing::Rtu);
+    let mut outcomes = |count: usize, noise: &[u8]| {
+        line.bytes(5, noise);
+        for place in 0..count {
+            let (request, response) = if place % 4 < 2 { (A, OF_A) } else { (B, OF_B) };
+            line.frame(5, request);
+            line.frame(0, response);
+        }
+        let last = line.ended.split_off(line.ended.len() - 100);
+        line.ended.clear();
+        last.into_iter().map(|ended| ended.outcome).collect::<Vec<_>>()
+    };
+    assert_eq!(outcomes(2_000, &[]), [Err(Fault::Unproven); 100]);
+    assert_eq!(outcomes(140_000, &[]), [Ok(()); 100]);
+    assert_eq!(outcomes(2_000, &[9; 20]), [Err(Fault::Unproven); 100], "what is lost once may be lost again");
+}
