@@ -2,14 +2,16 @@
 
 use std::{
     collections::{HashMap, HashSet},
+    ffi::OsString,
     fs::{self, File},
     io::{BufRead, BufReader, Read},
-    os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, chown},
+    os::unix::fs::{DirBuilderExt, MetadataExt, fchown},
     path::{Path, PathBuf},
 };
 
 use duckdb::params;
 use jiff::Timestamp;
+use rustix::fs::{AtFlags, CWD, Mode, OFlags, openat, unlinkat};
 
 use super::{
     sql,
@@ -35,14 +37,15 @@ pub fn folder(history: &Path) -> PathBuf {
 /// A file in the import folder; a copy that was made for one import is removed with this.
 #[derive(Debug)]
 pub struct Placed {
-    path: PathBuf,
+    folder: File,
+    name: OsString,
     is_copy: bool,
 }
 
 impl Placed {
     /// Its name there.
     pub fn name(&self) -> String {
-        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        self.name.to_string_lossy().into_owned()
     }
 }
 
@@ -50,35 +53,42 @@ impl Drop for Placed {
     fn drop(&mut self) {
         if self.is_copy {
             // A copy that stays takes room and does no harm.
-            let _ = fs::remove_file(&self.path);
+            let _ = unlinkat(&self.folder, &self.name, AtFlags::empty());
         }
     }
 }
 
-/// Puts a file where the station of a history reads it; one that is there already stays.
+/// Puts a file where the station of a history reads it; one that is there already stays. Everything is done in the folder as it
+/// was opened, and through no link: the user of the station must not lead root elsewhere.
 pub fn place(file: &Path, history: &Path) -> std::io::Result<Placed> {
-    let folder = folder(history);
+    let path = folder(history);
     let own = fs::metadata(history).or_else(|_| fs::metadata(history.parent().unwrap_or(history)))?;
-    match fs::DirBuilder::new().mode(0o750).create(&folder) {
-        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
-        made => made.and_then(|()| give(&folder, &own))?,
+    let made = match fs::DirBuilder::new().mode(0o750).create(&path) {
+        Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => false,
+        made => made.map(|()| true)?,
+    };
+    let flags = OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+    let folder = File::from(openat(CWD, &path, flags, Mode::empty())?);
+    if made {
+        give(&folder, &own)?;
     }
-    let path = folder.join(file.file_name().unwrap_or_default());
-    if fs::canonicalize(file)?.parent() == fs::canonicalize(&folder).ok().as_deref() {
-        return Ok(Placed { path, is_copy: false });
+    let name = file.file_name().unwrap_or_default().to_owned();
+    if fs::canonicalize(file)?.parent() == fs::canonicalize(&path).ok().as_deref() {
+        return Ok(Placed { folder, name, is_copy: false });
     }
     let mut from = regular::open(file)?;
-    let mut to = regular::open_no_link(File::options().write(true).create_new(true).mode(0o640), &path)?;
-    let placed = Placed { path, is_copy: true };
+    let new = OFlags::WRONLY | OFlags::CREATE | OFlags::EXCL | OFlags::NOFOLLOW | OFlags::CLOEXEC;
+    let mut to = File::from(openat(&folder, &name, new, Mode::from_raw_mode(0o640))?);
+    let placed = Placed { folder, name, is_copy: true };
     std::io::copy(&mut from, &mut to)?;
-    give(&placed.path, &own)?;
+    give(&to, &own)?;
     Ok(placed)
 }
 
 /// What root makes belongs to the user of the station.
-fn give(path: &Path, own: &fs::Metadata) -> std::io::Result<()> {
-    let is_other = fs::metadata(path)?.uid() != own.uid();
-    if is_other { chown(path, Some(own.uid()), Some(own.gid())) } else { Ok(()) }
+fn give(made: &File, own: &fs::Metadata) -> std::io::Result<()> {
+    let is_other = made.metadata()?.uid() != own.uid();
+    if is_other { fchown(made, Some(own.uid()), Some(own.gid())) } else { Ok(()) }
 }
 
 /// Longest file.
