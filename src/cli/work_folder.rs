@@ -9,8 +9,8 @@ use std::{
 use super::{CliError, say_error};
 use crate::profile::io::atomic::is_gone;
 
-/// The folder of a process, with its number.
-const WORK_FOLDER: &str = "sightglass-";
+/// The folder of a process, with its number. Nobody else's is called so: it is removed unasked.
+const WORK_FOLDER: &str = ".sightglass-command-";
 
 /// Removes the folders of killed processes, of this user: others are not to be removed.
 fn remove_leftovers(temporary: &Path) {
@@ -64,11 +64,14 @@ mod tests {
         for name in ["2147483647", &own, "x"] {
             fs::create_dir_all(folder.path().join(format!("{WORK_FOLDER}{name}/below"))).expect("a folder");
         }
-        fs::write(folder.path().join("sightglass-2147483646"), "a file").expect("a file");
+        fs::write(folder.path().join(format!("{WORK_FOLDER}2147483646")), "a file").expect("a file");
+        // The sockets of stations of user 2147483647, without a folder of the system for them.
+        fs::create_dir(folder.path().join("sightglass-2147483647")).expect("a folder");
         remove_leftovers(folder.path());
         let names = fs::read_dir(folder.path()).expect("a folder").flatten().map(|entry| entry.file_name());
         let left: BTreeSet<_> = names.map(|name| name.to_string_lossy().into_owned()).collect();
-        let expect = ["2147483646", &own, "x"].map(|number| format!("{WORK_FOLDER}{number}")).into();
+        let mut expect: BTreeSet<_> = ["2147483646", &own, "x"].map(|number| format!("{WORK_FOLDER}{number}")).into();
+        expect.insert("sightglass-2147483647".into());
         assert_eq!(left, expect);
     }
 }
