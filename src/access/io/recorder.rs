@@ -283,7 +283,9 @@ impl Recorder {
     fn drop_written(&mut self, opened: &Opened) {
         let (mut pending, mut written) = (std::mem::take(&mut self.pending), Vec::new());
         pending.retain(|Pending { action, .. }| {
-            let same = |entry: &&ActionRecord| ActionRecord { chain_hash: None, ..(*entry).clone() } == *action;
+            let is_equal = |entry: &ActionRecord| ActionRecord { chain_hash: None, ..entry.clone() } == *action;
+            // The time first: there may be thousands of both.
+            let same = |entry: &&ActionRecord| entry.at == action.at && is_equal(entry);
             let found = opened.tail.iter().rev().find(same);
             written.extend(found.cloned());
             found.is_none()
