@@ -102,12 +102,13 @@ impl StationFault {
             StationFault::HistoryDamaged => [
                 "a power failure, a failing disk, or a file that was changed, moved or removed manually",
                 "a part of the history is missing; recording continues in a new file",
-                "keep the file that was set aside; check the disk (SMART) and the power supply",
+                "keep the file that was set aside; bring back what is sound with `sightglass history restore PLANT --set-aside`; \
+                 check the disk (SMART) and the power supply",
             ],
             StationFault::NotArchived => [
                 "the disk is full or read-only, or a part of the history cannot be read",
                 "nothing is lost: samples stay in the database, which grows and answers more slowly",
-                "free the disk; run `sightglass history PLANT --verify`; archiving resumes automatically",
+                "free the disk; run `sightglass history verify PLANT`; archiving resumes automatically",
             ],
             StationFault::DiskSpace => [
                 "the history, reports or other files have grown",
