@@ -24,11 +24,11 @@ mod support;
 use std::{hint::black_box, path::Path, sync::Arc, time::Duration, time::Instant};
 
 use criterion::{Criterion, criterion_group};
-use jiff::{Timestamp, tz::TimeZone};
+use jiff::Timestamp;
 use sightglass::{
     history::{Query, io::store::Store},
     plant::{
-        def::{DeviceId, MimicDef, PlantDef, ReportDef, TagId},
+        def::{DeviceId, PlantDef, TagId},
         record::Record,
         sample::Sample,
         tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
@@ -49,27 +49,10 @@ fn tag(id: u16) -> TagDef {
 
 fn tank() -> Arc<PlantDef> {
     Arc::new(PlantDef {
-        runs: Vec::new(),
-        procedures: Vec::new(),
-        access: Default::default(),
         name: "tank".into(),
         title: "Water tank".into(),
-        time_zone: TimeZone::UTC,
-        lines: Vec::new(),
-        devices: Vec::new(),
         tags: (0..TAGS).map(tag).collect(),
-        alarms: Vec::new(),
-        alarm_rules: Default::default(),
-        logic: Default::default(),
-        mimic: MimicDef::default(),
-        trends: Vec::new(),
-        batches: Vec::new(),
-        shifts: Vec::new(),
-        history: Default::default(),
-        north: Default::default(),
-        file_sha256: String::new(),
-        report: ReportDef::default(),
-        simulation: None,
+        ..PlantDef::default()
     })
 }
 

@@ -9,12 +9,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use jiff::tz::TimeZone;
 use sightglass::{
     bus::plan::{Block, UnreadableRanges, Wire, blocks, single},
     plant::{
         PlantDef,
-        def::{DeviceDef, DeviceId, Limits, LineDef, LineId, MimicDef, ReportDef, Serial, TagId, Transport},
+        def::{DeviceDef, DeviceId, Limits, LineDef, LineId, Serial, TagId, Transport},
         tag::{ByteOrder, DataType, Point, Table, TagDef},
     },
 };
@@ -63,27 +62,11 @@ fn plant(devices: u16, tags: u16, gap: u64, dice: &mut Dice) -> PlantDef {
     };
     let tags = (0..tags).map(tag).collect();
     PlantDef {
-        runs: Vec::new(),
-        procedures: Vec::new(),
-        access: Default::default(),
         name: "scattered".into(),
-        title: String::new(),
-        time_zone: TimeZone::UTC,
         lines: vec![LineDef::new(LineId(0), "L1", Transport::rtu("/dev/null", Serial::USUAL))],
         devices: (0..devices).map(device).collect(),
         tags,
-        alarms: Vec::new(),
-        alarm_rules: Default::default(),
-        logic: Default::default(),
-        mimic: MimicDef::default(),
-        trends: Vec::new(),
-        batches: Vec::new(),
-        shifts: Vec::new(),
-        history: Default::default(),
-        north: Default::default(),
-        report: ReportDef::default(),
-        file_sha256: String::new(),
-        simulation: None,
+        ..PlantDef::default()
     }
 }
 

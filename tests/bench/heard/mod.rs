@@ -7,12 +7,12 @@ mod line;
 
 use std::sync::Arc;
 
-use jiff::{SignedDuration, Timestamp, tz::TimeZone};
+use jiff::{SignedDuration, Timestamp};
 use sightglass::{
     bus::listen::{Heard, Listener, Losses, events},
     plant::{
         Plant, PlantDef,
-        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, MimicDef, ReportDef, Serial, TagId, Transport},
+        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Serial, TagId, Transport},
         event::Event,
         line::Rs485,
         tag::{ByteOrder, DataType, Point, Table, TagDef},
@@ -155,29 +155,12 @@ fn plant(model: &Model) -> PlantDef {
         None => Transport::Tcp { host: "heard".into(), port: 502, framing: model.framing },
     };
     let mut def = PlantDef {
-        runs: Vec::new(),
-        procedures: Vec::new(),
-        access: Default::default(),
         name: "heard".into(),
-        title: String::new(),
-        time_zone: TimeZone::UTC,
         lines: vec![LineDef { listens: true, ..LineDef::new(LINE, "L1", transport) }],
         devices: (1..4)
             .map(|unit| DeviceDef { unit: unit as u8, ..DeviceDef::new(DeviceId(unit - 1), &format!("D{unit}"), LINE) })
             .collect(),
-        tags: Vec::new(),
-        alarms: Vec::new(),
-        alarm_rules: Default::default(),
-        logic: Default::default(),
-        mimic: MimicDef::default(),
-        trends: Vec::new(),
-        batches: Vec::new(),
-        shifts: Vec::new(),
-        history: Default::default(),
-        north: Default::default(),
-        report: ReportDef::default(),
-        file_sha256: String::new(),
-        simulation: None,
+        ..PlantDef::default()
     };
     for ask in model.cycle.iter().filter(|ask| ask.address < REFUSED) {
         for address in ask.address..ask.address + ask.count {
