@@ -9,7 +9,7 @@ use std::{
 use super::{CliError, say_error};
 use crate::profile::io::atomic::is_gone;
 
-/// The folder of a process, with its number. Nobody else's is called so: it is removed unasked.
+/// The folder of a process, with its number. No other program's is called so: it is removed unasked.
 const WORK_FOLDER: &str = ".sightglass-command-";
 
 /// Removes the folders of killed processes, of this user: others are not to be removed.

@@ -102,8 +102,7 @@ impl StationFault {
             StationFault::HistoryDamaged => [
                 "a power failure, a failing disk, or a file that was changed, moved or removed manually",
                 "a part of the history is missing; recording continues in a new file",
-                "keep the file that was set aside; bring back what is sound with `sightglass history restore PLANT --set-aside`; \
-                 check the disk (SMART) and the power supply",
+                "bring back what is sound with `sightglass history restore PLANT --set-aside`; check the disk (SMART) and the power supply",
             ],
             StationFault::NotArchived => [
                 "the disk is full or read-only, or a part of the history cannot be read",
