@@ -3,6 +3,7 @@
  *
  *   CRASH_FOLDER  only paths below it count         CRASH_AT    the operation at which the process is killed; 0: never
  *   CRASH_SHADOW  copies and the log of operations  CRASH_FULL  "FROM-TO": writes fail with ENOSPC from one operation to another
+ *   CRASH_TORN    1: power is lost, so the last write may reach the disk in part; a kill lets it end
  *
  * The log has a line per operation that matters to what a loss of power may forget:
  *   sync PATH COPY, folder PATH, create PATH, rename FROM TO COPY-OF-OLD, remove PATH COPY
@@ -25,6 +26,7 @@
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static const char *folder, *shadow;
 static long count, crash_at, full_from, full_to, copies;
+static int tears;
 static int log_file = -1;
 
 __attribute__((constructor)) static void begin(void) {
@@ -32,6 +34,7 @@ __attribute__((constructor)) static void begin(void) {
     shadow = getenv("CRASH_SHADOW");
     const char *at = getenv("CRASH_AT"), *full = getenv("CRASH_FULL");
     crash_at = at ? atol(at) : 0;
+    tears = getenv("CRASH_TORN") != NULL;
     if (full) sscanf(full, "%ld-%ld", &full_from, &full_to);
     if (folder && shadow) {
         char path[4096];
@@ -94,7 +97,7 @@ static ssize_t torn(int fd, const void *bytes, size_t size, off_t offset, int pl
     struct stat stat;
     if (!placed && fstat(fd, &stat) == 0) offset = fcntl(fd, F_GETFL) & O_APPEND ? stat.st_size : lseek(fd, 0, SEEK_CUR);
     size_t whole = (offset + size / 2) / 4096 * 4096;
-    if (count + 1 == crash_at && (off_t)whole > offset) syscall(SYS_pwrite64, fd, bytes, whole - offset, offset);
+    if (tears && count + 1 == crash_at && (off_t)whole > offset) syscall(SYS_pwrite64, fd, bytes, whole - offset, offset);
     return step() ? -1 : 0;
 }
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A station that is ended at any of its disk operations, by a kill or by a loss of power, as a seed says; asserts what must hold.
 
-    cargo build --release && tests/crash.py [BIN_FOLDER] [--seeds 0-99] [--keep FOLDER]
+    cargo build --release && tests/crash.py [BIN_FOLDER] [--seeds 0-99] [--keep FOLDER] [--simulated PROGRAM]
 
 Needs Linux, Python 3 and gcc. crash.c is preloaded into the real program, DuckDB included. A seed says at which operations
 of three runs the station ends, whether the last write is torn, which writes, renames and removals that were not synced are
@@ -14,11 +14,14 @@ forgotten, between which operations the disk is full, and what an operator does 
     samples     stored before a crash are still there, but for the last seconds
     stops       within 30 s of SIGTERM
 
-A failure prints its seed, and `--seeds N-N --keep FOLDER` shows it again.
+A failure prints its seed, and `--seeds N-N --keep FOLDER` shows it again. With `--simulated`, each run is a life in virtual
+time, see tests/simulation: it operates and looks by itself, and says what is wrong.
 """
 
 import argparse
 import collections
+import concurrent.futures
+import contextlib
 import datetime
 import getpass
 import json
@@ -36,6 +39,7 @@ import time
 HERE = pathlib.Path(__file__).parent
 LAST_S = 3  # so much of the samples may be lost
 OPERATIONS = 1_500  # of a run of a few seconds
+SIMULATED_OPERATIONS = 600  # of a minute
 BLOCK = 4096  # written whole or not at all, as disks do
 PLANT = """
 [access]
@@ -64,12 +68,19 @@ class Station:
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=timeout)
         return done.returncode, done.stdout if done.returncode == 0 else done.stdout + done.stderr
 
-    def start(self, crash_at=0, full=None):
-        environment = dict(self.environment)
-        if crash_at or full:
-            environment |= dict(LD_PRELOAD=str(self.shim), CRASH_FOLDER=str(self.state), CRASH_SHADOW=str(self.shadow), CRASH_AT=str(crash_at))
-        if full:
-            environment["CRASH_FULL"] = "{}-{}".format(*full)
+    def disk(self, end):
+        """The environment of a run that ends so; of one that ends by itself, nothing."""
+        if not end:
+            return {}
+        environment = dict(LD_PRELOAD=str(self.shim), CRASH_FOLDER=str(self.state), CRASH_SHADOW=str(self.shadow), CRASH_AT=str(end.at))
+        if end.full:
+            environment["CRASH_FULL"] = "{}-{}".format(*end.full)
+        if end.loses_power:
+            environment["CRASH_TORN"] = "1"
+        return environment
+
+    def start(self, end=None):
+        environment = self.environment | self.disk(end)
         self.process = subprocess.Popen([self.binaries / "sightglass", "run", self.plant, "--log", "-", "--port", f"L1=127.0.0.1:{self.port}"], env=environment,
                                         cwd=self.folder, stdout=self.output, stderr=self.output)
 
@@ -105,6 +116,23 @@ class Station:
         entries = map(json.loads, (self.state / "tank.audit.jsonl").read_text().splitlines())
         # A request that the end came before has no result.
         return collections.Counter(entry["note"] for entry in entries if entry.get("note") and not entry["action"].endswith(" requested"))
+
+
+End = collections.namedtuple("End", "at full loses_power")
+
+
+def an_end(dice, operations):
+    """How a run ends; half of them end while it opens."""
+    at = dice.randrange(1, 60 if dice.random() < 0.5 else operations)
+    return End(at, sorted(dice.sample(range(operations), 2)) if dice.random() < 0.3 else None, dice.random() < 0.5)
+
+
+def after(station, end, dice):
+    """What the end of a run leaves behind."""
+    if end.loses_power:
+        lose_power(station, dice)
+    station.output.write(f"--- {end}\n".encode())
+    station.output.flush()
 
 
 def lose_power(station, dice):
@@ -188,21 +216,15 @@ def run(station, seed):
     for round_number in range(3):
         shutil.rmtree(station.shadow)
         station.shadow.mkdir()
-        # Half of them while it opens.
-        crash_at = dice.randrange(1, 60 if dice.random() < 0.5 else OPERATIONS)
-        full = sorted(dice.sample(range(OPERATIONS), 2)) if dice.random() < 0.3 else None
-        station.start(crash_at, full)
+        end = an_end(dice, OPERATIONS)
+        station.start(end)
         if station.is_reached(60):
             operate(station, random.Random(f"{seed} {round_number}"), f"s{seed}r{round_number}", acknowledged, stored)
         if station.is_alive():
             station.process.kill()
         station.process.wait()
-        what = f"ended at {crash_at}, full {full}"
-        if dice.random() < 0.5:
-            lose_power(station, random.Random(f"{seed} {round_number} lost"))
-            what, power_lost = what + ", power lost", True
-        station.output.write(f"--- {what}\n".encode())
-        station.output.flush()
+        after(station, end, random.Random(f"{seed} {round_number} lost"))
+        power_lost |= end.loses_power
     station.start()
     if not station.is_reached(60):
         raise Wrong(f"starts: it ended by itself with {station.process.returncode}")
@@ -219,7 +241,7 @@ def run(station, seed):
     code, text = station.call("audit", "verify", station.plant)
     if code != 0:
         raise Wrong(f"audit: {text.strip()[-300:]}")
-    return len(acknowledged)
+    return f"{len(acknowledged)} actions"
 
 
 def check(station, acknowledged, stored, power_lost):
@@ -238,42 +260,105 @@ def check(station, acknowledged, stored, power_lost):
             raise Wrong(f"samples: {stored_before(station, instant)} before {instant}, there were {count}")
 
 
+class SimulatedStation(Station):
+    """A station whose lives are processes of PROGRAM."""
+
+    program = None
+
+    def live(self, seed, number, base, end=None):
+        environment = dict(self.environment, SIGHTGLASS_LIFE=str(seed), SIGHTGLASS_LIFE_NUMBER=str(number), SIGHTGLASS_BASE=str(base),
+                           SIGHTGLASS_LAST=str(int(not end)), SIGHTGLASS_FOLDER=str(self.folder), RUST_BACKTRACE="1", **self.disk(end))
+        with open(self.folder / "facts", "ab") as facts:
+            self.process = subprocess.Popen([self.program], env=environment, cwd=self.folder, stdout=facts, stderr=self.output)
+        try:
+            code = self.process.wait(120)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise Wrong(f"life {number}: it hangs") from None
+        said = (self.folder / "facts").read_text().splitlines()
+        wrong = [line for line in said if line.startswith("wrong ")]
+        if wrong:
+            raise Wrong(f"life {number}: {wrong[0][6:606]}" + f" and {len(wrong) - 1} more" * (len(wrong) > 1))
+        if code not in (0, -signal.SIGKILL) or not end and said[-1].strip() != "ended":
+            raise Wrong(f"life {number}: it ended by itself with {code}")
+
+
+def simulate(station, seed):
+    dice, power_lost, base = random.Random(seed), False, 1_772_000_000 + random.Random(seed).randrange(3600)
+    code, text = station.call("profiles", "tank")
+    mode = dice.choice(['mode = "rtu"', 'mode = "rtu"', 'mode = "ascii"'])
+    station.plant.write_text(text.replace('mode = "rtu"', mode) + PLANT.format(user=getpass.getuser()))
+    for number in range(3):
+        shutil.rmtree(station.shadow)
+        station.shadow.mkdir()
+        end = an_end(dice, SIMULATED_OPERATIONS)
+        station.live(seed, number, base, end)
+        after(station, end, random.Random(f"{seed} {number} lost"))
+        power_lost |= end.loses_power
+        base += 100 + dice.choice([0, 60, 1800, 7200])
+    station.live(seed, 3, base)
+    aside = [path.name for path in station.state.rglob("*damaged*")]
+    if aside and not (power_lost and "computed checksum" in (station.folder / "out").read_text()):
+        raise Wrong(f"history: set aside: {aside}")
+    said = (station.folder / "facts").read_text().splitlines()
+    compared = sum(int(line.split()[1]) for line in said if line.startswith("compared "))
+    return f"{compared} good values right, {sum(line.startswith('recorded ') for line in said)} actions"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("binaries", nargs="?", default=HERE.parent / "target/release")
     parser.add_argument("--seeds", default="0-99")
     parser.add_argument("--keep")
+    parser.add_argument("--simulated")
     args = parser.parse_args()
     first, last = map(int, args.seeds.split("-"))
     home = pathlib.Path(args.keep or tempfile.mkdtemp(prefix="crash-")).absolute()
     home.mkdir(exist_ok=True)
     shim = home / "crash.so"
     subprocess.run(["gcc", "-O1", "-shared", "-fPIC", "-o", shim, HERE / "crash.c", "-ldl", "-lpthread"], check=True)
+    SimulatedStation.program = args.simulated
+    with simulator(args, shim, home) as port:
+
+        def tried(seed):
+            shutil.rmtree(home / f"seed-{seed}", ignore_errors=True)
+            station = (SimulatedStation if args.simulated else Station)(args.binaries, shim, home / f"seed-{seed}", port)
+            try:
+                print(f"seed {seed}: {(simulate if args.simulated else run)(station, seed)} acknowledged", flush=True)
+                if not args.keep:
+                    shutil.rmtree(station.folder)
+                return 0
+            except Wrong as why:
+                print(f"seed {seed}: {why}; see {station.folder}", flush=True)
+                return 1
+            finally:
+                station.output.close()
+                if station.process and station.is_alive():
+                    station.process.kill()
+
+        # Those in real time need their time.
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count() if args.simulated else 1) as pool:
+            wrong = sum(pool.map(tried, range(first, last + 1)))
+    print(f"{last + 1 - first} seeds, {wrong} wrong")
+    sys.exit(wrong > 0)
+
+
+@contextlib.contextmanager
+def simulator(args, shim, home):
+    """The port of a simulated plant, for stations in real time."""
+    if args.simulated:
+        yield 0
+        return
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     slave = Station(args.binaries, shim, home / "slave", port)
     sim = subprocess.Popen([slave.binaries / "sightglass", "sim", "tank", "--mode", "tcp", "--tcp", f"127.0.0.1:{port}"], env=slave.environment,
                            stdout=subprocess.DEVNULL)
-    wrong = 0
     try:
-        for seed in range(first, last + 1):
-            shutil.rmtree(home / f"seed-{seed}", ignore_errors=True)
-            station = Station(args.binaries, shim, home / f"seed-{seed}", port)
-            try:
-                print(f"seed {seed}: {run(station, seed)} acknowledged", flush=True)
-                if not args.keep:
-                    shutil.rmtree(station.folder)
-            except Wrong as why:
-                wrong += 1
-                print(f"seed {seed}: {why}; see {station.folder}", flush=True)
-            finally:
-                if station.process and station.is_alive():
-                    station.process.kill()
+        yield port
     finally:
         sim.kill()
-    print(f"{last + 1 - first} seeds, {wrong} wrong")
-    sys.exit(wrong > 0)
 
 
 if __name__ == "__main__":

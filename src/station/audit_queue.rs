@@ -1,10 +1,10 @@
 //! The plant-side end of the recorder: sends actions and alarm events to disk, and replies once they are there.
 
-use std::{collections::VecDeque, sync::mpsc as queue, time::Duration};
+use std::{collections::VecDeque, time::Duration};
 
 use jiff::Timestamp;
 use tokio::{
-    sync::{oneshot, watch},
+    sync::{mpsc, oneshot, watch},
     time::Instant,
 };
 
@@ -71,7 +71,7 @@ pub(super) struct RecorderFaults {
 /// The plant-side end of the recorder.
 #[derive(Debug)]
 pub(super) struct AuditQueue {
-    queue: queue::SyncSender<Message>,
+    queue: mpsc::Sender<Message>,
     recorded: watch::Receiver<Recorded>,
     began: Instant,
     /// The next write group. Its events are bounded by the alarms of the plant.
@@ -141,8 +141,8 @@ impl AuditQueue {
                 self.backlog_events = LatestEvents::default();
                 return Vec::new();
             }
-            Err(queue::TrySendError::Full(message)) => (message, BACKLOG_MAX),
-            Err(queue::TrySendError::Disconnected(message)) => (message, 0),
+            Err(mpsc::error::TrySendError::Full(message)) => (message, BACKLOG_MAX),
+            Err(mpsc::error::TrySendError::Closed(message)) => (message, 0),
         };
         if let Message::WriteGroup(group) = message {
             self.backlog = group.actions;

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use tokio::task::JoinHandle;
 
 use crate::{
+    bus::io::worker::spawn_blocking,
     plant::{
         PlantDef,
         def::{DeviceDef, DeviceId},
@@ -132,7 +133,7 @@ impl FoundFile {
         }
         self.known = found.clone();
         let path = self.path.clone();
-        self.writing = Some(tokio::task::spawn_blocking(move || {
+        self.writing = Some(spawn_blocking(move || {
             if let Err(error) = found.write(&path) {
                 tracing::warn!(path = %path.display(), error, "what was found of devices is not kept");
             }

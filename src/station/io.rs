@@ -21,7 +21,7 @@ use crate::{
         AccessControl, Peer, Users,
         io::{audit_log::Opened, own_user, recorder, users, users_beside},
     },
-    bus::io::{clock::Clock, transport::Connector},
+    bus::io::{clock::Clock, transport::Connector, worker::Worker},
     history::{
         HistoryError,
         io::{
@@ -90,7 +90,7 @@ pub struct Station {
     /// `None` for a drill, which keeps nothing.
     history: Option<history::Handle>,
     /// The thread of the audit log, which ends before the history.
-    audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
+    audit_writer: Option<Worker<Option<ChainHash>>>,
     /// Login is not required.
     open: bool,
     def: Arc<PlantDef>,
@@ -215,7 +215,7 @@ struct Threads {
     /// To the history, and its file.
     jobs: (mpsc::Sender<JobRequest>, PathBuf),
     history: Option<history::Handle>,
-    audit_writer: Option<std::thread::JoinHandle<Option<ChainHash>>>,
+    audit_writer: Option<Worker<Option<ChainHash>>>,
 }
 
 /// A task for each line.
@@ -380,17 +380,13 @@ impl Station {
             }
         }
         // The last records are on their way; each thread ends when it has stored them, the audit log before the history.
-        let (history, audit_writer) = (self.history?, self.audit_writer);
-        let ended = move || {
-            // A panic of the thread has already been reported by the panic hook.
-            let last = audit_writer.and_then(|audit_writer| audit_writer.join().ok().flatten());
-            history.stop();
-            last
+        let last = match self.audit_writer {
+            Some(audit_writer) => audit_writer.ended().await.flatten(),
+            None => None,
         };
-        let ended = tokio::task::spawn_blocking(ended).await;
-        ended.unwrap_or_else(|error| {
-            tracing::error!(%error, "the history did not close cleanly");
-            None
-        })
+        if let Some(history) = self.history {
+            history.ended().await;
+        }
+        last
     }
 }

@@ -4,13 +4,14 @@ use std::{
     collections::VecDeque,
     io,
     path::{Path, PathBuf},
-    sync::mpsc as queue,
-    thread::JoinHandle,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use jiff::Timestamp;
-use tokio::sync::{mpsc, watch};
+use tokio::{
+    sync::{mpsc, watch},
+    time::{Instant, timeout},
+};
 
 use super::{
     audit_log::{self, AuditLog, IN_USE, Opened},
@@ -21,7 +22,10 @@ use crate::{
         audit_log::{Comparison, START, compare, fit},
         sealing::is_due,
     },
-    bus::io::clock::Clock,
+    bus::io::{
+        clock::Clock,
+        worker::{self, Worker},
+    },
     history::{
         io::{
             alarm_file::{self, AlarmFile, RestoredAlarms},
@@ -85,7 +89,7 @@ pub struct Recorded {
 #[derive(Debug)]
 pub struct Handle {
     /// What is to be written. When the last sender is dropped the thread writes what it has and ends.
-    pub groups: queue::SyncSender<Message>,
+    pub groups: mpsc::Sender<Message>,
     /// How it stands, after every sync.
     pub recorded: watch::Receiver<Recorded>,
     /// What was found when the log was opened.
@@ -93,19 +97,19 @@ pub struct Handle {
     /// What was found when the alarm-state file was opened.
     pub alarms: RestoredAlarms,
     /// The thread; ends with the last entry of the log. `None` where the system gave none: then nothing is written.
-    pub join: Option<JoinHandle<Option<ChainHash>>>,
+    pub join: Option<Worker<Option<ChainHash>>>,
 }
 
 /// Opens both files beside a history and starts the thread. A file that cannot be opened is trouble, and no reason not to
 /// start; nor is a system that gives no thread: the station goes on, and says that the audit log is not written.
 pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<HistoryInput>) -> Handle {
-    let (groups, queue) = queue::sync_channel(WRITE_GROUPS_MAX);
+    let (groups, queue) = mpsc::channel(WRITE_GROUPS_MAX);
     let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
     let mut opened = recorder.open();
     recorder.tail = std::mem::take(&mut opened.tail);
     recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.chain_hash).unwrap_or(START);
     let (status, recorded) = watch::channel(recorder.status());
-    let join = std::thread::Builder::new().name("recorder".into()).spawn(move || recorder.run(&queue, &status));
+    let join = worker::spawn("recorder", 1, move || recorder.run(queue, status));
     let join = join.inspect_err(|error| tracing::error!(%error, "no thread for the audit log")).ok();
     Handle { groups, recorded, opened, alarms, join }
 }
@@ -175,20 +179,17 @@ impl Recorder {
         (recorder, found)
     }
 
-    fn run(mut self, queue: &queue::Receiver<Message>, status: &watch::Sender<Recorded>) -> Option<ChainHash> {
+    async fn run(mut self, mut queue: mpsc::Receiver<Message>, status: watch::Sender<Recorded>) -> Option<ChainHash> {
+        let mut messages = Vec::with_capacity(GROUP_MAX);
         loop {
             let wait = if self.is_written() { CHECK_EVERY } else { AGAIN };
-            match queue.recv_timeout(wait) {
-                Ok(message) => {
-                    let more = queue.try_iter().take(GROUP_MAX - 1);
-                    [message].into_iter().chain(more).for_each(|message| match message {
-                        Message::WriteGroup(group) => self.on_group(group),
-                        Message::Stored(rows) => self.compare(&rows),
-                    });
-                }
-                Err(queue::RecvTimeoutError::Timeout) => {}
-                Err(queue::RecvTimeoutError::Disconnected) => break,
+            if timeout(wait, queue.recv_many(&mut messages, GROUP_MAX)).await == Ok(0) {
+                break;
             }
+            messages.drain(..).for_each(|message| match message {
+                Message::WriteGroup(group) => self.on_group(group),
+                Message::Stored(rows) => self.compare(&rows),
+            });
             self.write();
             status.send_replace(self.status());
             let now = self.clock.utc();

@@ -32,9 +32,17 @@ struct System {
     steady: RealInstant,
     // Shared by all copies of the clock for as long as the process lives, which has one or two clocks.
     steps: &'static AtomicI64,
+    /// In a simulation, what the system clock is set by: that of the computer is not looked at.
+    simulated: Option<&'static AtomicI64>,
 }
 
 impl Clock {
+    /// Virtual time, with a system clock that is set by so many microseconds.
+    pub fn simulated(base: Timestamp, set_by: &'static AtomicI64) -> Clock {
+        let clock = Clock { base, ..Clock::real() };
+        Clock { system: clock.system.map(|system| System { simulated: Some(set_by), ..system }), ..clock }
+    }
+
     /// Plant time begins at `base` and runs `speed` times as fast as real time.
     pub fn starting_at(base: Timestamp, speed: f64) -> Clock {
         Clock { base, start: Instant::now(), speed, system: None }
@@ -43,7 +51,7 @@ impl Clock {
     /// Real time, which follows the system clock: see [`Clock::follow`].
     pub fn real() -> Clock {
         let steps = Box::leak(Box::new(AtomicI64::new(0)));
-        let system = System { wall: SystemTime::now(), steady: RealInstant::now(), steps };
+        let system = System { wall: SystemTime::now(), steady: RealInstant::now(), steps, simulated: None };
         Clock { system: Some(system), ..Clock::starting_at(Timestamp::now(), 1.0) }
     }
 
@@ -64,21 +72,29 @@ impl Clock {
 
     /// Looks at the system clock: if it was set, [`Clock::utc`] follows at once, in all copies of this clock. Gives the step.
     pub fn follow(&self) -> Option<SignedDuration> {
-        self.follow_at(SystemTime::now(), RealInstant::now())
+        match self.system?.simulated {
+            Some(set_by) => self.stepped(SignedDuration::from_micros(set_by.load(Ordering::Relaxed))),
+            None => self.follow_at(SystemTime::now(), RealInstant::now()),
+        }
     }
 
     pub(crate) fn follow_at(&self, wall: SystemTime, steady: RealInstant) -> Option<SignedDuration> {
-        let System { wall: wall_before, steady: steady_before, steps } = self.system?;
+        let System { wall: wall_before, steady: steady_before, .. } = self.system?;
         let passed = SignedDuration::try_from(steady.saturating_duration_since(steady_before)).ok()?;
         let moved = match wall.duration_since(wall_before) {
             Ok(ahead) => SignedDuration::try_from(ahead).ok()?,
             Err(back) => -SignedDuration::try_from(back.duration()).ok()?,
         };
-        let step = moved - passed - self.behind_utc();
+        self.stepped(moved - passed)
+    }
+
+    /// The system clock is so far from the steady one.
+    fn stepped(&self, set_by: SignedDuration) -> Option<SignedDuration> {
+        let step = set_by - self.behind_utc();
         if step.abs() < STEP_MIN {
             return None;
         }
-        steps.fetch_add(i64::try_from(step.as_micros()).ok()?, Ordering::Relaxed);
+        self.system?.steps.fetch_add(i64::try_from(step.as_micros()).ok()?, Ordering::Relaxed);
         Some(step)
     }
 

@@ -1,6 +1,7 @@
 //! The edge of the bus: ports, sockets, clocks.
 
 pub mod clock;
+pub mod worker;
 pub mod uart;
 pub mod ports;
 pub mod network;

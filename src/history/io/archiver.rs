@@ -10,10 +10,7 @@ use std::{
 };
 
 use jiff::Timestamp;
-use tokio::{
-    sync::oneshot,
-    task::{JoinHandle, spawn_blocking},
-};
+use tokio::{sync::oneshot, task::JoinHandle};
 
 use super::{
     HistoryJob, JobRequest,
@@ -23,7 +20,10 @@ use super::{
     reader::stop,
     store::{Store, instant},
 };
-use crate::history::{HistoryError, retention::Why, tiers::HOUR};
+use crate::{
+    bus::io::worker::spawn_blocking,
+    history::{HistoryError, retention::Why, tiers::HOUR},
+};
 
 /// Real time between two looks at what is due.
 const LOOK_EVERY: Duration = Duration::from_secs(60);

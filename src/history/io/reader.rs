@@ -16,13 +16,16 @@ use std::{
 use jiff::Timestamp;
 use tokio::{
     sync::{mpsc, oneshot, watch},
-    task::{JoinHandle, JoinSet, spawn_blocking},
+    task::{JoinHandle, JoinSet},
     time::timeout,
 };
 
 use super::{QueryRequest, store::Store};
 use crate::{
-    bus::io::clock::Clock,
+    bus::io::{
+        clock::Clock,
+        worker::{HANG_MAX, spawn_blocking},
+    },
     history::{Answer, HistoryError, QUERY_TIME_MAX, Query},
 };
 
@@ -39,9 +42,6 @@ const WAITING_MAX: usize = 64;
 const COMMIT_MAX: Duration = Duration::from_secs(2);
 /// Real time between two attempts to interrupt: one that comes between two statements has no effect.
 const INTERRUPT_EVERY: Duration = Duration::from_millis(10);
-
-/// Interrupted work that goes on for so long hangs in the disk, which the engine cannot know.
-pub const HANG_MAX: Duration = Duration::from_secs(5);
 
 /// Queries on their way, each with the number of its terminal.
 pub type Queries = mpsc::Receiver<(u32, QueryRequest)>;

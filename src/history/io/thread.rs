@@ -1,10 +1,9 @@
 //! The thread that writes: records in, one commit a second; and the thread beside it that answers queries.
 
-use std::{path::Path, sync::Arc, thread::JoinHandle, time::Duration};
+use std::{path::Path, sync::Arc, time::Duration};
 
 use tokio::{
     sync::{mpsc, oneshot, watch},
-    task::spawn_blocking,
     time::MissedTickBehavior,
 };
 
@@ -13,12 +12,15 @@ use super::{
     archiver::Archiver,
     files,
     open::{Opened, Restored},
-    reader::{Answerer, HANG_MAX, QUERIES_IN_WORK_MAX, Queries, Reader, WriterRequest},
+    reader::{Answerer, QUERIES_IN_WORK_MAX, Queries, Reader, WriterRequest},
     store::Store,
     writer::Writer,
 };
 use crate::{
-    bus::io::clock::Clock,
+    bus::io::{
+        clock::Clock,
+        worker::{Worker, spawn, spawn_blocking},
+    },
     history::HistoryError,
     plant::{def::PlantDef, record::Record, snapshot::HistoryStatus},
 };
@@ -33,6 +35,8 @@ pub const QUERIES_MAX: usize = 64;
 const REQUESTS_MAX: usize = 2 * (QUERIES_IN_WORK_MAX + 1);
 /// Jobs that wait; more are refused.
 const JOBS_MAX: usize = 2;
+/// One for a query of the station.
+const BLOCKING_THREADS: usize = QUERIES_IN_WORK_MAX + 1;
 /// Real time between two commits: what a power failure may cost.
 pub(super) const COMMIT_EVERY: Duration = Duration::from_secs(1);
 
@@ -76,7 +80,7 @@ pub struct Handle {
     /// What the plant restores from its history, as soon as it is open for the first time.
     pub restored: Option<oneshot::Receiver<Restored>>,
     /// The thread; `None` where the system gave none.
-    pub join: Option<JoinHandle<()>>,
+    pub join: Option<Worker<()>>,
 }
 
 impl Handle {
@@ -84,8 +88,16 @@ impl Handle {
     pub fn stop(self) {
         let Handle { records, queries, jobs, status, restored: _, join } = self;
         drop((records, queries, jobs, status));
-        // A panic of the thread has already been reported by the panic hook.
-        let _ = join.map(JoinHandle::join);
+        let _ = join.and_then(Worker::join);
+    }
+
+    /// The same for who must not block.
+    pub async fn ended(self) {
+        let Handle { records, queries, jobs, status, restored: _, join } = self;
+        drop((records, queries, jobs, status));
+        if let Some(join) = join {
+            join.ended().await;
+        }
     }
 
     /// Of a station without a history: every record is lost and counted, and the status says why.
@@ -139,15 +151,14 @@ pub(super) fn start_with(
     let trouble = |error: std::io::Error| HistoryError::Engine(format!("thread: {error}"));
     let (requests, requests_in) = mpsc::channel(REQUESTS_MAX);
     let reader = Reader { stores: writer.stores(), writer: requests, clock, answer };
-    let reading = spawn("history-reader", || reader.run(queries_in)).map_err(trouble)?;
+    let reading = spawn("history-reader", BLOCKING_THREADS, || reader.run(queries_in)).map_err(trouble)?;
     let writing = move || async move {
         let opening = run(&mut writer, clock, commit_every, records_in, requests_in, jobs_in, &mut outputs).await;
         writer.end_reading();
-        // A panic of the thread has already been reported by the panic hook.
-        let _ = reading.join();
+        reading.ended().await;
         finish(&mut writer, clock, opening, &mut outputs).await;
     };
-    let join = spawn("history", writing).map_err(trouble)?;
+    let join = spawn("history", BLOCKING_THREADS, writing).map_err(trouble)?;
     Ok(Handle { records, queries, jobs, status, restored: Some(restored), join: Some(join) })
 }
 
@@ -177,23 +188,6 @@ async fn finish(writer: &mut Writer, clock: Clock, opening: Option<Opening>, out
     }
     writer.finish(clock.utc());
     outputs.publish(writer);
-}
-
-/// A thread with a runtime of its own, only to wait for queues and times at once.
-fn spawn<F: Future<Output = ()>>(
-    name: &str,
-    work: impl FnOnce() -> F + Send + 'static,
-) -> std::io::Result<JoinHandle<()>> {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_time()
-        // One for a query of the station.
-        .max_blocking_threads(QUERIES_IN_WORK_MAX + 1)
-        .build()?;
-    std::thread::Builder::new().name(name.into()).spawn(move || {
-        runtime.block_on(work());
-        // What hangs in the disk does not keep the station from ending.
-        runtime.shutdown_timeout(HANG_MAX);
-    })
 }
 
 /// What the thread publishes.

@@ -4,6 +4,7 @@ use tokio::{task::JoinHandle, time::timeout};
 
 use super::{FILES_MAX, PlantTask};
 use crate::{
+    bus::io::worker::spawn_blocking,
     plant::{SetWork, command::CommandId, def::LineDef},
     profile::PlantFile,
     station::sets,
@@ -62,7 +63,7 @@ impl PlantTask {
         let refused = match (&self.persistence.sets, &self.filing) {
             (Some(folder), None) => {
                 let (folder, def) = (folder.clone(), self.plant.def().clone());
-                self.filing = Some(tokio::task::spawn_blocking(move || sets::work(&folder, &def, work)));
+                self.filing = Some(spawn_blocking(move || sets::work(&folder, &def, work)));
                 return;
             }
             (Some(_), Some(_)) => "another set is being saved, try again",
@@ -93,7 +94,7 @@ impl PlantTask {
         match (self.file.take(), &self.saving) {
             (Some(mut file), _) => {
                 let saved = settings.clone();
-                let work = tokio::task::spawn_blocking(move || {
+                let work = spawn_blocking(move || {
                     let result = file.save(&settings);
                     (file, result)
                 });

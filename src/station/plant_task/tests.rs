@@ -6,6 +6,7 @@ use std::{fs, path::Path};
 use super::*;
 use crate::{
     access::io::{audit_log, recorder},
+    bus::io::worker::Worker,
     history::io::alarm_file::{self, AlarmFile},
     plant::{
         alarm::AlarmCommand,
@@ -25,7 +26,7 @@ struct Station {
     commands: mpsc::Sender<CommandStatus>,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     task: JoinHandle<()>,
-    recorder: std::thread::JoinHandle<Option<ChainHash>>,
+    recorder: Worker<Option<ChainHash>>,
     _blocked: mpsc::Receiver<HistoryInput>,
     messages: mpsc::Sender<AuditMessage>,
     _requests: mpsc::Receiver<BusRequest>,
@@ -91,7 +92,7 @@ impl Station {
         let Station { events, task, recorder, messages, .. } = self;
         drop((events, messages));
         task.await.unwrap();
-        tokio::task::spawn_blocking(move || recorder.join()).await.unwrap().unwrap();
+        recorder.ended().await.unwrap();
     }
 }
 

@@ -66,7 +66,7 @@ fn life(history_file: &Path, actions: &[&str]) -> (Vec<ActionRecord>, Recorded, 
     let (history, mut rows) = mpsc::channel(64);
     let Handle { groups, recorded, opened, alarms: _, join } = start(history_file, clock(), history);
     for what in actions {
-        groups.send(Message::WriteGroup(group(&[what], &[]))).unwrap();
+        groups.try_send(Message::WriteGroup(group(&[what], &[]))).unwrap();
     }
     drop(groups);
     join.unwrap().join().unwrap();
@@ -282,7 +282,7 @@ fn acknowledgements_survive_without_a_history() {
     drop(rows);
     let Handle { groups, mut recorded, join, .. } = start(&history_file, clock(), history);
     let done = group(&["acknowledge"], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]);
-    groups.send(Message::WriteGroup(done)).unwrap();
+    groups.try_send(Message::WriteGroup(done)).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     runtime.block_on(recorded.wait_for(|recorded| recorded.groups == 1)).unwrap();
     // Killed here: only what is on disk counts.
@@ -301,7 +301,7 @@ fn the_history_is_completed_and_differences_are_reported() {
     let compared = |known: Vec<ChainHash>| {
         let (history, mut stored_rows) = mpsc::channel(64);
         let Handle { groups, recorded, join, .. } = start(&history_file, clock(), history);
-        groups.send(Message::Stored(known)).unwrap();
+        groups.try_send(Message::Stored(known)).unwrap();
         drop(groups);
         join.unwrap().join().unwrap();
         (stored(&mut stored_rows), recorded.borrow().log.clone())

@@ -1,0 +1,393 @@
+//! One life of a station: from its start to its end, by a stop, a kill, or the disk.
+
+use std::{
+    collections::{BTreeMap, VecDeque},
+    env,
+    path::PathBuf,
+    process::ExitCode,
+    sync::{
+        Arc,
+        atomic::{AtomicI64, Ordering},
+    },
+    time::Duration,
+};
+
+use jiff::{SignedDuration, Timestamp};
+use sightglass::{
+    access::io::audit_log,
+    bus::io::{clock::Clock, worker},
+    history::{
+        Answer, Query,
+        io::{QueryRequest, store::Store},
+    },
+    plant::{
+        PlantDef, Snapshot,
+        alarm::{AlarmCommand, AlarmState},
+        command::{Command, CommandId, CommandKind},
+        def::{AlarmId, TagId},
+        sample::{Quality, Sample},
+        station::StationFault,
+        tag::Poll,
+    },
+    profile::{self, Search},
+    report::{self, FORMATS, Period, Style},
+    sim::{io::SimulatorHandle, simulator::Simulator},
+    station::{self, Request, Session, io::Station},
+};
+use tokio::sync::oneshot;
+
+use crate::{
+    facts::{Facts, say, wrong},
+    lines::{Dice, connectors},
+};
+
+/// So long after the start the alarms are restored, and the history completed from the log.
+const SETTLED: Duration = Duration::from_secs(12);
+/// A value was so in the device at most so long before its answer arrived, and at most so long after.
+const BEFORE: SignedDuration = SignedDuration::from_secs(5);
+const AFTER: SignedDuration = SignedDuration::from_millis(600);
+/// Samples of the last seconds may be lost.
+const LAST: SignedDuration = SignedDuration::from_secs(3);
+const STOP_MAX: Duration = Duration::from_secs(30);
+
+/// How a life goes.
+struct Life {
+    folder: PathBuf,
+    dice: Dice,
+    /// The last one: nothing misbehaves, and in the end everything is looked at.
+    is_last: bool,
+    /// The system clock is set in some life of this seed: figures of its hours are not compared.
+    clock_is_set: bool,
+    facts: Facts,
+    /// What is written beside a command: which life it was.
+    name: String,
+}
+
+pub fn main(seed: u64) -> ExitCode {
+    worker::simulate();
+    tracing_subscriber::fmt().with_writer(std::io::stderr).with_max_level(tracing::Level::WARN).init();
+    let said = |name: &str| env::var(name).unwrap_or_default();
+    let folder = PathBuf::from(said("SIGHTGLASS_FOLDER"));
+    let number: u64 = said("SIGHTGLASS_LIFE_NUMBER").parse().unwrap();
+    let mut of_seed = Dice::new(seed);
+    let life = Life {
+        dice: Dice::new(seed << 8 | number),
+        is_last: said("SIGHTGLASS_LAST") == "1",
+        clock_is_set: of_seed.chance(0.3),
+        facts: Facts::read(&folder.join("facts")),
+        name: format!("s{seed}l{number}"),
+        folder,
+    };
+    say("life", &life.name);
+    let base = Timestamp::from_second(said("SIGHTGLASS_BASE").parse().unwrap()).unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build().unwrap();
+    runtime.block_on(life.live(base));
+    say("ended", "");
+    ExitCode::SUCCESS
+}
+
+impl Life {
+    fn history(&self) -> PathBuf {
+        self.folder.join("state/sightglass/tank.duckdb")
+    }
+
+    async fn live(mut self, base: Timestamp) {
+        let def =
+            profile::load(&self.folder.join("tank.toml"), &Search::shipped()).unwrap_or_else(|why| panic!("{why}"));
+        let set_by: &'static AtomicI64 = Box::leak(Box::default());
+        let clock = Clock::simulated(base, set_by);
+        let simulator = SimulatorHandle::spawn_for(&def, Simulator::new(&def).unwrap(), clock);
+        let trouble = if self.is_last { 0.0 } else { [0.0, 0.02, 0.2][self.dice.below(3) as usize] };
+        let connectors = connectors(&def, &simulator, trouble, &mut self.dice);
+        let options = station::io::Options { def: def.clone(), clock, history: self.history(), connectors, file: None };
+        let station = match station::io::start(options) {
+            Ok(station) => station,
+            Err(why) => return wrong(format!("starts: {why}")),
+        };
+        let session = station.session("anna");
+        let operator = tokio::spawn(operate(session.clone(), def.clone(), self.name.clone(), self.dice, self.is_last));
+        let lasts = SETTLED + self.dice.millis(if self.is_last { 20_000 } else { 60_000 });
+        let mut watch = Watch::new(&def, session.clone(), simulator.clone(), clock);
+        watch.until(SETTLED).await;
+        self.compare(&session, &def, base).await;
+        if self.clock_is_set && !self.is_last && self.dice.chance(0.5) {
+            let step = self.dice.below(7_200) as i64 - 3_600;
+            set_by.store(step * 1_000_000, Ordering::Relaxed);
+        }
+        watch.until(lasts).await;
+        self.count(&session, clock).await;
+        watch.until(lasts + Duration::from_secs(5)).await;
+        operator.abort();
+        say("compared", watch.compared);
+        if !self.is_last && self.dice.chance(0.6) {
+            // As a kill between two operations on the disk.
+            let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::KILL);
+        }
+        let last = session.snapshots.borrow().clone();
+        drop((session, watch));
+        self.end(station, &last, &def).await;
+    }
+
+    /// What lives before this one have said.
+    async fn compare(&self, session: &Session, def: &Arc<PlantDef>, base: Timestamp) {
+        let snapshot = session.snapshots.borrow().clone();
+        let listed: Vec<String> = snapshot.alarms.iter().map(|alarm| name_of(def, alarm.id)).collect();
+        if snapshot.history.failing.is_none() && snapshot.station.is_empty() {
+            for alarm in self.facts.unacknowledged.iter().filter(|alarm| !listed.contains(alarm)) {
+                wrong(format!("alarms: {alarm} was not acknowledged, and is not listed; listed are {listed:?}"));
+            }
+        }
+        if self.clock_is_set || snapshot.history.damaged.is_some() {
+            return;
+        }
+        let hour = base.as_second() / 3600 * 3600;
+        for from in [hour - 3600, hour - 7200] {
+            let [from, to] = [from, from + 3600].map(|second| Timestamp::from_second(second).unwrap());
+            if let Some(Answer::Report(report)) = ask(session, Query::Report { period: Period::free(from, to) }).await {
+                let figures = report::render(FORMATS[0], &report, def, &Style::of(def)).unwrap();
+                let figures = String::from_utf8(figures).unwrap().replace("\r\n", " / ");
+                match self.facts.figures.get(&from) {
+                    Some(before) if *before != figures => wrong(format!("figures: of {from}: {before} now {figures}")),
+                    Some(_) => {}
+                    None => say("figures", format!("{from} {figures}")),
+                }
+            }
+        }
+    }
+
+    /// How much is stored now.
+    async fn count(&self, session: &Session, clock: Clock) {
+        if self.clock_is_set {
+            return;
+        }
+        let until = clock.utc() - LAST;
+        if let Some(count) = samples(session, until).await {
+            say("stored", format!("{until} {count}"));
+        }
+    }
+
+    async fn end(&self, station: Station, last: &Snapshot, def: &Arc<PlantDef>) {
+        if tokio::time::timeout(STOP_MAX, station.stop()).await.is_err() {
+            return wrong("stops: not within 30 s");
+        }
+        if !self.is_last {
+            return;
+        }
+        if let Some(why) = &last.history.failing {
+            wrong(format!("history: {why}"));
+        }
+        let bad: Vec<_> = def.tags.iter().filter(|tag| last.samples[tag.id.index()].value.is_none()).collect();
+        let polled: Vec<_> = bad.iter().filter(|tag| matches!(tag.poll, Poll::Every(_))).map(|tag| &tag.name).collect();
+        if !polled.is_empty() {
+            wrong(format!("lines: nothing misbehaves, and there is no value of {polled:?}"));
+        }
+        self.audit(last.history.damaged.is_some(), def);
+    }
+
+    /// The log is whole, has everything that was acknowledged, and the history has the same, each once.
+    fn audit(&self, is_damaged: bool, def: &Arc<PlantDef>) {
+        let store = match Store::open_read_only(&self.history(), def) {
+            Ok(store) => store,
+            Err(why) => return wrong(format!("history: {why}")),
+        };
+        let rows = store.chain_hashes().unwrap();
+        let path = audit_log::beside(&self.history());
+        if let Err(why) = audit_log::verify(&path, if is_damaged { &[] } else { &rows }) {
+            wrong(format!("audit: {why}"));
+        }
+        let log = notes(std::fs::read_to_string(&path).unwrap().lines().filter_map(note_of));
+        for note in self.facts.acknowledged.iter().filter(|note| !log.contains_key(*note)) {
+            wrong(format!("audit: {note} was shown as recorded, and is not in the log"));
+        }
+        let all = Query::Actions { from: Timestamp::UNIX_EPOCH, to: Timestamp::MAX, limit: 1_000_000 };
+        let Ok(Answer::Actions(actions)) = store.answer(&all, Timestamp::now()) else {
+            return wrong("history: no actions");
+        };
+        let stored = notes(actions.iter().filter_map(|action| action.note.as_deref().map(str::to_owned)));
+        let differ = |(note, count): &(&String, &u32)| log.get(*note) != Some(count);
+        let more: Vec<_> = stored.iter().filter(differ).collect();
+        let less: Vec<_> = log.keys().filter(|note| !stored.contains_key(*note)).collect();
+        if !(more.is_empty() && less.is_empty()) {
+            wrong(format!("history: actions differ from the log: too often {more:?}, missing {less:?}"));
+        }
+        for (until, count) in self.facts.stored.iter().filter(|_| !is_damaged) {
+            let query = Query::Samples { from: Timestamp::UNIX_EPOCH, to: *until };
+            let Ok(Answer::Samples(samples)) = store.answer(&query, Timestamp::now()) else {
+                return wrong("history: no samples");
+            };
+            if samples.len() < *count {
+                wrong(format!("samples: {} before {until}, there were {count}", samples.len()));
+            }
+        }
+    }
+}
+
+fn name_of(def: &PlantDef, alarm: AlarmId) -> String {
+    let def = def.alarm(alarm);
+    format!("{:?} {:?}", def.subject, def.condition).replace(',', ";")
+}
+
+fn note_of(line: &str) -> Option<String> {
+    let entry: serde_json::Value = serde_json::from_str(line).ok()?;
+    let is_request = entry["action"].as_str()?.ends_with(" requested");
+    entry["note"].as_str().filter(|_| !is_request).map(str::to_owned)
+}
+
+fn notes(all: impl Iterator<Item = String>) -> BTreeMap<String, u32> {
+    let mut counted = BTreeMap::new();
+    all.for_each(|note| *counted.entry(note).or_default() += 1);
+    counted
+}
+
+async fn ask(session: &Session, query: Query) -> Option<Answer> {
+    let (reply, answer) = oneshot::channel();
+    session.ask(QueryRequest { query, reply }).ok()?;
+    answer.await.ok()?.ok()
+}
+
+async fn samples(session: &Session, until: Timestamp) -> Option<usize> {
+    match ask(session, Query::Samples { from: Timestamp::UNIX_EPOCH, to: until }).await? {
+        Answer::Samples(samples) => Some(samples.len()),
+        _ => None,
+    }
+}
+
+/// Looks at every snapshot as an operator does, who knows what is true.
+struct Watch {
+    def: Arc<PlantDef>,
+    session: Session,
+    simulator: SimulatorHandle,
+    clock: Clock,
+    began: Timestamp,
+    /// What was true, oldest first.
+    truth: VecDeque<(Timestamp, BTreeMap<TagId, f64>)>,
+    unacknowledged: Vec<String>,
+    recorded: Vec<CommandId>,
+    /// Good values that were compared with what was true.
+    compared: u64,
+}
+
+impl Watch {
+    fn new(def: &Arc<PlantDef>, session: Session, simulator: SimulatorHandle, clock: Clock) -> Watch {
+        let (def, began) = (def.clone(), clock.now());
+        let (truth, unacknowledged, recorded) = (VecDeque::new(), Vec::new(), Vec::new());
+        Watch { def, session, simulator, clock, began, truth, unacknowledged, recorded, compared: 0 }
+    }
+
+    async fn until(&mut self, passed: Duration) {
+        let end = self.began + SignedDuration::try_from(passed).unwrap();
+        while self.clock.now() < end {
+            tokio::select! {
+                biased;
+                changed = self.session.snapshots.changed() => if changed.is_err() {
+                    return wrong("station: it has ended by itself");
+                },
+                () = self.clock.sleep(Duration::from_millis(200)) => {}
+            }
+            let Some(report) = self.simulator.report().await else { return };
+            self.truth.push_back((self.clock.now(), report.actual));
+            while self.truth.front().is_some_and(|(at, _)| *at < self.clock.now() - SignedDuration::from_secs(30)) {
+                self.truth.pop_front();
+            }
+            let snapshot = self.session.snapshots.borrow_and_update().clone();
+            self.look(&snapshot);
+        }
+    }
+
+    fn look(&mut self, snapshot: &Snapshot) {
+        for (tag, sample) in self.def.tags.iter().zip(&snapshot.samples) {
+            if sample.quality != Quality::Good {
+                continue;
+            }
+            self.compared += 1;
+            if self.is_wrong(tag.id, sample, snapshot.decimals[tag.id.index()]) {
+                wrong(format!("values: {} is shown as {:?} and good, read at {}", tag.name, sample.value, sample.at));
+            }
+        }
+        for status in snapshot.commands.iter().filter(|status| status.outcome.is_success() && status.recorded) {
+            if !self.recorded.contains(&status.command.id) {
+                self.recorded.push(status.command.id);
+                if let Some(note) = &status.command.note {
+                    say("recorded", note);
+                }
+            }
+        }
+        let old = snapshot.at - SignedDuration::from_secs(5);
+        let waits = |state| matches!(state, AlarmState::Unacknowledged | AlarmState::ReturnedToNormal);
+        let is_kept = !snapshot.station.contains_key(&StationFault::AlarmState);
+        let waiting =
+            snapshot.alarms.iter().filter(|alarm| is_kept && waits(alarm.state) && alarm.annunciated_at < old);
+        let waiting: Vec<String> = waiting.map(|alarm| name_of(&self.def, alarm.id)).collect();
+        if waiting != self.unacknowledged {
+            say("unacknowledged", waiting.join(","));
+            self.unacknowledged = waiting;
+        }
+    }
+
+    fn is_wrong(&self, tag: TagId, sample: &Sample, decimals: u8) -> bool {
+        let Some(value) = sample.value else { return true };
+        let then = |at: Timestamp| sample.at - BEFORE <= at && at <= sample.at + AFTER;
+        let of_then = self.truth.iter().filter(|(at, _)| then(*at)).filter_map(|(_, truth)| truth.get(&tag));
+        let (low, high) = of_then.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(*value), high.max(*value)));
+        let grain = 10f64.powi(-i32::from(decimals)) * 1.5;
+        low <= high && !(low - grain..=high + grain).contains(&value)
+    }
+}
+
+/// What an operator does until the station ends.
+async fn operate(session: Session, def: Arc<PlantDef>, name: String, mut dice: Dice, is_last: bool) {
+    let setpoint = def.tag_named("TIC-1.SV").unwrap();
+    tokio::time::sleep(SETTLED).await;
+    for number in 1.. {
+        tokio::time::sleep(dice.millis(if is_last { 4_000 } else { 6_000 })).await;
+        let snapshot = session.snapshots.borrow().clone();
+        let some = |dice: &mut Dice| def.alarms[dice.below(def.alarms.len() as u64) as usize].id;
+        let all: Arc<[_]> = snapshot.alarms.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
+        let alarm = match dice.below(if is_last { 4 } else { 16 }) {
+            0..4 => {
+                let value = (40 + dice.below(40)) as f64;
+                send(&session, number, &name, CommandKind::Write { tag: setpoint, value: value.into() });
+                continue;
+            }
+            4..6 => AlarmCommand::AcknowledgeAll { alarms: all },
+            6 => AlarmCommand::Silence,
+            7 => AlarmCommand::Shelve { alarms: [some(&mut dice)].into(), lasts: Duration::from_secs(600) },
+            8 => AlarmCommand::Unshelve(some(&mut dice)),
+            9 => {
+                send(&session, number, &name, CommandKind::HandOver);
+                continue;
+            }
+            10 => {
+                send(&session, number, &name, CommandKind::Refresh(def.devices[0].id));
+                continue;
+            }
+            11 => {
+                send(&session, number, &name, CommandKind::Connect(def.lines[0].id, dice.chance(0.7)));
+                continue;
+            }
+            12 => {
+                let to = snapshot.at;
+                let from = to - SignedDuration::from_secs(3600);
+                let tags = def.tags.iter().take(8).map(|tag| tag.id).collect();
+                let _ = ask(&session, Query::Series { tags, from, to, buckets: 100 }).await;
+                continue;
+            }
+            _ => continue,
+        };
+        if !matches!(alarm, AlarmCommand::Silence) {
+            // Whether it is done may not be known when the station ends.
+            say("unacknowledged", "");
+        }
+        send(&session, number, &name, CommandKind::Alarm(alarm));
+    }
+}
+
+fn send(session: &Session, number: u32, name: &str, kind: CommandKind) {
+    let id = CommandId { terminal: session.terminal, number };
+    let snapshot = session.snapshots.borrow().clone();
+    // A read is no action, and stands in no log.
+    let note = (!matches!(kind, CommandKind::Refresh(_))).then(|| format!("{name}n{number}").into());
+    let command = Command { note, ..Command::on(&snapshot, id, kind) };
+    // A station that is too busy refuses it.
+    let _ = session.send(Request::Command(command, None));
+}
