@@ -1,5 +1,7 @@
 //! What a message of DuckDB or of the system means. No other module compares its words.
 
+use std::path::Path;
+
 use super::HistoryError;
 
 /// What a message says is wrong.
@@ -80,6 +82,16 @@ pub(super) fn is_obstacle(message: &str) -> bool {
 /// Whether a message of damage is certainly about the database, not about its log.
 pub(super) fn is_of_database(message: &str) -> bool {
     message.contains("Corrupt database file") && !message.contains("WAL")
+}
+
+/// Which log of a database is damaged, and how many bytes come before the entry that cannot be read.
+pub(super) fn damaged_log_entry(message: &str) -> Option<(&Path, u64)> {
+    let (_, named) = message.split_once("replaying WAL file \"")?;
+    let (log, rest) = named.split_once("\":")?;
+    let (_, rest) = rest.split_once("entry at byte position ")?;
+    let position: u64 = rest.split(' ').next()?.parse().ok()?;
+    // It is that of the content: size and checksum come before.
+    Some((Path::new(log), position.checked_sub(16)?))
 }
 
 impl HistoryError {

@@ -10,7 +10,7 @@ use jiff::Timestamp;
 pub struct Facts {
     /// Notes of actions that were shown as recorded.
     pub acknowledged: Vec<String>,
-    /// Alarms that were unacknowledged for some seconds, by name; of the last life only, and none that somebody worked on.
+    /// Alarms that were unacknowledged for some seconds, by name; of the last life only, and none that an operator worked on.
     pub unacknowledged: Vec<String>,
     /// How many samples were stored before an instant.
     pub stored: Vec<(Timestamp, usize)>,

@@ -51,6 +51,8 @@ pub mod last;
 pub mod interrupt;
 pub mod store;
 pub mod open;
+mod blocks;
+mod mend;
 pub mod probe;
 mod room;
 pub mod read;

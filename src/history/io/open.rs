@@ -7,19 +7,17 @@ use jiff::Timestamp;
 
 use super::{
     alarm_metrics::Recent,
-    compact,
-    files::{self, Failure, Opening, SetAside},
-    last::{self, LastCommit, Noted},
-    probe::{self, Probe, Proven},
+    compact, disk,
+    files::{self, Failure, Opening},
+    last::{self, Noted},
+    mend::{mend, missing, said_of},
+    probe,
     read::action,
     restore, room, sql,
     store::{Store, after, engine},
 };
 use crate::{
-    history::{
-        HistoryError, engine_error,
-        words::{joined, plain},
-    },
+    history::{HistoryError, words::joined},
     plant::{
         batch::BatchRecord,
         control_run::ControlRun,
@@ -90,7 +88,7 @@ impl Store {
     /// Does to the files what may end the process at a start: replays the log, writes it into the file, reads, adds a row.
     pub(super) fn try_out(path: &Path, now: Timestamp) -> Result<(), HistoryError> {
         let store = Store::around(connect(path, AccessMode::ReadWrite).map_err(engine)?, path, &Arc::default());
-        store.migrate().map_err(engine)?;
+        store.migrate()?;
         store.checkpoint()?;
         store.adopt_tags(now)?;
         store.adopt_files()?;
@@ -143,8 +141,9 @@ impl Store {
         let fresh = files::size(path) == 0 || (noted == Noted::Nothing && files::is_unfinished(path));
         if fresh {
             files::remove(path);
+            Store::create(path)?;
         }
-        let (mut trouble, mut repaired) = (None, None);
+        let mut trouble = None;
         let mut report = |proven| trouble = Some(said_of(proven));
         if 0 < opening.failed && !fresh {
             let examined = probe::examine(path, now, &probe::in_child);
@@ -160,23 +159,7 @@ impl Store {
             let read = read(&store).map_err(|error| failure(path, error))?;
             Ok((store, archive, read))
         };
-        let mut opened = try_open();
-        for part in [SetAside::Log, SetAside::Everything] {
-            let Err(Failure::Damaged(why)) = &opened else { break };
-            if part == SetAside::Log && (!files::has_log(path) || engine_error::is_of_database(why)) {
-                continue;
-            }
-            match probe::in_child(path) {
-                Probe::Obstacle(error) => return Err(error),
-                // What the engine has stumbled over is gone, or the log had what could not be read.
-                Probe::Sound => (repaired, opened) = (Some(unread_at_first(why)), try_open()),
-                Probe::Untried(_) | Probe::Damaged(_) => {}
-            }
-            if let Err(Failure::Damaged(why)) = &opened {
-                report(Proven { part, why: why.clone(), target: files::set_aside(path, part, now)? });
-                opened = try_open();
-            }
-        }
+        let (opened, repaired) = mend(path, now, &noted, &try_open, &mut report)?;
         let (store, archive, read) = opened.map_err(|failure| {
             if fresh {
                 files::remove(path);
@@ -231,12 +214,27 @@ impl Store {
         Ok(store)
     }
 
+    /// Creates an empty store, complete under its name or not there at all.
+    fn create(path: &Path) -> Result<(), HistoryError> {
+        let new = with_suffix(path, ".new");
+        let created = || {
+            files::remove(&new);
+            let store = Store::around(connect(&new, AccessMode::ReadWrite).map_err(engine)?, &new, &Arc::default());
+            store.migrate()?;
+            drop(store);
+            disk::rename(&new, path).map_err(|error| HistoryError::Engine(format!("{}: {error}", path.display())))
+        };
+        created().inspect_err(|_| files::remove(&new))
+    }
+
     /// Opens the file and compares it with its archive; with what is wrong with that, in words.
     fn open_file(path: &Path, def: &Arc<PlantDef>, now: Timestamp) -> Result<(Store, Option<String>), Failure> {
         let failed = |error: duckdb::Error| files::diagnose(path, &error.to_string());
         let db = connect(path, AccessMode::ReadWrite).map_err(failed)?;
+        // The engine makes none by itself: each is prepared for, see `blocks`.
+        db.execute_batch("SET checkpoint_threshold = '1TB'").map_err(failed)?;
         let mut store = Store::around(db, path, def);
-        store.migrate().map_err(failed)?;
+        store.migrate().map_err(|error| failure(path, error))?;
         let version = store.version().map_err(failed)?;
         if sql::MIGRATIONS.len() < version as usize {
             return Err(Failure::Obstacle(other_schema(path, version)));
@@ -255,15 +253,20 @@ impl Store {
         if self.ids.contains(&None) { Err(HistoryError::Engine(words.into())) } else { Ok(()) }
     }
 
-    fn migrate(&self) -> duckdb::Result<()> {
-        self.db.execute_batch(sql::CREATE_VERSION)?;
-        let done = self.version()? as usize;
+    fn migrate(&self) -> Result<(), HistoryError> {
+        self.db.execute_batch(sql::CREATE_VERSION).map_err(engine)?;
+        let done = self.version().map_err(engine)? as usize;
+        // Of a file that is being created nothing is kept.
+        let bare = || self.db.execute_batch("CHECKPOINT").map_err(engine);
+        let checkpoint = || if done == 0 { bare() } else { self.checkpoint() };
         for (number, migration) in sql::MIGRATIONS.iter().enumerate().skip(done) {
             // What a station left in the log goes into the file first, see `sql::MIGRATIONS`.
-            self.db.execute_batch("CHECKPOINT; BEGIN")?;
-            self.db.execute_batch(migration)?;
-            self.db.execute(sql::SET_VERSION, params![to_u32(number) + 1])?;
-            self.db.execute_batch("COMMIT; CHECKPOINT")?;
+            checkpoint()?;
+            self.db.execute_batch("BEGIN").map_err(engine)?;
+            self.db.execute_batch(migration).map_err(engine)?;
+            self.db.execute(sql::SET_VERSION, params![to_u32(number) + 1]).map_err(engine)?;
+            self.db.execute_batch("COMMIT").map_err(engine)?;
+            checkpoint()?;
         }
         Ok(())
     }
@@ -316,30 +319,6 @@ fn failure(path: &Path, error: HistoryError) -> Failure {
     match error {
         HistoryError::Engine(words) => files::diagnose(path, &words),
         other => Failure::Obstacle(other),
-    }
-}
-
-/// What an operator reads of damage that was gone at the second try.
-fn unread_at_first(why: &str) -> String {
-    format!("a part of the history could not be read at first ({})", plain(why))
-}
-
-/// What an operator reads of what was set aside.
-fn said_of(Proven { part, why, target }: Proven) -> String {
-    tracing::error!(why, ?part, "the history is damaged");
-    let what = match part {
-        SetAside::Log => "the last minutes of the history are",
-        SetAside::Everything => "the history is",
-    };
-    format!("{what} damaged ({}) and set aside as {}", plain(&why), target.display())
-}
-
-/// What is missing; a file that was set aside itself is not said to be missing as well.
-fn missing(noted: &Noted, open: &LastCommit, set_aside: bool) -> Option<String> {
-    match noted {
-        Noted::Commit(noted) if set_aside && noted.identity != open.identity => None,
-        Noted::Unreadable if set_aside => None,
-        Noted::Nothing | Noted::Unreadable | Noted::Commit(_) => last::missing(noted, open),
     }
 }
 

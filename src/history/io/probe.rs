@@ -18,6 +18,7 @@ use rustix::{
 };
 
 use super::{
+    blocks,
     files::{self, Failure, SetAside},
     room,
     store::Store,
@@ -71,6 +72,10 @@ pub fn examine(db: &Path, now: Timestamp, probe: &dyn Fn(&Path) -> Probe) -> Res
         Ok(Some(Proven { part: SetAside::Everything, why, target }))
     };
     let Some(why) = failing(db, probe)? else { return Ok(None) };
+    // The opening meets the same, and may mend it.
+    if engine_error::damaged_log_entry(&why).is_some() || engine_error::is_of_database(&why) && blocks::are_kept(db) {
+        return Ok(None);
+    }
     if !files::has_log(db) {
         return everything(why);
     }

@@ -15,6 +15,7 @@ use duckdb::{
 use jiff::Timestamp;
 
 use super::{
+    blocks::{self, Blocks},
     disk, files,
     interrupt::{Interrupt, Open},
     last::{self, LastCommit},
@@ -63,6 +64,7 @@ pub struct Store {
     pub(super) changed: Cell<bool>,
     /// Shared with every clone, and dropped after their connections: while one is left, the file is not closed.
     alive: Arc<()>,
+    blocks: Arc<Blocks>,
 }
 
 impl Store {
@@ -79,6 +81,7 @@ impl Store {
             ended: self.ended,
             piece: self.piece,
             alive: Arc::clone(&self.alive),
+            blocks: Arc::clone(&self.blocks),
             ..Store::around(db, &self.path, &self.def)
         })
     }
@@ -138,7 +141,18 @@ impl Store {
     /// Writes the log into the file.
     pub fn checkpoint(&self) -> Result<(), HistoryError> {
         room::check()?;
-        self.db.execute_batch("CHECKPOINT").map_err(engine)
+        if let Err(error) = self.keep_blocks() {
+            // The log would grow otherwise, and power is rarely lost in the next milliseconds.
+            tracing::warn!(?error, "a loss of power during this checkpoint would damage the history");
+        }
+        self.db.execute_batch("CHECKPOINT").map_err(engine)?;
+        blocks::forget(&self.path);
+        Ok(())
+    }
+
+    /// What the next checkpoint overwrites.
+    pub(super) fn keep_blocks(&self) -> Result<(), HistoryError> {
+        self.blocks.keep(&self.db, &self.path)
     }
 
     /// Bytes on disk.
@@ -173,6 +187,7 @@ impl Store {
             avoided: RefCell::default(),
             changed: Cell::default(),
             alive: Arc::default(),
+            blocks: Arc::default(),
         }
     }
 

@@ -27,6 +27,8 @@ use crate::{
 pub const PENDING_MAX: usize = 200_000;
 /// Commits between two checkpoints: five minutes of one a second.
 const CHECKPOINT_EVERY: u32 = 300;
+/// A longer log is written into the file at the next commit.
+const LOG_MAX: u64 = 4 << 20;
 /// A clock that is behind the last record by more than this has been set back or lost its time. The end of the curves
 /// of a dead station alone may lie a second ahead.
 const CLOCK_STEP: Duration = Duration::from_secs(5);
@@ -215,7 +217,7 @@ impl Writer {
         self.failing = None;
         // A log that was removed by hand would take its commits with it: they go into the file at once.
         let no_log = rows > 0 && !files::has_log(&self.path);
-        if no_log || self.commits >= CHECKPOINT_EVERY {
+        if no_log || self.commits >= CHECKPOINT_EVERY || LOG_MAX < files::log_size(&self.path) {
             self.checkpoint();
         }
     }

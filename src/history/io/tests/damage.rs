@@ -229,7 +229,7 @@ pub(in super::super) fn probe_command(db: &Path) -> Command {
 }
 
 /// A child commits a few seconds of records and dies without closing anything.
-fn die_after_writing(db: &Path) {
+pub(super) fn die_after_writing(db: &Path) {
     assert!(!child("write and die", db).wait().unwrap().success());
 }
 

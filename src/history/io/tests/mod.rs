@@ -16,6 +16,7 @@ mod flips;
 mod import;
 mod alarm_metrics;
 mod pieces;
+mod power;
 mod procedures;
 mod reading;
 mod redefine;
@@ -132,7 +133,7 @@ fn the_engine_is_the_one_that_was_vetted_and_set_as_decided() {
         ("autoload_known_extensions", "false"),
         ("disabled_compression_methods", "bitpacking"),
         ("max_temp_directory_size", "488.2 MiB"),
-        ("checkpoint_threshold", "3.8 MiB"),
+        ("checkpoint_threshold", "931.3 GiB"),
     ] {
         assert_eq!(setting(&store, name).to_lowercase(), expect.to_lowercase(), "{name}");
     }
