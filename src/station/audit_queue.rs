@@ -17,7 +17,7 @@ use crate::{
         Completion, Durability,
         io::recorder::{Handle, Message, Recorded, WriteGroup},
     },
-    history::alarm_state::LatestEvents,
+    history::{alarm_state::LatestEvents, io::chain::StoredEntries},
     plant::{
         Snapshot,
         record::{ActionRecord, AlarmRecord, ChainHash},
@@ -203,8 +203,8 @@ impl AuditQueue {
     }
 
     /// The history is open and holds these entries of the audit log.
-    pub fn compare(&self, chain_hashes: Vec<ChainHash>) {
-        if self.queue.try_send(Message::Stored(chain_hashes)).is_err() {
+    pub fn compare(&self, entries: StoredEntries) {
+        if self.queue.try_send(Message::Stored(entries)).is_err() {
             tracing::warn!("the audit log is not compared with the history until the next start: its queue is full");
         }
     }

@@ -84,7 +84,7 @@ mod tests {
     fn a_late_restore_changes_no_newer_alarm() {
         let before = vec![event(1, "high", AlarmEvent::Raised), event(2, "low", AlarmEvent::Raised)];
         let recent = Recent { events: before.clone(), ..Recent::default() };
-        let restored = Restored { events: before.clone(), recent, chain_hashes: None, ..Restored::default() };
+        let restored = Restored { events: before.clone(), recent, entries: None, ..Restored::default() };
         let now = event(9, "low", AlarmEvent::ReturnedToNormal);
         for from_journal in [true, false] {
             let mut past = Past::new(None, from_journal);

@@ -237,7 +237,7 @@ impl PlantTask {
     fn restore_history(&mut self, restored: Restored) {
         let Some(past) = self.persistence.past.take() else { return };
         let at_start = past.at_start;
-        let Restored { events, recent, chain_hashes, batches, mut runs, procedure, totals, off } = past.join(restored);
+        let Restored { events, recent, entries, batches, mut runs, procedure, totals, off } = past.join(restored);
         let behind = self.clock.behind_utc();
         let off = off.map(|off| off.checked_sub(behind).unwrap_or(off));
         runs.iter_mut().for_each(|run| run.move_from_utc(behind));
@@ -247,8 +247,8 @@ impl PlantTask {
         let mut interrupted = self.plant.restore_runs(&runs);
         interrupted.extend(self.plant.restore_procedures(procedure.as_ref()));
         self.dispatch(interrupted);
-        if let (Some(chain_hashes), Some(audit)) = (chain_hashes, &mut self.persistence.audit) {
-            audit.compare(chain_hashes);
+        if let (Some(entries), Some(audit)) = (entries, &mut self.persistence.audit) {
+            audit.compare(entries);
         }
         if !events.is_empty() {
             tracing::info!(events = events.len(), "the alarm state is restored from the journal");

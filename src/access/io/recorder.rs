@@ -29,7 +29,7 @@ use crate::{
     history::{
         io::{
             alarm_file::{self, AlarmFile, RestoredAlarms},
-            chain::CHAIN_HASHES_MAX,
+            chain::{CHAIN_HASHES_MAX, StoredEntries},
             thread::{HistoryInput, offer},
         },
         words::plain,
@@ -64,8 +64,9 @@ pub struct WriteGroup {
 pub enum Message {
     /// To be written.
     WriteGroup(WriteGroup),
-    /// The history is open, and holds these entries: what it lacks of the log is sent to it.
-    Stored(Vec<ChainHash>),
+    /// The history is open, and holds these entries: what it lacks of the log is sent to it, and what the log lacks is
+    /// appended.
+    Stored(StoredEntries),
 }
 
 /// How it stands.
@@ -188,7 +189,7 @@ impl Recorder {
             }
             messages.drain(..).for_each(|message| match message {
                 Message::WriteGroup(group) => self.on_group(group),
-                Message::Stored(rows) => self.compare(&rows),
+                Message::Stored(entries) => self.compare(entries),
             });
             self.write();
             status.send_replace(self.status());
@@ -220,9 +221,9 @@ impl Recorder {
 
     /// Compares the history with the log as both were at the start, and sends it what it lacks: a station that was killed
     /// had written it here first.
-    fn compare(&mut self, rows: &[ChainHash]) {
+    fn compare(&mut self, StoredEntries { chain_hashes: rows, unchained }: StoredEntries) {
         let tail = std::mem::take(&mut self.tail);
-        let Comparison { missing, differing, not_in_log } = compare(&tail, self.last_at_start, rows, CHAIN_HASHES_MAX);
+        let Comparison { missing, differing, not_in_log } = compare(&tail, self.last_at_start, &rows, CHAIN_HASHES_MAX);
         let mut wrong = Vec::new();
         if let Some(first) = differing.first() {
             wrong.push(format!("{} entries differ from the history, the first is {first}", differing.len()));
@@ -231,8 +232,13 @@ impl Recorder {
             wrong.push(format!("it lacks {} entries that the history holds, from {first} on", not_in_log.len()));
         }
         let completed = (!missing.is_empty()).then(|| format!("{} entries were missing in the history", missing.len()));
-        let notes: Vec<ActionRecord> = wrong.iter().chain(&completed).map(|words| self.note(words)).collect();
-        self.pending.extend(notes.into_iter().map(|action| Pending { action, stored: false }));
+        // It was killed while the log could not be written.
+        let is_in_log = |action: &ActionRecord| tail.iter().any(|entry| is_same(entry, action));
+        let lacking: Vec<_> = unchained.into_iter().map(fit).filter(|action| !is_in_log(action)).collect();
+        let appended = (!lacking.is_empty()).then(|| format!("{} actions were in the history only", lacking.len()));
+        let notes: Vec<_> = wrong.iter().chain(&completed).chain(&appended).map(|words| self.note(words)).collect();
+        let lacking = lacking.into_iter().map(|action| Pending { action, stored: true });
+        self.pending.extend(lacking.chain(notes.into_iter().map(|action| Pending { action, stored: false })));
         self.found.extend(wrong.iter().map(|words| format!("the audit log does not agree with the history: {words}")));
         self.store(missing);
     }
@@ -284,10 +290,7 @@ impl Recorder {
     fn drop_written(&mut self, opened: &Opened) {
         let (mut pending, mut written) = (std::mem::take(&mut self.pending), Vec::new());
         pending.retain(|Pending { action, .. }| {
-            let is_equal = |entry: &ActionRecord| ActionRecord { chain_hash: None, ..entry.clone() } == *action;
-            // The time first: there may be thousands of both.
-            let same = |entry: &&ActionRecord| entry.at == action.at && is_equal(entry);
-            let found = opened.tail.iter().rev().find(same);
+            let found = opened.tail.iter().rev().find(|entry| is_same(entry, action));
             written.extend(found.cloned());
             found.is_none()
         });
@@ -378,6 +381,11 @@ impl Recorder {
             alarms: all(alarms, self.alarms_found.as_slice()),
         }
     }
+}
+
+/// Whether an entry of the log is this action. The time first: there may be thousands of both.
+fn is_same(entry: &ActionRecord, action: &ActionRecord) -> bool {
+    entry.at == action.at && ActionRecord { chain_hash: None, ..entry.clone() } == *action
 }
 
 #[cfg(test)]

@@ -4,7 +4,11 @@ use std::collections::HashSet;
 
 use duckdb::params;
 
-use super::store::{Store, engine, utc};
+use super::{
+    read::action,
+    sql,
+    store::{Store, engine, utc},
+};
 use crate::{
     history::HistoryError,
     plant::record::{ActionRecord, ChainHash},
@@ -16,6 +20,15 @@ pub const CHAIN_HASHES_MAX: usize = 5_000;
 /// The chain hashes of the latest entries, newest first.
 const CHAIN_HASHES: &str = "SELECT number, any_value(hash) FROM operator_action WHERE number IS NOT NULL
     GROUP BY number ORDER BY number DESC LIMIT ?";
+/// What a store holds of the audit log.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StoredEntries {
+    /// The chain hashes of the latest entries.
+    pub chain_hashes: Vec<ChainHash>,
+    /// Actions that the log had not when they were stored, oldest first: it could not be written.
+    pub unchained: Vec<ActionRecord>,
+}
+
 /// Is an action stored without its chain hash, because the audit log could not be written?
 const UNCHAINED: &str = "SELECT count(*) FROM (SELECT 1 FROM operator_action WHERE number IS NULL LIMIT 1)";
 /// The action that is about to be stored with its chain hash.
@@ -40,6 +53,13 @@ impl Store {
             Ok(ChainHash { number, hash: hash.try_into().unwrap_or_default() })
         };
         rows.map(chain_hash).collect()
+    }
+
+    /// What is compared with the audit log at a start.
+    pub(super) fn stored_entries(&self) -> Result<StoredEntries, HistoryError> {
+        let mut unchained = self.list(&sql::unchained(CHAIN_HASHES_MAX), &[], action)?;
+        unchained.reverse();
+        Ok(StoredEntries { chain_hashes: self.chain_hashes()?, unchained })
     }
 
     /// Makes room for actions that come with their chain hashes and were stored without before, or come without among these:

@@ -7,6 +7,7 @@ use jiff::Timestamp;
 
 use super::{
     alarm_metrics::Recent,
+    chain::StoredEntries,
     compact, disk,
     files::{self, Failure, Opening},
     last::{self, Noted},
@@ -23,7 +24,7 @@ use crate::{
         control_run::ControlRun,
         def::PlantDef,
         number::to_u32,
-        record::{ActionRecord, AlarmRecord, ChainHash},
+        record::{ActionRecord, AlarmRecord},
     },
     profile::io::atomic::with_suffix,
 };
@@ -45,8 +46,8 @@ pub struct Restored {
     pub events: Vec<AlarmRecord>,
     /// What the alarm monitor must know of the last day.
     pub recent: Recent,
-    /// The latest entries of the audit log that the store holds; `None` where they cannot be read.
-    pub chain_hashes: Option<Vec<ChainHash>>,
+    /// What the store holds of the audit log; `None` where that cannot be read.
+    pub entries: Option<StoredEntries>,
     /// The last record of the batches of each name.
     pub batches: Vec<BatchRecord>,
     /// The latest control run of each controller.
@@ -79,10 +80,10 @@ impl Store {
             }
             recent => recent?,
         };
-        let chain_hashes =
-            self.chain_hashes().inspect_err(|error| tracing::warn!(%error, "not compared with the audit log")).ok();
+        let entries =
+            self.stored_entries().inspect_err(|error| tracing::warn!(%error, "not compared with the audit log")).ok();
         let procedure = self.list(&sql::latest_procedure(), &[], action)?.pop();
-        Ok(Restored { events, recent, chain_hashes, procedure, ..self.restore_followed()? })
+        Ok(Restored { events, recent, entries, procedure, ..self.restore_followed()? })
     }
 
     /// Does to the files what may end the process at a start: replays the log, writes it into the file, reads, adds a row.

@@ -174,6 +174,11 @@ pub fn audit() -> String {
     )
 }
 
+/// The latest actions without a chain hash, newest first.
+pub fn unchained(limit: usize) -> String {
+    format!("SELECT {ACTION} FROM operator_action WHERE number IS NULL ORDER BY rowid DESC LIMIT {limit}")
+}
+
 /// The last start or end of a procedure; a refused start is none.
 pub fn latest_procedure() -> String {
     format!(

@@ -269,7 +269,7 @@ fn entries_about_the_log_itself_wait_for_the_disk_too() {
     recorder.tail = recorder.open().tail;
     assert!(recorder.is_written());
     recorder.audit_log.as_mut().unwrap().set_file(fs::File::open(beside(&history_file)).unwrap());
-    recorder.compare(&[]);
+    recorder.compare(StoredEntries::default());
     recorder.write();
     assert!(!recorder.is_written(), "it is tried again each second");
 }
@@ -292,20 +292,43 @@ fn acknowledgements_survive_without_a_history() {
     join.unwrap().join().unwrap();
 }
 
+/// What a start sends to a history that holds these entries, and what is wrong with the log then.
+fn compared(history_file: &Path, entries: StoredEntries) -> (Vec<ActionRecord>, Option<String>) {
+    let (history, mut stored_rows) = mpsc::channel(64);
+    let Handle { groups, recorded, join, .. } = start(history_file, clock(), history);
+    groups.try_send(Message::Stored(entries)).unwrap();
+    drop(groups);
+    join.unwrap().join().unwrap();
+    (stored(&mut stored_rows), recorded.borrow().log.clone())
+}
+
+/// What a station that was killed had written into the history while the log could not be written.
+#[test]
+fn the_log_is_completed_from_the_history() {
+    let folder = tempfile::tempdir().unwrap();
+    let history_file = folder.path().join("tank.duckdb");
+    let (rows, ..) = life(&history_file, &["start", "write"]);
+    let bare = |row: &ActionRecord| ActionRecord { chain_hash: None, ..row.clone() };
+    let only_there = ActionRecord { note: Some("by hand".into()), ..bare(&rows[1]) };
+    // The last entry was in the log, and the station killed before the history had its hash.
+    let unchained = vec![bare(&rows[1]), only_there.clone()];
+    let (sent, log) = compared(&history_file, StoredEntries { chain_hashes: chain_hashes(&rows[..1]), unchained });
+    assert_eq!(log, None, "nothing is wrong with the log");
+    assert_eq!(sent[0], rows[1], "it is in the log");
+    assert_eq!((bare(&sent[1]), sent[1].chain_hash.map(|hash| hash.number)), (only_there, Some(3)));
+    assert!(sent[2].outcome.contains("1 entries were missing in the history"), "{sent:?}");
+    assert!(sent[3].outcome.contains("1 actions were in the history only"), "{sent:?}");
+    let summary = verify(&beside(&history_file), &chain_hashes(&rows[..1])).unwrap();
+    assert_eq!((sent.len(), summary.entries), (4, 5));
+}
+
 /// What a station that was killed had written into the log and not into the history.
 #[test]
 fn the_history_is_completed_and_differences_are_reported() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("tank.duckdb");
     let (rows, ..) = life(&history_file, &["start", "write", "acknowledge"]);
-    let compared = |known: Vec<ChainHash>| {
-        let (history, mut stored_rows) = mpsc::channel(64);
-        let Handle { groups, recorded, join, .. } = start(&history_file, clock(), history);
-        groups.try_send(Message::Stored(known)).unwrap();
-        drop(groups);
-        join.unwrap().join().unwrap();
-        (stored(&mut stored_rows), recorded.borrow().log.clone())
-    };
+    let compared = |chain_hashes| compared(&history_file, StoredEntries { chain_hashes, unchained: Vec::new() });
     let (sent, log) = compared(chain_hashes(&rows[..1]));
     assert_eq!(sent[..2], rows[1..], "the very entries, with their chain hashes");
     assert!(sent.len() == 3 && sent[2].outcome.contains("2 entries were missing in the history"), "{sent:?}");
