@@ -51,6 +51,7 @@ pub fn minute(line: Arc<str>, before: &LineReport, after: &LineReport, at: Times
     let devices = devices(after, (!restarted).then_some(before));
     let ms = |span: Option<std::time::Duration>| span.map(|span| span.as_secs_f32() * 1e3);
     let sent_bytes = since(new.sent_bytes, old.sent_bytes);
+    let received_bytes = since(new.received_bytes, old.received_bytes);
     LineMinute {
         at,
         line,
@@ -63,9 +64,9 @@ pub fn minute(line: Arc<str>, before: &LineReport, after: &LineReport, at: Times
         late: since(new.late, old.late),
         missed: since(new.missed, old.missed),
         sent_bytes,
-        received_bytes: since(new.received_bytes, old.received_bytes),
+        received_bytes,
         // A line that is not connected reports nothing new: its last figure is not that of this minute.
-        utilisation: if sent_bytes == 0 { 0.0 } else { new.utilisation_minute },
+        utilisation: if sent_bytes + received_bytes == 0 { 0.0 } else { new.utilisation_minute },
         reply_p99_ms: ms(devices.response_time.p99()),
         reply_max_ms: ms(devices.response_time.max()),
     }
@@ -226,5 +227,17 @@ mod tests {
         assert_eq!(lately(&watch, &bad), 50, "not yet twice ten minutes");
         watch.tick(at(1_202), "L1", &bad);
         assert_eq!(lately(&watch, &bad), 0);
+    }
+
+    #[test]
+    fn a_line_that_only_listens_has_a_load() {
+        let heard = |requests: u64| {
+            let mut report = report(requests, 10, 0);
+            report.counters.sent_bytes = 0;
+            report
+        };
+        let minute = minute("L1".into(), &heard(100), &heard(160), at(120));
+        assert_eq!((minute.requests, minute.received_bytes), (60, 60 * 21));
+        assert_eq!(minute.utilisation, 0.6);
     }
 }

@@ -1,12 +1,14 @@
 //! The plant at a past instant.
 
+use std::collections::HashMap;
+
 use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
     read::{ROWS_MAX, alarm, line_minute},
     sql,
-    store::{Store, after, engine, instant, utc},
+    store::{Store, engine, instant, utc},
 };
 use crate::{
     history::{
@@ -93,22 +95,38 @@ impl Store {
     /// The last values of the tags that are totals, of those that have one in the last [`TOTALS_DAYS`]. A good one has a row
     /// an hour; but it may have had none in the runs of the station that came last.
     pub(super) fn last_totals(&self) -> Result<Vec<(String, f64)>, HistoryError> {
-        let Some((_, last)) = self.extent() else { return Ok(Vec::new()) };
-        let mut missing: Vec<TagId> = self.def.tags.iter().filter(|tag| tag.is_total()).map(|tag| tag.id).collect();
-        let (mut found, mut end) = (Vec::new(), after(last).unwrap_or(last));
+        let row = |row: &duckdb::Row| row.get::<_, Option<i64>>(0);
+        let last = self.db.query_row(sql::LAST_OF_EPOCH, [self.epoch()], row).map_err(engine)?;
+        let last = last.or_else(|| Some(self.extent()?.1.as_microsecond()));
+        let mut totals: Vec<(u16, &str)> = self
+            .def
+            .tags
+            .iter()
+            .filter(|tag| tag.is_total())
+            .filter_map(|tag| Some((self.id(tag.id)?, &*tag.name)))
+            .collect();
+        let mut found = Vec::new();
+        let Some(last) = last else { return Ok(found) };
         for hours in [2, 48, TOTALS_DAYS * 24] {
-            let begin = last.checked_sub(jiff::SignedDuration::from_hours(hours)).unwrap_or(Timestamp::MIN);
-            if missing.is_empty() {
+            if totals.is_empty() {
                 break;
             }
-            let mut values = vec![None; missing.len()];
-            self.each_sample(&missing, begin, end, |place, sample| values[place] = sample.value.or(values[place]))?;
-            let of_each = missing.iter().zip(values);
-            found.extend(of_each.filter_map(|(tag, value)| Some((*tag, value?))));
-            missing.retain(|tag| found.iter().all(|(known, _)| known != tag));
-            end = begin;
+            // What lies ahead was stored before the clock was set back.
+            let span = last.saturating_sub(hours * HOUR)..i64::MAX;
+            let files = self.files(Some((Tier::Raw, span.clone())))?;
+            let files = (!files.is_empty()).then(|| self.parquet(&files, false));
+            let sql = sql::last_written(files.as_deref(), totals.iter().map(|(id, _)| *id));
+            let row = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?));
+            let values: HashMap<u16, f64> = self.list(&sql, params![span.start], row)?.into_iter().collect();
+            totals.retain(|(id, name)| match values.get(id) {
+                Some(value) => {
+                    found.push(((*name).to_owned(), *value));
+                    false
+                }
+                None => true,
+            });
         }
-        Ok(found.into_iter().map(|(tag, value)| (self.def.tag(tag).name.clone(), value)).collect())
+        Ok(found)
     }
 
     /// The latest sample of each tag until an instant, of those that matter in a span.

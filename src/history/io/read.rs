@@ -43,6 +43,10 @@ impl Store {
             }
             answer = self.look_up(query, now);
         }
+        if self.changed.take() && answer.is_ok() {
+            // It may lack an hour that moved meanwhile, and nobody could tell.
+            answer = Err(HistoryError::Engine("the archive changed each time that it was read: try again".into()));
+        }
         if let Err(error) = &answer
             && error.is_damage()
         {

@@ -166,8 +166,9 @@ impl Store {
         let gap_min = ((end - next) / GAP_PARTS).max(GAP_MIN);
         let (mut span, mut span_max) = (end - next, end - next);
         let (mut rows, mut gaps) = (Vec::new(), Vec::<Gap>::new());
-        let files = self.files(Some((Tier::Raw, next..end)))?;
+        // The table first: what leaves it from now on is seen at the end.
         let hot = self.oldest_in_table()?.unwrap_or(i64::MAX);
+        let files = self.files(Some((Tier::Raw, next..end)))?;
         if let Some((stored, micros)) = self.spread(to)? {
             // Few rows need one piece, however close together they are: those of a start have one time.
             let of = |rows: f64| if rows < stored { to_i64(rows / stored * micros).max(1) } else { i64::MAX };

@@ -73,6 +73,22 @@ pub fn samples(tags: &str, table: bool, files: Option<&str>, rests: bool) -> Str
     sources.map(from).collect::<Vec<_>>().join(" UNION ALL ")
 }
 
+/// The last instant of which a value was stored in an epoch, of what is not archived.
+pub const LAST_OF_EPOCH: &str = "SELECT epoch_us(max(utc)) FROM sample WHERE epoch = ? AND value IS NOT NULL";
+
+/// The value of each of these tags that a station stored last, whatever the clock showed then; since an instant.
+pub fn last_written(files: Option<&str>, tags: impl Iterator<Item = u16>) -> String {
+    let tags = tags.map(|tag| tag.to_string()).collect::<Vec<_>>().join(", ");
+    let from = |source: &str| {
+        format!(
+            "SELECT tag, epoch, utc, value FROM {source} WHERE epoch_us(utc) >= $1 AND tag IN ({tags}) AND value IS NOT NULL
+                AND epoch IS DISTINCT FROM {IMPORTED}"
+        )
+    };
+    let sources = files.into_iter().chain(["sample"]).map(from).collect::<Vec<_>>().join(" UNION ALL ");
+    format!("SELECT tag, last(value ORDER BY epoch NULLS FIRST, utc) FROM ({sources}) GROUP BY tag")
+}
+
 /// The condition for some stored numbers of tags; for all of them without a list.
 pub fn of_tags(list: Option<&[String]>) -> String {
     match list {

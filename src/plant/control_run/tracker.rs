@@ -65,6 +65,12 @@ struct Open {
     stored: Option<(Timestamp, [Figure; 3])>,
 }
 
+impl Open {
+    fn is_measured_as(&self, label: &str) -> bool {
+        self.run.cause == RunCause::Procedure && *self.run.detail == *label
+    }
+}
+
 impl RunTracker {
     /// Goes on counting after the last run of the history, unless it does already. One that the station before this one left at
     /// work is interrupted.
@@ -126,12 +132,16 @@ impl RunTracker {
                 Some(open) if open.stored.is_none() => open.run.sv_before,
                 Some(_) | None => self.target,
             };
+            // A step of the setpoint within a measurement is what is measured: from there on, under the same number.
+            let measured = self.open.take_if(|open| cause == RunCause::Procedure && open.is_measured_as(&detail));
             records.extend(self.close(view.at, RunState::Ended));
-            let number = self.last_number.unwrap_or_default() + 1;
+            let next = self.last_number.unwrap_or_default() + 1;
+            let (number, place, stored) =
+                measured.map_or((next, 0, None), |open| (open.run.number, open.run.place, open.stored));
             let begun = begin(def, device, view, cause, &detail);
-            let run = ControlRun { number, sv, sv_before, seen: self.known, ..begun };
+            let run = ControlRun { number, place, sv, sv_before, seen: self.known, ..begun };
             let parameters = parameters(device, view).collect();
-            self.open = Some(Open { run, figures: Figures::new(view.at), parameters, stored: None });
+            self.open = Some(Open { run, figures: Figures::new(view.at), parameters, stored });
         }
         self.started = batch.filter(|_| target.is_none());
         self.known = target.is_some();
@@ -139,7 +149,9 @@ impl RunTracker {
         if let Some(open) = &mut self.open {
             open.figures.update(&mut open.run, def, target, view);
             open.run.settings_changed |= has_changed(&open.parameters, parameters(device, view));
-            records.extend(match def.duration_max <= open.run.lasted() {
+            // What is measured ends with its procedure.
+            let is_over = open.run.cause != RunCause::Procedure && def.duration_max <= open.run.lasted();
+            records.extend(match is_over {
                 true => self.close(view.at, RunState::Ended),
                 false => self.store(view.at),
             });
@@ -159,6 +171,9 @@ impl RunTracker {
             return Some((RunCause::Procedure, label.to_string(), sv));
         }
         let changed = self.target.is_some_and(|before| before != sv);
+        if let Some(open) = self.open.as_ref().filter(|open| open.run.cause == RunCause::Procedure) {
+            return changed.then(|| (RunCause::Procedure, open.run.detail.to_string(), sv));
+        }
         match (step, batch, changed) {
             (Some(step), ..) => Some((RunCause::Program, format!("step {}", step + 1), sv)),
             (None, Some(label), _) => Some((RunCause::Batch, label.to_owned(), sv)),

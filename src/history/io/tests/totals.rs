@@ -59,3 +59,36 @@ fn a_total_goes_on_over_restarts_and_runs_that_did_not_know_it() {
     assert_eq!(unknown, Sample::bad(Cause::NotRead, unknown.at));
     assert_eq!(station(&db, 4_320..4_381, true), Sample::good(2.5, sec(4_380 * 60)));
 }
+
+#[test]
+fn a_total_goes_on_from_what_was_stored_last_whatever_the_clock_showed() {
+    let total = |tag, at, value| Record::Sample(tag, Sample::good(value, sec(at)));
+    let day = 86_400;
+    // The clock was an hour, or a year, ahead and is set right; it is set forward, for good or for an hour.
+    for (before, steps, expect) in [
+        (7_200, vec![(3_600, 100.1), (5_400, 100.5)], 100.5),
+        (365 * day, vec![(3_600, 100.1), (5_400, 100.5)], 100.5),
+        (3_600, vec![(400 * day, 100.5)], 100.5),
+        (7_200, vec![], 100.0),
+    ] {
+        for archived in [false, true] {
+            let (_folder, db) = folder();
+            let (def, hours) = def();
+            let store = Store::open_at_start(&db, &def, sec(0)).unwrap().store;
+            store.append(&[total(hours, before, 100.0)]).unwrap();
+            let now = steps.last().map_or(before, |(at, _)| *at) + 60;
+            if !steps.is_empty() {
+                let after = steps.iter().map(|(at, value)| total(hours, *at, *value));
+                store.append(&[Record::ClockSet].into_iter().chain(after).collect::<Vec<_>>()).unwrap();
+            }
+            if archived {
+                store
+                    .archive(&crate::history::io::archive::Job::Hour(before / 3_600 * crate::history::tiers::HOUR))
+                    .unwrap();
+            }
+            drop(store);
+            let totals = Store::open_at_start(&db, &def, sec(now)).unwrap().read.totals;
+            assert_eq!(totals, [("PLC-1.HOURS".to_owned(), expect)], "{before} {steps:?} {archived}");
+        }
+    }
+}

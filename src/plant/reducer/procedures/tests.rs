@@ -1,5 +1,6 @@
 //! Procedures as an operator sees them: step by step, and into the safe state by whatever ends them early.
 
+mod measurements;
 mod safe_state;
 
 use std::time::Duration;
