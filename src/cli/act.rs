@@ -1,25 +1,29 @@
 //! `sightglass write` and `sightglass ack`: actions at a running station, with rights, checks and records as on the screen.
 
-use std::sync::Arc;
+use std::{io::IsTerminal, sync::Arc};
 
 use crate::plant::{
     Snapshot,
     alarm::manager::subject_name,
     command::{CommandKind, Outcome},
     def::TagId,
+    entry,
     exact::Exact,
 };
 
-use super::{CliError, client, in_runtime, say};
+use super::{CliError, client, in_runtime, prompt::ask, say};
 
 /// Arguments of `write`.
 #[derive(Debug, clap::Args)]
 pub struct WriteArgs {
     /// The tag: TIC-1.SV
     tag: String,
-    /// The new value in the tag's unit, or one of its words
+    /// The new value in the tag's unit, or one of its words; +5 adds 5, -5 subtracts 5, =-5 is -5
     #[arg(allow_negative_numbers = true)]
     value: String,
+    /// Do not ask again, not even about a large step, a limit, or a value that the device rounds
+    #[arg(long)]
+    yes: bool,
     #[command(flatten)]
     action: client::ActionArgs,
 }
@@ -47,6 +51,7 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
             .tag_named(&args.tag)
             .ok_or_else(|| CliError::Usage(format!("no tag `{}` in {}", args.tag, snapshot.def.name)))?;
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
+        confirm(&snapshot, tag, value, args.yes).await?;
         let kind = CommandKind::Write { tag, value };
         let status = actor.send_command(1, kind).await?;
         let words = |value: Option<Exact>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
@@ -98,7 +103,27 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
     })
 }
 
-/// A word of the tag, or a number. The station checks range and decimals.
+/// Asks what a screen asks in a window of its own: a large step, an alarm limit, a rounded value, what the profile wants asked.
+async fn confirm(snapshot: &Snapshot, tag: TagId, value: Exact, yes: bool) -> Result<(), CliError> {
+    if yes || !entry::needs_confirmation(snapshot, tag, value) {
+        return Ok(());
+    }
+    let def = snapshot.def.tag(tag);
+    let words = |value: Option<Exact>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
+    let question = def.confirm.clone().into_iter().chain(entry::rounded_text(snapshot, tag, value));
+    let question = question.chain(entry::warnings(snapshot, tag, value)).collect::<Vec<_>>().join("; ");
+    let change = format!("{} {} → {}", def.name, words(snapshot.sample(tag).good_exact()), words(Some(value)));
+    if !std::io::stdin().is_terminal() {
+        return Err(CliError::Usage(format!("{change}: {question}: add --yes to write it")));
+    }
+    say(&question);
+    match &*ask(&format!("{change}: write it?"), "no").await? {
+        "y" | "yes" => Ok(()),
+        _ => Err(CliError::Failed("nothing was written".to_owned())),
+    }
+}
+
+/// A word of the tag, or a number as it is typed on a screen.
 fn value(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, String> {
     let def = snapshot.def.tag(tag);
     let word = def.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text));
@@ -107,8 +132,47 @@ fn value(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, String> {
     }
     let labels: Vec<&str> = def.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
     let expected = if labels.is_empty() { "a number".to_owned() } else { format!("one of {}", labels.join(", ")) };
-    match text.parse::<Exact>() {
-        Ok(value) if value.is_finite() => Ok(value),
-        Ok(_) | Err(_) => Err(format!("{}: found `{text}`, expected {expected}", def.name)),
+    let entered = entry::check(snapshot, tag, text);
+    entered.map_err(|why| format!("{}: found `{text}`, expected {expected}: {why}", def.name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::{
+        Plant,
+        fixture::{self, SV},
+        sample::Sample,
+    };
+    use jiff::Timestamp;
+
+    /// SV is 70.0 °C, of one decimal.
+    fn snapshot() -> Snapshot {
+        let at = Timestamp::UNIX_EPOCH;
+        let mut snapshot = Plant::new(Arc::new(fixture::plant()), at, 1.0).snapshot();
+        (snapshot.samples[SV.index()], snapshot.decimals[SV.index()]) = (Sample::good(70.0, at), 1);
+        snapshot
+    }
+
+    #[test]
+    fn a_number_is_read_as_on_a_screen() {
+        let snapshot = snapshot();
+        let read = |text| value(&snapshot, SV, text).map(Exact::near);
+        for (text, expect) in [("71", 71.0), ("71,5", 71.5), ("+5", 75.0), ("-0.5", 69.5), ("=71.5", 71.5)] {
+            assert_eq!(read(text), Ok(expect), "{text}");
+        }
+        for text in ["71.25", "1.000", "1e2", "0x10", "inf", "", "71 5", "+"] {
+            let why = read(text).unwrap_err();
+            assert!(why.contains(&format!("found `{text}`, expected a number: ")), "{why}");
+        }
+    }
+
+    #[tokio::test]
+    async fn what_a_screen_asks_again_is_not_written_without_an_answer() {
+        let snapshot = snapshot();
+        for (value, yes, is_written) in [(71.0, false, true), (20.0, false, false), (20.0, true, true)] {
+            let confirmed = confirm(&snapshot, SV, value.into(), yes).await;
+            assert_eq!(confirmed.is_ok(), is_written, "{value} {yes} {confirmed:?}");
+        }
     }
 }

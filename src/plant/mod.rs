@@ -62,6 +62,7 @@ pub mod process_load;
 pub mod station;
 pub mod sweep;
 pub mod snapshot;
+pub mod entry;
 pub mod past;
 pub(crate) mod totalizer;
 pub(crate) mod delay;

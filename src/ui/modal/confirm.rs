@@ -8,7 +8,6 @@ use super::{
     Faceplate, Modal, Next,
     confirmed_value::ConfirmedValue,
     form::{Field, Form, Turn},
-    number::rounded_text,
     window,
 };
 use crate::{
@@ -18,6 +17,7 @@ use crate::{
         command::{Command, CommandKind},
         def::TagId,
         diagnostics::Diagnostic,
+        entry,
         exact::Exact,
         number::to_u16,
         role::Reauthentication,
@@ -96,7 +96,7 @@ impl Confirm {
     pub fn write(cx: &ViewContext, tag: TagId, value: impl Into<Exact>) -> Confirm {
         let value = value.into();
         let def = cx.def().tag(tag);
-        let rounded = rounded_text(cx, tag, value);
+        let rounded = entry::rounded_text(cx.snapshot, tag, value);
         let value = if rounded.is_some() { cx.snapshot.rounded_to_device(tag, value) } else { value };
         let action = ConfirmAction::Command(CommandKind::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();

@@ -9,13 +9,15 @@ use super::{
     confirm::{wire_text, write_notes},
     confirmed_value::ConfirmedValue,
     line::Line,
-    number::{self, is_numeric, range_text},
     window,
 };
 use crate::{
+    access::control::reauthentication,
     plant::{
         command::{Command, CommandKind},
         def::TagId,
+        entry::{self, is_numeric, range_text},
+        exact::Exact,
         number::to_u16,
     },
     ui::{
@@ -26,6 +28,15 @@ use crate::{
         },
     },
 };
+
+#[cfg(test)]
+mod numbers;
+
+/// Is a number for this tag asked again in a window of its own? A tag with reauthentication is.
+fn needs_confirmation(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
+    entry::needs_confirmation(cx.snapshot, tag, value)
+        || reauthentication::required(cx.def(), &CommandKind::Write { tag, value }).is_some()
+}
 
 /// A number on its way into a tag.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,12 +61,12 @@ impl Entry {
         if keys::code(KeyCode::Enter).is(event) {
             let checked = match self.line.missed() {
                 true => Err(t!("the text was cut; Ctrl-U clears the line").to_owned()),
-                false => number::check(cx, self.tag, &self.line.text()),
+                false => entry::check(cx.snapshot, self.tag, &self.line.text()),
             };
             match checked {
                 Ok(_) if self.expected.changed(cx) => self.problem = None,
-                Ok(value) if number::needs_confirmation(cx, self.tag, value) => {
-                    let why = number::warnings(cx, self.tag, value);
+                Ok(value) if needs_confirmation(cx, self.tag, value) => {
+                    let why = entry::warnings(cx.snapshot, self.tag, value);
                     return Next::Stay(Modal::Confirm(Confirm::write(cx, self.tag, value).with_notes(why)));
                 }
                 Ok(value) => {
@@ -97,8 +108,8 @@ impl Entry {
         let def = cx.def().tag(self.tag);
         let room = body.width.saturating_sub(8).min(64);
         let mut rows: Vec<(String, Style)> =
-            vec![(range_text(cx, self.tag), theme.normal()), (wire_text(def), theme.dim())];
-        rows.push((number::help(cx, self.tag), theme.dim()));
+            vec![(range_text(cx.snapshot, self.tag), theme.normal()), (wire_text(def), theme.dim())];
+        rows.push((entry::help(cx.snapshot, self.tag), theme.dim()));
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
         let notes = notes.chain(interlock::unlock_text(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
@@ -121,7 +132,7 @@ impl Entry {
         let x = canvas.text(x, 0, t!("  →  new "), theme.dim());
         let x = self.line.view(theme, &mut canvas, x, 0);
         let x = canvas.text(x + 1, 0, cx.snapshot.unit(self.tag), theme.normal());
-        if let Some(words) = number::relative_text(cx, self.tag, &self.line.text()) {
+        if let Some(words) = entry::relative_text(cx.snapshot, self.tag, &self.line.text()) {
             canvas.text(x + 2, 0, &words, theme.strong());
         }
         canvas.rows(0, 1, &rows);

@@ -8,7 +8,6 @@ use ratatui::{Frame, layout::Rect};
 use super::{
     Confirm, Modal, Next, Notice, Why,
     confirm::wire_text,
-    number::range_text,
     sheet::{Row, Sheet},
     window,
 };
@@ -17,6 +16,7 @@ use crate::{
     plant::{
         command::CommandKind,
         def::{AlarmId, Condition, DeviceId, TagId},
+        entry,
         event::LineState,
         ne107::Reason,
         snapshot::DeviceState,
@@ -188,7 +188,7 @@ fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
     rows.extend([
         (t!("quality"), quality, theme.quality(sample.quality)),
         (t!("read"), format!("{read} ({poll})"), theme.normal()),
-        (t!("range"), range_text(cx, tag).trim_start_matches(t!("range ")).to_owned(), theme.normal()),
+        (t!("range"), entry::range_text(cx.snapshot, tag).trim_start_matches(t!("range ")).to_owned(), theme.normal()),
         (
             t!("access"),
             t!(

@@ -10,7 +10,6 @@ pub(crate) mod guidance;
 pub(crate) mod help;
 pub(crate) mod line;
 pub(crate) mod notice;
-pub(crate) mod number;
 pub(crate) mod palette;
 pub(crate) mod prompt;
 pub(crate) mod reason;

@@ -2,9 +2,11 @@
 
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::tag::{Access, Poll, TagDef},
+    plant::{
+        entry,
+        tag::{Access, Poll, TagDef},
+    },
     ui::{
-        modal::number::range_text,
         rights,
         widgets::text::{age, whole},
     },
@@ -104,7 +106,7 @@ impl Table {
             && cx.age(tag.id).as_secs() < 60
             && cx.snapshot.sample(tag.id).quality.is_good();
         let read = if now || tag.access == Access::Write { String::new() } else { age(cx.age(tag.id)) };
-        let range = range_text(cx, tag.id);
+        let range = entry::range_text(cx.snapshot, tag.id);
         // What is only read needs no range; what can be written says that its range is not known.
         let writable = tag.writable() && !cx.def().listens_on(cx.def().device(tag.device).line);
         let none = !writable && tag.enum_labels.is_empty() && cx.snapshot.range(tag.id).is_none();

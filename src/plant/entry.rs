@@ -1,0 +1,186 @@
+//! A typed number: what it means, whether it can be written, and why to ask again before it is.
+
+use super::{
+    Snapshot,
+    alarm::manager::subject_name,
+    def::{Condition, Level, Subject, TagId},
+    exact::Exact,
+    number::digits,
+    scale,
+};
+use crate::{t, text::translate};
+
+/// A step over this share of the range is asked again: more than an operator usually changes at once.
+const STEP_MAX: f64 = 0.2;
+
+/// Can this character be in a number?
+pub fn is_numeric(c: char) -> bool {
+    c.is_ascii_digit() || matches!(c, '+' | '-' | '.' | ',' | '=')
+}
+
+/// The number that is meant if it can be written; else what is wrong with it. Courtesy: the station checks again.
+pub fn check(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, String> {
+    let text = text.trim();
+    if text.is_empty() {
+        return Err(t!("enter a number").to_owned());
+    }
+    let (number, typed) = parse(text).ok_or_else(|| t!("\"{text}\" is not a number", text))?;
+    // Trailing zeros count as decimals: a tag without decimals refuses `1,000` and `1.000`, which mean a thousand to their author.
+    let decimals = usize::from(snapshot.decimals[tag.index()]);
+    if typed > decimals {
+        return Err(match decimals {
+            0 => t!("whole numbers only").to_owned(),
+            1 => t!("at most 1 decimal").to_owned(),
+            n => t!("at most {n} decimals", n),
+        });
+    }
+    let value = match number {
+        Number::Absolute(value) => value,
+        Number::Step(by) => {
+            stepped(snapshot, tag, by).ok_or(t!("the current value is unknown: enter the new value without a sign"))?
+        }
+    };
+    let Some((min, max)) = snapshot.bounds(tag) else { return Ok(value) };
+    let inside = |value| scale::is_inside(Some(min), Some(max), value);
+    let rounded = snapshot.rounded_to_device(tag, value);
+    match (inside(value), inside(rounded)) {
+        (false, _) => Err(t!("outside {range_text}", range_text = range_text(snapshot, tag))),
+        (true, false) => Err(t!(
+            "the device would store {plain}, outside {range_text}",
+            plain = plain(rounded),
+            range_text = range_text(snapshot, tag)
+        )),
+        (true, true) => Ok(value),
+    }
+}
+
+/// `70.0 → 75.0`, while a number with a sign is typed.
+pub fn relative_text(snapshot: &Snapshot, tag: TagId, text: &str) -> Option<String> {
+    let (Number::Step(by), _) = parse(text.trim())? else { return None };
+    let text = |value| snapshot.format(tag, value);
+    Some(format!("{} → {}", text(snapshot.sample(tag).good_exact()?), text(stepped(snapshot, tag, by)?)))
+}
+
+/// How to type a change.
+pub fn help(snapshot: &Snapshot, tag: TagId) -> String {
+    match snapshot.range(tag) {
+        Some((min, _)) if min < 0.0 => t!("+5 adds 5, -5 subtracts 5, =-5 sets -5").to_owned(),
+        Some(_) | None => t!("+5 adds 5, -5 subtracts 5").to_owned(),
+    }
+}
+
+/// Is a number for this tag asked again before it is sent?
+pub fn needs_confirmation(snapshot: &Snapshot, tag: TagId, value: Exact) -> bool {
+    snapshot.def.tag(tag).confirm.is_some()
+        || rounded_text(snapshot, tag, value).is_some()
+        || !warnings(snapshot, tag, value).is_empty()
+}
+
+/// `72.3 → the resolution of the device is 0.5: 72.5`; `None` where it holds what was typed.
+pub fn rounded_text(snapshot: &Snapshot, tag: TagId, value: Exact) -> Option<String> {
+    let rounded = snapshot.rounded_to_device(tag, value);
+    // A single-precision register is as good as exact.
+    let apart = (rounded - value).near().abs();
+    let same = if value.rest().is_some() { rounded == value } else { apart <= 1e-6 * value.near().abs().max(1.0) };
+    let step = plain(snapshot.step(tag).into());
+    (!same).then(|| {
+        t!(
+            "{format} → the resolution of the device is {step}: {plain}",
+            format = snapshot.format(tag, value),
+            step,
+            plain = plain(rounded)
+        )
+    })
+}
+
+/// Why a number that is allowed may still not be what its author meant.
+pub fn warnings(snapshot: &Snapshot, tag: TagId, value: Exact) -> Vec<String> {
+    let text = |value: Exact| format!("{} {}", snapshot.format(tag, value), snapshot.unit(tag)).trim_end().to_owned();
+    let step = snapshot.sample(tag).exact().map(|now| (value - now).abs());
+    let share = step.zip(snapshot.range(tag)).map(|(step, (min, max))| (step, step.near() / (max - min)));
+    let large = share.filter(|(_, share)| STEP_MAX < *share);
+    let large = large.map(|(step, share)| {
+        t!("! a change of {text}, {share} % of the range", text = text(step), share = format!("{:.0}", share * 100.0))
+    });
+    let faceplate = snapshot.def.device(snapshot.def.tag(tag).device).faceplate.as_ref();
+    let process = faceplate.filter(|faceplate| faceplate.sv == tag).map(|faceplate| faceplate.pv);
+    let alarms = snapshot.def.alarms.iter().filter(|alarm| alarm.subject == Subject::Tag(process.unwrap_or(tag)));
+    let limits = alarms.filter_map(|alarm| {
+        let Condition::Limit { level, limit, .. } = alarm.condition else { return None };
+        let beyond = match level {
+            Level::High | Level::HighHigh => (value - limit.into()).near(),
+            Level::Low | Level::LowLow => (Exact::from(limit) - value).near(),
+        };
+        let place = if beyond > 0.0 { t!("beyond") } else { t!("at") };
+        (beyond >= 0.0).then(|| {
+            t!(
+                "! {place} the alarm limit of {subject} {message} ({text})",
+                place,
+                subject = subject_name(&snapshot.def, alarm.subject),
+                message = translate(&alarm.message),
+                text = text(limit.into())
+            )
+        })
+    });
+    large.into_iter().chain(limits).collect()
+}
+
+/// The permitted range in words.
+pub fn range_text(snapshot: &Snapshot, tag: TagId) -> String {
+    let labels = &snapshot.def.tag(tag).enum_labels;
+    if !labels.is_empty() {
+        return t!("range one of {count}", count = labels.len());
+    }
+    match snapshot.bounds(tag) {
+        Some((min, max)) => {
+            let unit = snapshot.unit(tag);
+            t!(
+                "range {format} … {format2} {unit}",
+                format = snapshot.format(tag, min),
+                format2 = snapshot.format(tag, max),
+                unit
+            )
+            .trim_end()
+            .to_owned()
+        }
+        None => t!("range unknown").to_owned(),
+    }
+}
+
+/// The present value and a step from it.
+fn stepped(snapshot: &Snapshot, tag: TagId, by: Exact) -> Option<Exact> {
+    let now = snapshot.sample(tag).good_exact()?;
+    // As many decimals as are shown: 0.1 + 0.2 is 0.3.
+    digits(now + by, Some(snapshot.decimals[tag.index()])).parse().ok()
+}
+
+/// With as many decimals as it has.
+fn plain(value: Exact) -> String {
+    value.rest().map_or_else(|| format!("{}", (value.near() * 1e9).round() / 1e9), |_| value.to_string())
+}
+
+/// What was typed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Number {
+    /// A new value.
+    Absolute(Exact),
+    /// A change of the present one.
+    Step(Exact),
+}
+
+/// A number and its decimals: digits and one decimal mark, a point or a comma. A sign before it makes it a step; `=` makes
+/// it a value all the same. No exponent, no `inf`.
+fn parse(text: &str) -> Option<(Number, usize)> {
+    let (whole, text) = text.strip_prefix('=').map_or((false, text), |rest| (true, rest));
+    let unsigned = text.strip_prefix(['-', '+']);
+    let point = text.replacen(',', ".", 1);
+    let digits = unsigned.unwrap_or(text).replacen(',', ".", 1);
+    let (before, after) = digits.split_once('.').unwrap_or((&digits, ""));
+    let numeric = |text: &str| text.bytes().all(|c| c.is_ascii_digit());
+    if !numeric(before) || !numeric(after) || before.is_empty() && after.is_empty() {
+        return None;
+    }
+    let value = point.parse().ok()?;
+    let number = if unsigned.is_some() && !whole { Number::Step(value) } else { Number::Absolute(value) };
+    Some((number, after.len()))
+}
