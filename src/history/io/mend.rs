@@ -35,7 +35,7 @@ pub fn mend<T>(
     report: &mut dyn FnMut(Proven),
 ) -> Result<(Tried<T>, Option<String>), HistoryError> {
     let (mut opened, mut repaired) = (try_open(), None);
-    if matches!(&opened, Err(Failure::Damaged(why)) if engine_error::is_of_database(why)) && put_blocks_back(path) {
+    if matches!(&opened, Err(Failure::Damaged(why)) if engine_error::is_of_database(why)) && put_blocks_back(path)? {
         opened = try_open();
     }
     for part in [SetAside::Log, SetAside::Everything] {
@@ -73,15 +73,15 @@ pub fn mend<T>(
     Ok((opened, repaired))
 }
 
-/// Puts the blocks back that a checkpoint has overwritten before power was lost.
-fn put_blocks_back(path: &Path) -> bool {
-    let put_back = blocks::put_back(path);
-    match &put_back {
-        Ok(true) => tracing::warn!("power was lost during a checkpoint: the blocks before it are put back"),
-        Ok(false) => {}
-        Err(error) => tracing::error!(%error, "the blocks before the last checkpoint are not put back"),
+/// Puts the blocks back that a checkpoint has overwritten before power was lost. While the disk takes none, the opening waits.
+fn put_blocks_back(path: &Path) -> Result<bool, HistoryError> {
+    let put_back = blocks::put_back(path).map_err(|error| {
+        HistoryError::Engine(format!("the blocks of its last checkpoint are not put back: {error}"))
+    })?;
+    if put_back {
+        tracing::warn!("power was lost during a checkpoint: the blocks before it are put back");
     }
-    put_back.unwrap_or(false)
+    Ok(put_back)
 }
 
 /// What an operator reads of what was set aside.

@@ -108,3 +108,20 @@ fn blocks_of_other_headers_are_never_put_back() {
     assert!(blocks::put_back(&torn).unwrap());
     assert!(fs::read(&torn).unwrap() != before);
 }
+
+#[test]
+fn a_disk_that_takes_no_blocks_is_waited_for() {
+    let (folder, _) = folder();
+    let torn = torn_by_a_checkpoint(folder.path());
+    let kept = with_suffix(&torn, ".blocks");
+    let (aside, before) = (with_suffix(&kept, ".aside"), fs::read(&torn).unwrap());
+    // What cannot be read now: a folder, as a disk that fails.
+    fs::rename(&kept, &aside).unwrap();
+    fs::create_dir(&kept).unwrap();
+    let refused = Store::open(&torn, &def(), sec(20)).err().expect("no opening");
+    assert!(refused.to_string().contains("last checkpoint"), "{refused}");
+    assert!(fs::read(&torn).unwrap() == before, "nothing is set aside");
+    fs::remove_dir(&kept).unwrap();
+    fs::rename(&aside, &kept).unwrap();
+    assert_eq!(Store::open(&torn, &def(), sec(20)).unwrap().trouble, None);
+}
