@@ -93,11 +93,8 @@ fn as_many(def: &PlantDef, many: usize) -> Result<(), String> {
 
 fn of_alarms(def: &PlantDef, alarm_command: &AlarmCommand) -> Result<(), String> {
     match alarm_command {
-        AlarmCommand::AcknowledgeAll { alarms } => {
-            as_many(def, alarms.len())?;
-            alarms.iter().try_for_each(|(id, _)| alarm(def, *id))
-        }
-        AlarmCommand::Shelve { alarms, .. } => {
+        AlarmCommand::AcknowledgeAll { alarms: None, .. } => Ok(()),
+        AlarmCommand::AcknowledgeAll { alarms: Some(alarms), .. } | AlarmCommand::Shelve { alarms, .. } => {
             as_many(def, alarms.len())?;
             alarms.iter().try_for_each(|id| alarm(def, *id))
         }

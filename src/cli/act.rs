@@ -4,11 +4,12 @@ use std::{io::IsTerminal, sync::Arc};
 
 use crate::plant::{
     Snapshot,
-    alarm::manager::subject_name,
+    alarm::{AlarmCommand, manager::subject_name},
     command::{CommandKind, Outcome},
     def::TagId,
     entry,
     exact::Exact,
+    snapshot::ActiveAlarm,
 };
 
 use super::{CliError, client, in_runtime, prompt::ask, say};
@@ -68,7 +69,7 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
     })
 }
 
-/// Acknowledges alarm after alarm; the first refusal ends it.
+/// Acknowledges what waits, as it is seen now.
 pub fn ack(args: AckArgs) -> Result<(), CliError> {
     in_runtime(async {
         let mut actor = args.action.attach().await?;
@@ -87,14 +88,27 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
                 args.all || args.subjects.iter().any(|name| name == subject)
             })
             .collect();
-        for (number, seen) in (1..).zip(&waiting) {
-            let (alarm, kind) = (snapshot.def.alarm(seen.id), seen.acknowledge());
-            let status = actor.send_command(number, kind).await?;
-            let line = format!("{} {}: ", subject_name(&snapshot.def, alarm.subject), alarm.message);
-            if status.outcome != Outcome::Verified {
-                return Err(CliError::Failed(line + &status.outcome.to_string()));
+        if !waiting.is_empty() {
+            // One command, however many there are: the station limits how many a terminal sends at once.
+            let alarms = (!args.all).then(|| waiting.iter().map(|alarm| alarm.id).collect());
+            let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms, seen: snapshot.at });
+            let status = actor.send_command(1, kind).await?;
+            let after = actor.session.snapshots.borrow().clone();
+            let still = |seen: &ActiveAlarm| {
+                let same = |alarm: &&ActiveAlarm| alarm.id == seen.id && alarm.annunciated_at == seen.annunciated_at;
+                after.alarms.iter().find(same).is_some_and(|alarm| alarm.state.needs_acknowledgement())
+            };
+            for seen in &waiting {
+                let alarm = snapshot.def.alarm(seen.id);
+                let became = match still(seen) {
+                    true => "not acknowledged".to_owned(),
+                    false => format!("acknowledged{}", client::recorded_words(status.recorded)),
+                };
+                say(&format!("{} {}: {became}", subject_name(&snapshot.def, alarm.subject), alarm.message));
             }
-            say(&(line + "acknowledged" + client::recorded_words(status.recorded)));
+            if status.outcome != Outcome::Verified {
+                return Err(CliError::Failed(status.outcome.to_string()));
+            }
         }
         if waiting.is_empty() {
             say("nothing to acknowledge");

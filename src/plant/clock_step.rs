@@ -70,12 +70,9 @@ impl CommandKind {
     pub fn move_from_utc(&mut self, by: SignedDuration) {
         let CommandKind::Alarm(command) = self else { return };
         match command {
-            AlarmCommand::Acknowledge { annunciated_at: at, .. } | AlarmCommand::Tick { raised_at: at, .. } => {
-                move_by(at, -by);
-            }
-            AlarmCommand::AcknowledgeAll { alarms } => {
-                *alarms = alarms.iter().map(|(alarm, at)| (*alarm, at.checked_sub(by).unwrap_or(*at))).collect();
-            }
+            AlarmCommand::Acknowledge { annunciated_at: at, .. }
+            | AlarmCommand::AcknowledgeAll { seen: at, .. }
+            | AlarmCommand::Tick { raised_at: at, .. } => move_by(at, -by),
             AlarmCommand::Silence
             | AlarmCommand::Reset(_)
             | AlarmCommand::Shelve { .. }

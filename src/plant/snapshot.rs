@@ -220,9 +220,8 @@ impl Snapshot {
     }
     /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
     pub fn acknowledge_all(&self) -> Option<CommandKind> {
-        let waits = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
-        let alarms: Arc<[_]> = waits.map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
-        (!alarms.is_empty()).then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms }))
+        let waits = self.alarms.iter().any(|alarm| alarm.state.needs_acknowledgement());
+        waits.then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: self.at }))
     }
     /// The details of a fault of the station, as of the last time it was active.
     pub fn fault_details(&self, alarm: AlarmId) -> &str {

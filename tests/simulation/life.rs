@@ -342,14 +342,13 @@ async fn operate(session: Session, def: Arc<PlantDef>, name: String, mut dice: D
         tokio::time::sleep(dice.millis(if is_last { 4_000 } else { 6_000 })).await;
         let snapshot = session.snapshots.borrow().clone();
         let some = |dice: &mut Dice| def.alarms[dice.below(def.alarms.len() as u64) as usize].id;
-        let all: Arc<[_]> = snapshot.alarms.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
         let alarm = match dice.below(if is_last { 4 } else { 16 }) {
             0..4 => {
                 let value = (40 + dice.below(40)) as f64;
                 send(&session, number, &name, CommandKind::Write { tag: setpoint, value: value.into() });
                 continue;
             }
-            4..6 => AlarmCommand::AcknowledgeAll { alarms: all },
+            4..6 => AlarmCommand::AcknowledgeAll { alarms: None, seen: snapshot.at },
             6 => AlarmCommand::Silence,
             7 => AlarmCommand::Shelve { alarms: [some(&mut dice)].into(), lasts: Duration::from_secs(600) },
             8 => AlarmCommand::Unshelve(some(&mut dice)),

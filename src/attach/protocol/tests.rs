@@ -4,6 +4,8 @@
 use proptest::prelude::*;
 
 use super::*;
+use std::{sync::Arc, time::Duration};
+
 use crate::plant::alarm::AlarmCommand;
 use crate::{
     access::Durability,
@@ -110,6 +112,20 @@ fn requests_and_news_survive_the_way() {
             decode(&body(encode(&sent, SERVER_MESSAGE_BYTES_MAX).unwrap()), "message").unwrap();
         assert_eq!(format!("{received:?}"), format!("{sent:?}"));
     }
+}
+
+#[test]
+fn a_flood_of_alarms_is_handled_by_one_message() {
+    let ids: Arc<[AlarmId]> = (0..10_000).map(AlarmId).collect();
+    let all = AlarmCommand::AcknowledgeAll { alarms: None, seen: now() };
+    let many = AlarmCommand::AcknowledgeAll { alarms: Some(ids.clone()), seen: now() };
+    let shelve = AlarmCommand::Shelve { alarms: ids, lasts: Duration::from_secs(600) };
+    let bytes = |command: AlarmCommand| {
+        let command = Command::new(1, CommandId { terminal: 1, number: 1 }, CommandKind::Alarm(command));
+        encode(&ClientMessage::Command(Box::new(command), None), REQUEST_BYTES_MAX).unwrap().len()
+    };
+    assert!(bytes(all) < 100);
+    assert!(bytes(many).max(bytes(shelve)) < REQUEST_BYTES_MAX / 2);
 }
 
 #[test]

@@ -31,10 +31,12 @@ pub enum AlarmCommand {
         /// When the operator's view of it was annunciated: an alarm annunciated later stays unacknowledged.
         annunciated_at: Timestamp,
     },
-    /// Acknowledge all of these, as the operator saw them.
+    /// Acknowledge several, as the operator saw them. Of a size that any flood fits into.
     AcknowledgeAll {
-        /// Which, and when each was annunciated.
-        alarms: Arc<[(AlarmId, Timestamp)]>,
+        /// Which; `None` for all.
+        alarms: Option<Arc<[AlarmId]>>,
+        /// What the operator saw was of this instant: an alarm annunciated later stays unacknowledged.
+        seen: Timestamp,
     },
     /// End the sound of what sounds now.
     Silence,
@@ -127,12 +129,41 @@ impl AlarmManager {
         annunciated_at: Timestamp,
         note: &OperatorNote,
     ) -> Result<AlarmRecord, AlarmRefusal> {
+        self.acknowledge_unless(id, |latest| latest != annunciated_at, note)
+    }
+
+    /// The same for one of several that were seen at an instant.
+    pub fn acknowledge_seen(
+        &mut self,
+        id: AlarmId,
+        seen: Timestamp,
+        note: &OperatorNote,
+    ) -> Result<AlarmRecord, AlarmRefusal> {
+        self.acknowledge_unless(id, |latest| is_later(latest, seen, note.at), note)
+    }
+
+    /// All that wait, of those that were seen at an instant.
+    pub fn waiting(&self, seen: Timestamp, now: Timestamp) -> Vec<AlarmId> {
+        let waits = |id: &AlarmId| {
+            let machine = self.machine(*id);
+            let since = machine.annunciated_at.is_some_and(|latest| is_later(latest, seen, now));
+            machine.state().needs_acknowledgement() && !since
+        };
+        self.def.alarms.iter().map(|alarm| alarm.id).filter(waits).collect()
+    }
+
+    fn acknowledge_unless(
+        &mut self,
+        id: AlarmId,
+        raised_since: impl Fn(Timestamp) -> bool,
+        note: &OperatorNote,
+    ) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
         let machine = self.machine(id);
         if !machine.state().needs_acknowledgement() {
             return Err(AlarmRefusal::NothingToAcknowledge);
         }
-        if machine.annunciated_at.is_some_and(|latest| latest != annunciated_at) {
+        if machine.annunciated_at.is_some_and(raised_since) {
             return Err(AlarmRefusal::RaisedSince);
         }
         let reason = note.reason.clone().filter(|reason| !reason.trim().is_empty());
@@ -254,4 +285,9 @@ pub fn check_note(words: Option<&Arc<str>>) -> Result<(), AlarmRefusal> {
         true => Err(AlarmRefusal::TooLong),
         false => Ok(()),
     }
+}
+
+/// Was it annunciated after what was seen? An instant that lies ahead is one of before the clock was set back.
+fn is_later(annunciated_at: Timestamp, seen: Timestamp, now: Timestamp) -> bool {
+    seen < annunciated_at && annunciated_at <= now
 }

@@ -90,6 +90,24 @@ fn an_alarm_raised_since_the_display_stays_unacknowledged() {
 }
 
 #[test]
+fn all_that_was_seen_is_acknowledged_and_what_came_since_is_not() {
+    let def = with(|alarm| alarm.on_delay = Duration::ZERO);
+    let mut manager = AlarmManager::new(def);
+    manager.evaluate(at(0), facts(80.0, true));
+    let seen = at(1);
+    assert_eq!(manager.waiting(seen, at(9)), [HIGH]);
+    manager.evaluate(at(2), facts(70.0, true));
+    manager.evaluate(at(3), facts(80.0, true));
+    assert!(manager.waiting(seen, at(9)).is_empty());
+    assert_eq!(manager.acknowledge_seen(HIGH, seen, &note(at(9), None)), Err(AlarmRefusal::RaisedSince));
+    // The clock was an hour ahead when it was raised, and is set right: no one has seen it later.
+    assert_eq!(manager.waiting(seen, at(2)), [HIGH]);
+    assert_eq!(manager.waiting(at(3), at(9)), [HIGH]);
+    assert!(manager.acknowledge_seen(HIGH, at(3), &note(at(9), None)).is_ok());
+    assert!(manager.waiting(at(3), at(9)).is_empty());
+}
+
+#[test]
 fn a_note_is_asked_for_where_the_plant_wants_one() {
     let def = with(|alarm| (alarm.on_delay, alarm.ack_comment) = (Duration::ZERO, true));
     let mut manager = AlarmManager::new(def);

@@ -73,10 +73,8 @@ pub fn alarm_action(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static s
     };
     match alarm_command {
         AlarmCommand::Acknowledge { alarm, .. } => ("acknowledge", name(alarm), None),
-        AlarmCommand::AcknowledgeAll { alarms } => {
-            let ids: Vec<AlarmId> = alarms.iter().map(|(id, _)| *id).collect();
-            ("acknowledge", names(&ids), None)
-        }
+        AlarmCommand::AcknowledgeAll { alarms: None, .. } => ("acknowledge", "all alarms".into(), None),
+        AlarmCommand::AcknowledgeAll { alarms: Some(alarms), .. } => ("acknowledge", names(alarms), None),
         AlarmCommand::Silence => ("silence", "alarms".into(), None),
         AlarmCommand::Reset(alarm) => ("reset", name(alarm), None),
         AlarmCommand::Shelve { alarms, lasts } => {

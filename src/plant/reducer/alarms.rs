@@ -43,8 +43,9 @@ impl Plant {
             AlarmCommand::Acknowledge { alarm, annunciated_at } => {
                 one(manager.acknowledge(alarm, annunciated_at, &note))
             }
-            AlarmCommand::AcknowledgeAll { alarms } => {
-                let each = alarms.iter().map(|(alarm, since)| manager.acknowledge(*alarm, *since, &note));
+            AlarmCommand::AcknowledgeAll { alarms, seen } => {
+                let alarms = alarms.unwrap_or_else(|| manager.waiting(seen, note.at).into());
+                let each = alarms.iter().map(|alarm| manager.acknowledge_seen(*alarm, seen, &note));
                 return together(each, AlarmRefusal::NothingToAcknowledge, effects);
             }
             AlarmCommand::Silence => manager.silence().then(Vec::new).ok_or(AlarmRefusal::NothingSounds),

@@ -62,8 +62,9 @@ pub fn acknowledge_all<'a>(
     };
     let needed = waiting.iter().any(|alarm| cx.def().alarm(alarm.id).ack_comment);
     let mut notes = names(cx, waiting.iter().map(|alarm| alarm.id));
-    let alarms = waiting.iter().map(|alarm| (alarm.id, alarm.annunciated_at)).collect();
-    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms });
+    let all = cx.snapshot.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement()).count();
+    let alarms = (waiting.len() < all).then(|| waiting.iter().map(|alarm| alarm.id).collect());
+    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms, seen: cx.snapshot.at });
     if !needed && !with_note {
         return open(Modal::Confirm(Confirm::command(t!("acknowledge all"), asked, kind).with_notes(notes)));
     }
