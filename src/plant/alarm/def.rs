@@ -71,7 +71,7 @@ impl AlarmDef {
 pub struct AlarmRules {
     /// An alarm can be shelved for at most this long.
     pub shelve_max: Duration,
-    /// An alarm that is raised within this time after another belongs to the same first-out group.
+    /// An alarm that is raised within this time after the first of a first-out group of its line belongs to it.
     pub first_out_window: Duration,
 }
 

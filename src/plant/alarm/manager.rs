@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::{
     condition::{ConditionMemory, Facts, holds},
@@ -14,7 +14,7 @@ use super::{
     state::{AlarmDelays, AlarmState, AlarmStateMachine},
 };
 use crate::plant::{
-    def::{AlarmDef, AlarmId, PlantDef, Subject},
+    def::{AlarmDef, AlarmId, LineId, PlantDef, Subject},
     exact::Exact,
     record::{AlarmEvent, AlarmRecord, FirstOut},
     station::STATION,
@@ -36,8 +36,9 @@ pub struct AlarmManager {
     /// The manager's own clock: what has passed while it was evaluated. It never goes back, whatever the station's clock does.
     ran: Duration,
     evaluated_at: Option<Timestamp>,
-    /// The latest first-out group, and when its last alarm was raised on the manager's own clock.
-    first_out: Option<(FirstOut, Duration)>,
+    /// The latest first-out group of each line, and of the station itself: its last alarm, and when its first was raised on the
+    /// manager's own clock.
+    first_out: HashMap<Option<LineId>, (FirstOut, Duration)>,
     /// Counts what sounds, so that silence ends what was before it and nothing else.
     pub(super) edges: u64,
     pub(super) silenced: u64,
@@ -55,7 +56,7 @@ impl AlarmManager {
             def,
             ran: Duration::ZERO,
             evaluated_at: None,
-            first_out: None,
+            first_out: HashMap::new(),
             edges: 0,
             silenced: 0,
             lists: OnceLock::new(),
@@ -96,8 +97,8 @@ impl AlarmManager {
     /// Goes on under another definition: each alarm of a name stands as it did. Where its condition is another, its delay and
     /// what it looks back on begin again.
     pub fn redefine(&mut self, def: &Arc<PlantDef>) {
-        let AlarmManager { ran, evaluated_at, first_out, edges, silenced, .. } = *self;
-        let begun = AlarmManager { ran, evaluated_at, first_out, edges, silenced, ..AlarmManager::new(def.clone()) };
+        let AlarmManager { ran, evaluated_at, edges, silenced, .. } = *self;
+        let begun = AlarmManager { ran, evaluated_at, edges, silenced, ..AlarmManager::new(def.clone()) };
         let mut before = std::mem::replace(self, begun);
         let known = by_name(&before.def);
         let reference =
@@ -242,7 +243,7 @@ impl AlarmManager {
 
     /// An event without operator.
     fn event(&mut self, alarm: &AlarmDef, event: AlarmEvent, at: Timestamp, value: Option<Exact>) -> AlarmRecord {
-        let first_out = (event == AlarmEvent::Raised).then(|| self.next_first_out(at));
+        let first_out = (event == AlarmEvent::Raised).then(|| self.next_first_out(alarm.subject, at));
         let record = self.record(alarm, event, at, value);
         self.apply_event(alarm.id, AlarmRecord { first_out, ..record })
     }
@@ -264,15 +265,29 @@ impl AlarmManager {
         self.lists = OnceLock::new();
     }
 
-    fn next_first_out(&mut self, at: Timestamp) -> FirstOut {
-        let near =
-            |(_, last): &(FirstOut, Duration)| self.ran.saturating_sub(*last) <= self.def.alarm_rules.first_out_window;
-        let first_out = match self.first_out.filter(near) {
-            Some((first_out, _)) => FirstOut { rank: first_out.rank.saturating_add(1), ..first_out },
-            None => FirstOut { began: at, rank: 1 },
+    /// The place of an alarm among those of its line that were raised within a time of the first: what comes later is no
+    /// consequence of it, however long the chain.
+    fn next_first_out(&mut self, subject: Subject, at: Timestamp) -> FirstOut {
+        let line = match subject {
+            Subject::Tag(tag) => Some(self.def.device(self.def.tag(tag).device).line),
+            Subject::Device(device) => Some(self.def.device(device).line),
+            Subject::Line(line) => Some(line),
+            Subject::Station => None,
         };
-        self.first_out = Some((first_out, self.ran));
-        first_out
+        let window = self.def.alarm_rules.first_out_window;
+        if let Some((group, first)) = self.first_out.get_mut(&line)
+            && self.ran.saturating_sub(*first) <= window
+        {
+            group.rank = group.rank.saturating_add(1);
+            return *group;
+        }
+        // The instant identifies a group: those of two lines are never the same.
+        let is_taken = |began: &Timestamp| self.first_out.values().any(|(group, _)| group.began == *began);
+        let instants = std::iter::successors(Some(at), |at| at.checked_add(SignedDuration::from_micros(1)).ok());
+        let began = instants.skip_while(is_taken).next().unwrap_or(at);
+        let group = FirstOut { began, rank: 1 };
+        self.first_out.insert(line, (group, self.ran));
+        group
     }
 
     pub(super) fn record(

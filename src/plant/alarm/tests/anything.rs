@@ -1,6 +1,10 @@
 //! Storms, and any sequence of events with restarts.
 
 use super::*;
+use crate::plant::{
+    def::LineId,
+    fixture::{PLC, TIC},
+};
 
 /// A plant with so many alarms on PV, each with a limit of its own.
 fn many(count: u16) -> Arc<PlantDef> {
@@ -22,14 +26,40 @@ fn of_a_storm_none_is_lost_and_the_first_out_is_marked() {
     }
     assert_eq!(raised.len(), 501);
     assert_eq!(manager.active().len(), 501);
-    assert!(
-        raised.iter().all(|record| record.first_out.is_some_and(|first_out| first_out.began == at(0))),
-        "one first_out"
-    );
-    let ranks: Vec<u32> = raised.iter().filter_map(|record| record.first_out.map(|first_out| first_out.rank)).collect();
-    assert_eq!(ranks, (1..=501).collect::<Vec<u32>>());
+    // A group ends ten seconds after its first, however long the storm.
+    let groups = raised.chunk_by(|one, next| one.first_out.map(|of| of.began) == next.first_out.map(|of| of.began));
+    let groups: Vec<&[AlarmRecord]> = groups.collect();
+    assert_eq!(groups.len(), 6);
+    for (group, began) in groups.iter().zip([0, 11, 22, 33, 44, 55].map(at)) {
+        let ranks: Vec<_> = group.iter().filter_map(|record| record.first_out).map(|of| (of.began, of.rank)).collect();
+        assert_eq!(ranks, (1..).map(|rank| (began, rank)).take(group.len()).collect::<Vec<_>>());
+        assert!(group.iter().all(|record| record.at <= began + Duration::from_secs(10)));
+    }
     let later = manager.evaluate(at(80), facts(501.5, true));
     assert_eq!(later[0].first_out.map(|first_out| (first_out.began, first_out.rank)), Some((at(80), 1)), "another one");
+}
+
+#[test]
+fn what_is_of_another_line_is_no_consequence() {
+    let mut def = fixture::plant();
+    let mut other = def.lines[0].clone();
+    other.id = LineId(1);
+    def.lines.push(other);
+    def.devices[PLC.index()].line = LineId(1);
+    for (number, device) in [TIC, PLC].into_iter().enumerate() {
+        let id = AlarmId(number as u16);
+        def.alarms[number] = AlarmDef::new(id, Subject::Device(device), Condition::NotResponding, "silent");
+    }
+    def.alarms.truncate(2);
+    let mut manager = AlarmManager::new(Arc::new(def));
+    let mut raised = Vec::new();
+    for second in 0..60 {
+        raised.extend(manager.evaluate(at(second), facts(1.0, false)));
+    }
+    let [one, two] = &raised[..] else { panic!("{raised:?}") };
+    let ranks = [one, two].map(|record| record.first_out.map(|of| of.rank));
+    assert_eq!(ranks, [Some(1), Some(1)]);
+    assert_ne!(one.first_out.map(|of| of.began), two.first_out.map(|of| of.began), "the instant identifies a group");
 }
 
 /// One thing that happens in the property test.

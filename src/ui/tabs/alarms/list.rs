@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use jiff::Timestamp;
 
 use crate::plant::{
+    alarm::AlarmState,
     def::{PlantDef, Priority},
     snapshot::ActiveAlarm,
 };
@@ -47,30 +48,35 @@ struct Group<'a> {
 }
 
 /// The rows of these alarms, which come in order of urgency. The first of a first-out group stands where the most urgent of it
-/// would, the less urgent others below it, unless they are folded; alarms of high and critical priority are never folded.
+/// would, the less urgent others below it, unless they are folded; alarms of high and critical priority are never folded, nor
+/// is anything once the first has gone from the list, nor what needs an operator under one that has returned.
 pub fn rows<'a>(
     def: &PlantDef,
     alarms: impl Iterator<Item = &'a ActiveAlarm>,
     is_folded: impl Fn(Timestamp) -> bool,
 ) -> Vec<Row<'a>> {
     let alarms: Vec<&ActiveAlarm> = alarms.collect();
+    let root = |alarm: &&ActiveAlarm| alarm.first_out.filter(|group| group.rank == 1).map(|group| group.began);
+    let roots: HashMap<Timestamp, &ActiveAlarm> =
+        alarms.iter().filter_map(|alarm| Some((root(alarm)?, *alarm))).collect();
     let mut groups: HashMap<Timestamp, Group> = HashMap::new();
     for alarm in &alarms {
         let Some(first_out) = alarm.first_out else { continue };
+        let root = roots.get(&first_out.began);
         let new = || Group { leader: alarm, rank: first_out.rank, below: Vec::new(), count: 0, listed: false };
         let group = groups.entry(first_out.began).or_insert_with(new);
         if first_out.rank < group.rank {
             (group.leader, group.rank) = (alarm, first_out.rank);
         }
         group.count += 1;
-        if may_fold(def, alarm) {
+        if root.is_some_and(|root| may_fold(def, root, alarm)) {
             group.below.push(alarm);
         }
     }
     let mut rows = Vec::with_capacity(alarms.len());
     for alarm in &alarms {
         let group = alarm.first_out.and_then(|first_out| Some((first_out.began, groups.get_mut(&first_out.began)?)));
-        let Some((began, group)) = group.filter(|(_, group)| 1 < group.count) else {
+        let Some((began, group)) = group.filter(|(_, group)| 1 < group.count && group.rank == 1) else {
             rows.push(Row::plain(alarm));
             continue;
         };
@@ -78,22 +84,25 @@ pub fn rows<'a>(
             let below: Vec<_> = group.below.iter().filter(|other| other.id != group.leader.id).copied().collect();
             let more_waiting = below.iter().filter(|other| other.state.needs_acknowledgement()).count();
             let folded = !below.is_empty() && is_folded(began);
-            let first = group.rank == 1;
-            rows.push(Row { first, more: below.len(), more_waiting, folded, ..Row::plain(group.leader) });
+            rows.push(Row { first: true, more: below.len(), more_waiting, folded, ..Row::plain(group.leader) });
             if !folded {
                 let last = below.len().saturating_sub(1);
                 let under = |(n, alarm)| Row { under: true, last: n == last, ..Row::plain(alarm) };
                 rows.extend(below.into_iter().enumerate().map(under));
             }
         }
-        if alarm.id != group.leader.id && !may_fold(def, alarm) {
+        if alarm.id != group.leader.id && !may_fold(def, group.leader, alarm) {
             rows.push(Row::plain(alarm));
         }
     }
     rows
 }
 
-fn may_fold(def: &PlantDef, alarm: &ActiveAlarm) -> bool {
+/// May an alarm be folded under the first of its group?
+fn may_fold(def: &PlantDef, root: &ActiveAlarm, alarm: &ActiveAlarm) -> bool {
+    if alarm.state == AlarmState::Unacknowledged && root.returned_at.is_some() {
+        return false;
+    }
     match def.alarm(alarm.id).priority {
         Priority::Critical | Priority::High => false,
         Priority::Medium | Priority::Low => true,
@@ -106,7 +115,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        plant::{alarm::AlarmState, def::AlarmId, record::FirstOut},
+        plant::{def::AlarmId, record::FirstOut},
         ui::fixture::{Fixture, now},
     };
 
@@ -150,6 +159,15 @@ mod tests {
         assert!(!alone[0].first, "the first of nothing");
         let headless = rows(&def, alarms.iter().filter(|alarm| alarm.id.0 != 0), |_| true);
         assert!(!headless[0].first, "the second is not called the first once that has gone");
+        assert_eq!(headless.len(), 4, "and nothing is folded under it");
+        let mut returned = alarms.clone();
+        let root = returned.iter_mut().find(|alarm| alarm.id.0 == 0).expect("it is there");
+        (root.state, root.returned_at) = (AlarmState::ReturnedToNormal, Some(now()));
+        assert_eq!(
+            ids(&rows(&def, returned.iter(), |_| true)).len(),
+            5,
+            "an active alarm is not hidden by one that returned"
+        );
     }
 
     proptest! {
@@ -171,7 +189,7 @@ mod tests {
             seen.sort_unstable();
             seen.dedup();
             prop_assert_eq!(seen.len(), rows.len());
-            for alarm in alarms.iter().filter(|alarm| !may_fold(&def, alarm)) {
+            for alarm in alarms.iter().filter(|alarm| !may_fold(&def, alarm, alarm)) {
                 prop_assert!(rows.iter().any(|row| row.alarm.id == alarm.id));
             }
         }
