@@ -36,8 +36,9 @@ impl Store {
         let samples = sql::samples_of(&span, rests);
         let raw = self.write_file((Tier::Raw, rests), span.clone(), &samples, "ORDER BY tag, utc, rowid")?;
         let rows = raw.as_ref().map_or(0, |raw| raw.file.rows);
-        // The first minutes of the next hour begin with values of this one.
-        let formed = if late { hour..hour + 2 * HOUR } else { span.clone() };
+        // The first minutes of the next hour begin with values of this one: where it is archived already, they change.
+        let is_before = !deleted && !self.files(Some((Tier::Raw, span.end..span.end + HOUR)))?.is_empty();
+        let formed = if late || is_before { hour..hour + 2 * HOUR } else { span.clone() };
         self.form(formed.clone())?;
         let (mut new, mut old) = (Vec::from_iter(raw), Vec::new());
         for tier in [Tier::Minute, Tier::Hour] {

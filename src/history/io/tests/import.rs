@@ -155,3 +155,25 @@ fn an_import_that_was_killed_is_completed_by_the_next() {
     assert!(rest > 0 && second.rows == rest, "{} of {rest}", second.rows);
     assert!(content(&opened.store) == expect);
 }
+
+#[test]
+fn an_import_that_reaches_into_an_archived_hour_is_in_its_minutes() {
+    let ((_one, db), (_two, plain)) = (folder(), folder());
+    let (store, plain) = (open(&db, 0), open(&plain, 0));
+    // The station recorded hour 0 and hour 2 from its second 140 on; hour 1 is missing.
+    let recorded: Vec<Record> =
+        [good(PV, 10, 1.0)].into_iter().chain((0..60).map(|n| good(PV, 2 * HOUR_S + 140 + 60 * n, 9.0))).collect();
+    store.append(&recorded).unwrap();
+    plain.append(&recorded).unwrap();
+    archive_all(&store, 5);
+    let file = by_tag(&[good(PV, 2 * HOUR_S - 200, 4.0), good(PV, 2 * HOUR_S - 5, 5.0)]);
+    import_all(&store, file.clone(), "x.csv", sec(5 * HOUR_S)).unwrap();
+    import_all(&plain, file, "x.csv", sec(5 * HOUR_S)).unwrap();
+    let minutes = |store: &Store| means(store, PV, 2 * HOUR_S - 120, 2 * HOUR_S + 240, 6);
+    let hours = |store: &Store| series(store, PV, 0, 4 * HOUR_S, 4).good;
+    let before = (minutes(&store), hours(&store));
+    archive_all(&store, 5);
+    archive_all(&plain, 5);
+    let (got, expect) = ((minutes(&store), hours(&store)), (minutes(&plain), hours(&plain)));
+    assert_eq!(got, expect, "hot it was {before:?}");
+}
