@@ -176,7 +176,7 @@ mod tests {
             assert_eq!(read(text), Ok(expect), "{text}");
         }
         for text in ["71.25", "1.000", "1e2", "0x10", "inf", "", "71 5", "+"] {
-            let why = read(text).unwrap_err();
+            let why = read(text).expect_err("no number");
             assert!(why.contains(&format!("found `{text}`, expected a number: ")), "{why}");
         }
     }

@@ -97,7 +97,7 @@ impl Life {
         let set_by: &'static AtomicI64 = Box::leak(Box::default());
         let clock = Clock::simulated(base, set_by);
         let simulator = SimulatorHandle::spawn_for(&def, Simulator::new(&def).unwrap(), clock);
-        let trouble = if self.is_last { 0.0 } else { [0.0, 0.02, 0.2][self.dice.below(3) as usize] };
+        let trouble = if self.is_last { 0.0 } else { [0.0, 0.02, 0.2][self.dice.place(3)] };
         let connectors = connectors(&def, &simulator, trouble, &mut self.dice);
         let options = station::io::Options { def: def.clone(), clock, history: self.history(), connectors, file: None };
         let station = match station::io::start(options) {
@@ -341,7 +341,7 @@ async fn operate(session: Session, def: Arc<PlantDef>, name: String, mut dice: D
     for number in 1.. {
         tokio::time::sleep(dice.millis(if is_last { 4_000 } else { 6_000 })).await;
         let snapshot = session.snapshots.borrow().clone();
-        let some = |dice: &mut Dice| def.alarms[dice.below(def.alarms.len() as u64) as usize].id;
+        let some = |dice: &mut Dice| def.alarms[dice.place(def.alarms.len())].id;
         let alarm = match dice.below(if is_last { 4 } else { 16 }) {
             0..4 => {
                 let value = (40 + dice.below(40)) as f64;

@@ -36,6 +36,11 @@ impl Dice {
         (self.0 >> 33) % limit
     }
 
+    /// A place in a list of so many.
+    pub fn place(&mut self, count: usize) -> usize {
+        usize::try_from(self.below(count as u64)).unwrap()
+    }
+
     /// True so often: 0.01 is once in a hundred.
     pub fn chance(&mut self, rate: f64) -> bool {
         (self.below(1 << 30) as f64) < rate * (1u64 << 30) as f64
@@ -81,11 +86,11 @@ async fn misbehave(mut master: DuplexStream, mut slave: DuplexStream, trouble: f
                     match dice.below(6) {
                         0 => continue,
                         1 => sleep(dice.millis(3_000)).await,
-                        2 => answer[dice.below(count as u64) as usize] ^= 1 << dice.below(8),
-                        3 => count = 1 + dice.below(count as u64) as usize,
+                        2 => answer[dice.place(count)] ^= 1 << dice.below(8),
+                        3 => count = 1 + dice.place(count),
                         4 => {
                             // In pieces.
-                            let cut = dice.below(count as u64) as usize;
+                            let cut = dice.place(count);
                             let first = master.write_all(&answer[..cut]).await;
                             sleep(dice.millis(30)).await;
                             if first.is_err() || master.write_all(&answer[cut..count]).await.is_err() { return }

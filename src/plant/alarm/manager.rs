@@ -282,9 +282,9 @@ impl AlarmManager {
             return *group;
         }
         // The instant identifies a group: those of two lines are never the same.
-        let is_taken = |began: &Timestamp| self.first_out.values().any(|(group, _)| group.began == *began);
-        let instants = std::iter::successors(Some(at), |at| at.checked_add(SignedDuration::from_micros(1)).ok());
-        let began = instants.skip_while(is_taken).next().unwrap_or(at);
+        let is_free = |began: &Timestamp| self.first_out.values().all(|(group, _)| group.began != *began);
+        let mut instants = std::iter::successors(Some(at), |at| at.checked_add(SignedDuration::from_micros(1)).ok());
+        let began = instants.find(is_free).unwrap_or(at);
         let group = FirstOut { began, rank: 1 };
         self.first_out.insert(line, (group, self.ran));
         group
