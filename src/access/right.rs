@@ -64,7 +64,8 @@ pub fn of_command(kind: &CommandKind) -> Right {
         | CommandKind::TakeOver => Right::Operate,
         CommandKind::Alarm(AlarmCommand::OutOfService(_) | AlarmCommand::InService(_))
         | CommandKind::Configure(_)
-        | CommandKind::SaveSettings(_) => Right::Engineer,
+        | CommandKind::SaveSettings(_)
+        | CommandKind::CorrectCounter { .. } => Right::Engineer,
         CommandKind::Test(_, diagnostic) => of_diagnostic(diagnostic),
     }
 }
@@ -256,6 +257,7 @@ mod tests {
         let supervisor = [
             CommandKind::Configure(Box::new(line)),
             CommandKind::SaveSettings(LineId(0)),
+            CommandKind::CorrectCounter { tag: TagId(1), amount: 1.0.into() },
             CommandKind::Test(LineId(0), Diagnostic::Send(vec![1])),
             CommandKind::Test(LineId(0), scan(vec![serial])),
             CommandKind::Test(LineId(0), Diagnostic::Signal(signal)),

@@ -38,7 +38,7 @@ const REPORT_MAX: SignedDuration = SignedDuration::from_hours(5 * 366 * 24);
 /// `Err` says what a command names that this plant does not have.
 pub fn command(def: &PlantDef, kind: &CommandKind) -> Result<(), String> {
     match kind {
-        CommandKind::Write { tag: id, value: _ } => tag(def, *id),
+        CommandKind::Write { tag: id, value: _ } | CommandKind::CorrectCounter { tag: id, amount: _ } => tag(def, *id),
         CommandKind::Alarm(alarm_command) => of_alarms(def, alarm_command),
         CommandKind::ReadSets | CommandKind::HandOver | CommandKind::TakeOver => Ok(()),
         CommandKind::Refresh(id) | CommandKind::StopRestore(id) => device(def, *id),

@@ -1,4 +1,4 @@
-//! `sightglass write` and `sightglass ack`: actions at a running station, with rights, checks and records as on the screen.
+//! `sightglass write`, `ack` and `correct`: actions at a running station, with rights, checks and records as on the screen.
 
 use std::{io::IsTerminal, sync::Arc};
 
@@ -42,15 +42,46 @@ pub struct AckArgs {
     action: client::ActionArgs,
 }
 
+/// Arguments of `correct`.
+#[derive(Debug, clap::Args)]
+pub struct CorrectArgs {
+    /// The counter: PM-1.E
+    tag: String,
+    /// What is added to what it counted, in its unit; below 0 it is taken away
+    #[arg(allow_negative_numbers = true)]
+    amount: Exact,
+    #[command(flatten)]
+    action: client::ActionArgs,
+}
+
+/// Corrects what a counter counted, and prints the outcome; the note is the reason.
+pub fn correct(args: CorrectArgs) -> Result<(), CliError> {
+    in_runtime(async {
+        let mut actor = args.action.attach().await?;
+        let snapshot = actor.session.snapshots.borrow().clone();
+        let tag = tag_named(&snapshot, &args.tag)?;
+        let status = actor.send_command(1, CommandKind::CorrectCounter { tag, amount: args.amount }).await?;
+        let (amount, unit) = (snapshot.format(tag, args.amount), snapshot.unit(tag));
+        let line = format!("{} corrected by {amount} {unit}: ", args.tag);
+        if status.outcome != Outcome::Verified {
+            return Err(CliError::Failed(line + &status.outcome.to_string()));
+        }
+        say(&(line + "done" + client::recorded_words(status.recorded)));
+        Ok(())
+    })
+}
+
+fn tag_named(snapshot: &Snapshot, name: &str) -> Result<TagId, CliError> {
+    let unknown = || CliError::Usage(format!("no tag `{name}` in {}", snapshot.def.name));
+    snapshot.def.tag_named(name).ok_or_else(unknown)
+}
+
 /// Writes and prints the outcome; anything but verified, or sent where nothing can be, is a failure.
 pub fn write(args: WriteArgs) -> Result<(), CliError> {
     in_runtime(async {
         let mut actor = args.action.attach().await?;
         let snapshot = actor.session.snapshots.borrow().clone();
-        let tag = snapshot
-            .def
-            .tag_named(&args.tag)
-            .ok_or_else(|| CliError::Usage(format!("no tag `{}` in {}", args.tag, snapshot.def.name)))?;
+        let tag = tag_named(&snapshot, &args.tag)?;
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
         confirm(&snapshot, tag, value, args.yes).await?;
         let kind = CommandKind::Write { tag, value };

@@ -110,6 +110,8 @@ enum Command {
     Ack(act::AckArgs),
     /// Write a tag at the running station and wait until it is verified
     Write(act::WriteArgs),
+    /// Correct what a counter counted, from now on and with a reason (--note)
+    Correct(act::CorrectArgs),
     /// Verify the audit log: `audit verify` names the first line that was changed, `audit key` has it sealed
     Audit(audit::Args),
     /// Stop the running station
@@ -294,6 +296,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Status(args)) => status::main(args),
         Some(Command::Ack(args)) => act::ack(args),
         Some(Command::Write(args)) => act::write(args),
+        Some(Command::Correct(args)) => act::correct(args),
         Some(Command::Audit(args)) => audit::main(args),
         Some(Command::Stop(args)) => control::stop(args),
         Some(Command::Reload(args)) => control::reload(args),

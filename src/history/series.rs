@@ -91,6 +91,7 @@ impl Curve {
             step: columns.step(),
             buckets: stats.into_iter().map(|stats| stats.map(bucket)).collect(),
             summary: whole.map(|stats| (stats.min, stats.shown_mean(), stats.max)),
+            counted: None,
             good: whole.map_or(0.0, |stats| (stats.seconds * 1e9 / columns.nanos as f64).clamp(0.0, 1.0)),
         }
     }

@@ -13,8 +13,8 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    plant::{exact::Exact, sample::Sample},
-    report::step_series::{HoldInterval, IntervalStats, StepSeries, gain},
+    plant::{counter::ReadingSummary, exact::Exact, number::to_i64, sample::Sample},
+    report::step_series::{HoldInterval, IntervalStats, StepSeries},
 };
 
 /// How finely values are kept.
@@ -82,7 +82,8 @@ pub struct Aggregate {
     pub stats: IntervalStats,
     /// The first good value.
     pub first: Exact,
-    /// How far it counted from the first to the last value, if it is a counter.
+    /// All its rises from the first to the last value, added: how often something on or off was switched on; and of what only
+    /// counts up, how far.
     pub gain: Exact,
     /// Samples that were stored in it, good or not.
     pub samples: u32,
@@ -93,9 +94,28 @@ impl Aggregate {
         Aggregate { at, stats: part.into(), first: part.value, gain: Exact::default(), samples: 0 }
     }
 
+    /// Was it good all the time, and did it never fall?
+    pub fn only_rises(&self, step: i64) -> bool {
+        let IntervalStats { min, max, last, .. } = self.stats;
+        self.is_whole(step) && min == self.first && max == last && self.gain == last - self.first
+    }
+
+    /// Was it good all the time? `step` is how long that is.
+    pub fn is_whole(&self, step: i64) -> bool {
+        step <= to_i64((self.stats.seconds * 1e6).round())
+    }
+
+    /// What it says of a counter.
+    pub fn summary(&self) -> ReadingSummary {
+        let Aggregate { at, stats, first, gain, .. } = *self;
+        let good = to_i64((stats.seconds * 1e6).round());
+        let (from, to) = (instant(at), instant(at + good));
+        ReadingSummary { from, to, first, last: stats.last, min: stats.min, max: stats.max, rises: gain }
+    }
+
     /// Adds a later one.
     pub fn merge(&mut self, later: Aggregate) {
-        self.gain = self.gain + gain(self.stats.last, later.first) + later.gain;
+        self.gain = self.gain + rise(self.stats.last, later.first) + later.gain;
         self.stats.merge(later.stats);
         self.samples += later.samples;
     }
@@ -229,6 +249,11 @@ pub fn pieces(from: i64, to: i64, widest: Tier, kept: &impl Fn(Tier) -> Vec<Rang
     all
 }
 
+/// How far a value is above the one before it.
+pub fn rise(last: Exact, value: Exact) -> Exact {
+    if last < value { value - last } else { Exact::default() }
+}
+
 /// The multiple of `step` at or before an instant.
 pub fn floor(at: i64, step: i64) -> i64 {
     at.div_euclid(step) * step
@@ -291,8 +316,8 @@ mod tests {
             120,
             &[(0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 60.0, 1), (60, 2.0, 2.0, 2.0, 2.0, 2.0, 0.0, 60.0, 1)],
         );
-        // A counter that was reset has counted 4 + 2.
-        check(&[(0, Some(6.0)), (20, Some(10.0)), (40, Some(2.0))], 60, &[(0, 2.0, 6.0, 10.0, 6.0, 2.0, 6.0, 60.0, 3)]);
+        // What has fallen in between is seen by its rises.
+        check(&[(0, Some(6.0)), (20, Some(10.0)), (40, Some(2.0))], 60, &[(0, 2.0, 6.0, 10.0, 6.0, 2.0, 4.0, 60.0, 3)]);
     }
 
     #[test]

@@ -121,6 +121,11 @@ impl Batch {
     }
 }
 
+/// The records as they would be if nothing had happened before an instant: of what lies after it.
+pub fn records_since(records: &[BatchRecord], from: Timestamp) -> Vec<BatchRecord> {
+    records.iter().map(|record| BatchRecord { at: record.at.max(from), ..record.clone() }).collect()
+}
+
 /// Batches from their records, which lie together for each batch and in the order of their places. One that runs is as long as
 /// it is at `now`.
 pub fn batches(records: &[BatchRecord], now: Timestamp) -> Vec<Batch> {

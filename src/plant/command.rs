@@ -108,6 +108,13 @@ pub enum CommandKind {
     StartProcedure(ProcedureId),
     /// End the procedure at work, or one that was interrupted, with the writes of its safe state.
     AbortProcedure(ProcedureId),
+    /// Correct what a counter has counted; the note of the command is the reason.
+    CorrectCounter {
+        /// Which.
+        tag: TagId,
+        /// What is added, in its unit; less than 0 takes away.
+        amount: Exact,
+    },
     /// Hand the plant over to the next shift; the note of the command is for that shift.
     HandOver,
     /// Take the plant over from the shift before.
@@ -141,6 +148,7 @@ impl CommandKind {
             | CommandKind::ReadSets
             | CommandKind::StartProcedure(_)
             | CommandKind::AbortProcedure(_)
+            | CommandKind::CorrectCounter { .. }
             | CommandKind::HandOver
             | CommandKind::TakeOver => None,
         }

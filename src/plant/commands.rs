@@ -19,9 +19,9 @@ use super::{
     scale,
 };
 use crate::plant::time::elapsed;
-use record::{record, value_text};
+use record::record;
 
-pub use record::{HAND_OVER, TAKE_OVER, alarm_action};
+pub use record::{HAND_OVER, TAKE_OVER, alarm_action, value_text};
 
 /// Commands in a snapshot.
 const SHOWN: usize = 32;

@@ -35,6 +35,7 @@ pub fn refusal(def: &PlantDef, kind: &CommandKind) -> Option<Refusal> {
         | CommandKind::SaveSet { .. }
         | CommandKind::StopRestore(_)
         | CommandKind::AbortProcedure(_)
+        | CommandKind::CorrectCounter { .. }
         | CommandKind::HandOver
         | CommandKind::TakeOver => false,
     };

@@ -24,6 +24,7 @@ use super::{
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::{CommandTracker, Limits},
     control_run::RunTracker,
+    counter::{self, CounterWatch},
     def::{LineDef, LineId, PlantDef, TagId},
     event::{Event, Fault, LineState, WriteResult},
     heard,
@@ -114,6 +115,7 @@ pub struct Plant {
     /// How far the data out has come.
     north: Option<Arc<NorthStatus>>,
     load: Option<ProcessLoad>,
+    counters: CounterWatch,
 }
 
 impl Plant {
@@ -142,21 +144,12 @@ impl Plant {
             programs: vec![ProgramWatch::default(); def.devices.len()],
             north: None,
             load: None,
+            counters: CounterWatch::default(),
             def,
             at,
             run: at.as_microsecond().cast_unsigned(),
             speed,
         }
-    }
-
-    /// The definition of the plant.
-    pub fn def(&self) -> &Arc<PlantDef> {
-        &self.def
-    }
-
-    /// Every line as it stands.
-    pub fn lines(&self) -> &[LineStatus] {
-        &self.lines
     }
 
     /// Applies an event.
@@ -276,6 +269,9 @@ impl Plant {
             | CommandKind::StopRestore(_) => self.set_command(&status, &mut effects),
             CommandKind::StartProcedure(id) => Some(self.start_procedure(id, &status).into()),
             CommandKind::AbortProcedure(id) => Some(self.abort_procedure(id, &status, &mut effects)),
+            CommandKind::CorrectCounter { tag, amount } => {
+                Some(counter::check_correction(self.def.tag(tag), amount, status.command.note.as_ref()).into())
+            }
             CommandKind::HandOver | CommandKind::TakeOver => {
                 Some(check_note(status.command.note.as_ref()).map_err(Refusal::Alarm).into())
             }
@@ -390,6 +386,7 @@ impl Plant {
         self.actuators.update(&self.def.logic, |tag| image.sample(tag), self.at);
         let events = self.evaluate_alarms();
         let mut records = self.image.records(self.at);
+        records.extend(self.counters.steps(&self.def, &self.image, &records));
         records.extend(events.into_iter().map(Record::Alarm));
         records.extend(self.follow_batches());
         records.extend(self.follow_runs(&records));

@@ -74,6 +74,8 @@ keyword_enum! {
         Values => "values",
         /// The same against the shift before and that of a week before.
         Comparison => "comparison",
+        /// What counters did beside counting.
+        Counters => "counters",
         /// Hours and starts of actuators.
         Runs => "run hours",
         /// Curves of trend groups.

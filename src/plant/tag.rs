@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Duration};
 use serde::{Deserialize, Serialize};
 
 pub use super::{
+    bound::Bound,
     calculation::Calculation,
     confidence::Confidence,
     data_type::{ByteOrder, DataType, Encoding},
@@ -88,6 +89,12 @@ pub struct TagDef {
     pub store_every: Duration,
     /// Whether it counts up, so that a report gives its difference and no mean; `None`: by its unit.
     pub counter: Option<bool>,
+    /// After so much, in its unit, a counter shows the same again; `None`: by its type.
+    pub modulus: Option<f64>,
+    /// The most that a counter counts in an hour, in its unit.
+    pub max_rate: Option<f64>,
+    /// Whether a report gives how long and how often it was on.
+    pub hours: bool,
     /// How sure the register map is of this row.
     pub confidence: Confidence,
     /// Where the row comes from (manual, clause).
@@ -141,6 +148,9 @@ impl TagDef {
             store: StorePolicy::Change,
             store_every: STORE_EVERY_MAX,
             counter: None,
+            modulus: None,
+            max_rate: None,
+            hours: false,
             confidence: Confidence::Proven,
             source: String::new(),
             simulate: None,
@@ -319,31 +329,6 @@ impl Decimals {
         match self {
             Decimals::From(tag) => Some(tag),
             Decimals::Fixed(_) => None,
-        }
-    }
-}
-
-/// A bound of a value.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub enum Bound {
-    /// A number in the tag's unit.
-    Fixed(Exact),
-    /// The present value of another tag.
-    From(TagId),
-}
-
-impl Bound {
-    /// What it is now; `Err` names the tag that is not known.
-    pub(super) fn now(self, value: impl Fn(TagId) -> Option<Exact>) -> Result<Exact, TagId> {
-        match self {
-            Bound::Fixed(bound) => Ok(bound),
-            Bound::From(from) => value(from).ok_or(from),
-        }
-    }
-    fn source(self) -> Option<TagId> {
-        match self {
-            Bound::From(tag) => Some(tag),
-            Bound::Fixed(_) => None,
         }
     }
 }

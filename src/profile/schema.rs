@@ -7,8 +7,8 @@ use std::time::Duration;
 use jiff::civil::Time;
 
 pub(super) use self::device::{
-    ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Roles, Scheme,
-    SignatureTable, SimulateTable, Stated, StepTable, TagTable,
+    ActionTable, CheckTable, CounterKey, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Roles,
+    Scheme, SignatureTable, SimulateTable, Stated, StepTable, TagTable,
 };
 use super::{
     condition::AlarmTable,

@@ -15,7 +15,7 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Names, check_name, number_of},
     reader::{At, Choice, OptionalKey, Raw, either, supersede, text},
-    schema::{PollWord, Roles, Scheme, SimulateTable, TagTable},
+    schema::{CounterKey, PollWord, Roles, Scheme, SimulateTable, TagTable},
     tag_keys::{check_calculated, check_text},
     units,
 };
@@ -116,7 +116,10 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         deadband: row.deadband.map(|deadband| deadband.value),
         store: store_policy(&row, is_text, access, poll),
         store_every: store_every(&row, problems),
-        counter: row.counter.map(|counter| counter.value),
+        counter: row.counter.map(|counter| !matches!(counter.value, CounterKey::Counts(false))),
+        modulus: modulus(&row, problems),
+        max_rate: row.max_rate.and_then(|rate| positive(rate, "max_rate", problems)),
+        hours: row.hours.is_some_and(|hours| hours.value && is_on_or_off(kind, hours.at, problems)),
         confidence: row.confidence.value_or(Confidence::Medium),
         source: text(&row.source),
         // Needs all tags of the plant.
@@ -313,6 +316,29 @@ fn poll(row: &TagTable, context: &DeviceContext) -> Poll {
 }
 
 /// What is read regularly is stored, unless the row says otherwise.
+/// Is it on or off, so that its hours can be given? A condition of an expression is.
+fn is_on_or_off(kind: Option<(DataType, Option<u8>)>, at: Span, problems: &mut Problems) -> bool {
+    let is = kind.is_none_or(|(kind, bits)| kind == DataType::Bool || bits == Some(1));
+    if !is {
+        problems.add(at, "only what is on or off has hours").label("expected a bool, one bit, or `expr = \"… > …\"`");
+    }
+    is
+}
+
+/// After how much a counter shows the same again.
+fn modulus(row: &TagTable, problems: &mut Problems) -> Option<f64> {
+    let Some(At { value: CounterKey::Rolls(Some(modulus)), .. }) = row.counter else { return None };
+    positive(modulus, "modulus", problems)
+}
+
+fn positive(number: At<f64>, key: &str, problems: &mut Problems) -> Option<f64> {
+    let is_right = 0.0 < number.value && number.value.is_finite();
+    if !is_right {
+        problems.add(number.at, format!("`{key}` must be greater than 0")).label("expected a number of its unit");
+    }
+    is_right.then_some(number.value)
+}
+
 fn store_policy(row: &TagTable, is_text: bool, access: Access, poll: Poll) -> StorePolicy {
     let stored = !is_text && access != Access::Write && (matches!(poll, Poll::Every(_)) || row.expr.is_some());
     row.store.map_or(if stored { StorePolicy::Change } else { StorePolicy::Never }, |store| store.value)

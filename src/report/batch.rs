@@ -34,12 +34,14 @@ pub struct BatchReport {
     pub alarms: Option<u64>,
     /// Where stored values could not be read: there, none is counted.
     pub unreadable: Vec<Gap>,
+    /// Of one that began before the period of a report, what lies of it in the period.
+    pub part: Option<Box<BatchReport>>,
 }
 
 impl BatchReport {
     /// Without figures.
     pub fn new(batch: Batch, until: Timestamp) -> BatchReport {
-        BatchReport { batch, until, tags: Vec::new(), energy: None, alarms: None, unreadable: Vec::new() }
+        BatchReport { batch, until, tags: Vec::new(), energy: None, alarms: None, unreadable: Vec::new(), part: None }
     }
 
     /// Its time, as a period to report on.

@@ -2,15 +2,16 @@
 //! and outcomes, stay as they were recorded.
 
 mod alarms;
+mod production;
+
+pub(super) use production::of_part;
 
 use std::{sync::Arc, time::Duration};
 
 use jiff::{Timestamp, civil, tz::TimeZone};
 
 use super::{
-    Compared, Gap, Outage, Period, PeriodName, RunFigures, ShiftReport, TagFigures, alarm_metrics,
-    batch::{self, BatchReport},
-    control_runs,
+    Compared, Gap, Outage, Period, PeriodName, ShiftReport, TagFigures, alarm_metrics, control_runs,
     csv::floor_percent,
     document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table, Times, plain},
     raised,
@@ -95,10 +96,11 @@ fn content(kind: Kind, report: &ShiftReport, def: &PlantDef) -> Option<Content> 
         Kind::Handover => table(handover(report)),
         Kind::Values => table(values(&report.tags)),
         Kind::Comparison => table(comparison(report, &def.time_zone)),
-        Kind::Runs => table(runs(&report.runs)),
+        Kind::Counters => table(production::counters(&report.counters)),
+        Kind::Runs => table(production::runs(&report.runs)),
         Kind::Curves => (!report.charts.is_empty()).then(|| Content::Charts(report.charts.clone())),
-        Kind::Batches => table(batches(&report.batches)),
-        Kind::ControlRuns => table(control_runs::table(&report.control_runs)),
+        Kind::Batches => table(production::batches(&report.batches)),
+        Kind::ControlRuns => table(control_runs::table(&report.control_runs, &report.run_parts)),
         Kind::Gaps => table(gaps(report)),
         Kind::AlarmCounts => table(alarms::alarm_counts(report)),
         Kind::Suppressed => table(alarms::suppressed(&report.suppressed)),
@@ -221,49 +223,6 @@ fn compared_row(tag: &TagFigures, compared: &[Compared]) -> Vec<Cell> {
         row.extend([cell(before), cell(change)]);
     }
     row
-}
-
-fn runs(runs: &[RunFigures]) -> Table {
-    let columns =
-        [Column::text("actuator"), Column::number("hours on"), Column::number("starts"), Column::number("good %")];
-    Table::new(columns).with(runs.iter().map(|run| {
-        let hours = run.on.map(|on| on.as_secs_f64() / 3_600.0);
-        let good = Cell::number(Some(floor_percent(run.good)), 1);
-        vec![Cell::text(&run.tag), Cell::number(hours, 2), Cell::number(run.starts, 0), good]
-    }))
-}
-
-fn batches(batches: &[BatchReport]) -> Table {
-    let columns = [
-        Column::text("batch"),
-        Column::number("number"),
-        Column::time("from"),
-        Column::time("to"),
-        Column::number("minutes"),
-        Column::text("state"),
-        Column::number("energy kWh"),
-        Column::number("energy good %"),
-        Column::number("alarms"),
-        Column::text("phases, minutes"),
-    ];
-    Table::new(columns).with(batches.iter().map(|report| {
-        let BatchReport { batch, energy, alarms, .. } = report;
-        let (kwh, good) = energy.unzip();
-        let phase = |(name, time): &(Arc<str>, Duration)| format!("{name} {:.1}", time.as_secs_f64() / 60.0);
-        let phases: Vec<String> = batch.phases.iter().map(phase).collect();
-        vec![
-            Cell::text(&batch.name),
-            Cell::number(Some(f64::from(batch.number)), 0),
-            Cell::Time(batch.from),
-            batch.to.map_or(Cell::Empty, Cell::Time),
-            minutes(batch.lasted),
-            Cell::text(batch::state(batch)),
-            Cell::number(kwh, 3),
-            Cell::number(good.map(floor_percent), 1),
-            Cell::number(alarms.map(|alarms| alarms as f64), 0),
-            Cell::text(phases.join(" | ")),
-        ]
-    }))
 }
 
 /// Where values are missing: what could not be read, devices that did not answer, times without a station.

@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
+    content::of_part,
     csv::{self, floor_percent, iso, number, plain},
     document::{Cell, Column, Table},
 };
@@ -15,6 +17,7 @@ use crate::{
         number::digits,
     },
     t,
+    text::translate,
 };
 
 /// Runs of one report; of more, the newest.
@@ -49,6 +52,17 @@ const HEADER: [&str; 26] = [
     "minutes",
     "partial",
 ];
+
+/// What lies of a run in the period of a report that it crosses an edge of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunPart {
+    /// Controller and number: `TIC-1-17`.
+    pub run: String,
+    /// How long it lasted in the period.
+    pub lasted: Duration,
+    /// Energy in kWh in the period, and the share of that time in which it was known.
+    pub energy: Option<(f64, f64)>,
+}
 
 /// The list of runs, a row each.
 pub fn csv(runs: &[ControlRun], def: &PlantDef, dialect: CsvDialect) -> Vec<u8> {
@@ -129,7 +143,7 @@ pub fn text(runs: &[ControlRun], def: &PlantDef) -> String {
 /// `setpoint 27.0 → 70.0 °C`, `program step 2, 70.0 °C`, `batch hot-water-3, 70.0 °C`.
 pub fn setpoint(run: &ControlRun) -> String {
     let value = |value: f64| digits(value, Some(run.decimals));
-    let (cause, sv, unit) = (crate::text::translate(run.cause.word()), value(run.sv), &run.unit);
+    let (cause, sv, unit) = (translate(run.cause.word()), value(run.sv), &run.unit);
     let detail = run.detail.strip_prefix("step ").unwrap_or(&run.detail);
     match (detail, run.sv_before) {
         ("", Some(before)) => format!("{cause} {} → {sv} {unit}", value(before)),
@@ -185,11 +199,12 @@ pub fn clock(time: Duration) -> String {
 }
 
 /// The runs as a table of a report.
-pub(super) fn table(runs: &[ControlRun]) -> Table {
+pub(super) fn table(runs: &[ControlRun], parts: &[RunPart]) -> Table {
     let columns = [
         Column::text("run"),
         Column::time("from"),
         Column::number("minutes"),
+        Column::text("state"),
         Column::text("setpoint"),
         Column::number("first at SV, min"),
         Column::number("steady from, min"),
@@ -201,6 +216,8 @@ pub(super) fn table(runs: &[ControlRun]) -> Table {
         Column::number("energy good %"),
         Column::number("good %"),
         Column::text("settings"),
+        Column::number("whole minutes"),
+        Column::number("whole energy kWh"),
     ];
     let minutes = |time: Duration| Cell::number(Some(time.as_secs_f64() / 60.0), 1);
     let figure = |figure: Figure| match figure {
@@ -209,12 +226,15 @@ pub(super) fn table(runs: &[ControlRun]) -> Table {
         Figure::Unknown => Cell::text(t!("unknown")),
     };
     Table::new(columns).with(runs.iter().map(|run| {
-        let (kwh, kwh_good) = run.energy.unzip();
+        let part = parts.iter().find(|part| part.run == run.label());
+        let (lasted, energy) = part.map_or((run.lasted(), run.energy), |part| (part.lasted, part.energy));
+        let (kwh, kwh_good) = energy.unzip();
         let changed = if run.settings_changed { t!(" (changed)") } else { "" };
         vec![
             Cell::text(run.label()),
             Cell::Time(run.from),
-            minutes(run.lasted()),
+            minutes(lasted),
+            Cell::text(of_part(translate(run.state.word()), part.is_some())),
             Cell::text(setpoint(run)),
             figure(run.at_sv),
             figure(run.steady),
@@ -226,6 +246,8 @@ pub(super) fn table(runs: &[ControlRun]) -> Table {
             Cell::number(kwh_good.map(floor_percent), 1),
             Cell::number(Some(floor_percent(run.good)), 1),
             Cell::text(format!("{}{changed}", run.settings)),
+            part.map_or(Cell::Empty, |_| minutes(run.lasted())),
+            Cell::number(part.and(run.energy).map(|(kwh, _)| kwh), 3),
         ]
     }))
 }

@@ -20,6 +20,8 @@ pub struct Series {
     pub buckets: Vec<Option<Bucket>>,
     /// Of the whole span: (min, time-weighted mean, max) of good values.
     pub summary: Option<(Exact, Exact, Exact)>,
+    /// What a counter counted from the value at the begin of the span to that at its end, where only one column was asked.
+    pub counted: Option<Exact>,
     /// Share of the span with a good value, 0–1.
     pub good: f64,
 }

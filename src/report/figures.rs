@@ -9,10 +9,11 @@ use jiff::{Timestamp, ToSpan, tz::TimeZone};
 
 use super::{
     DECIMALS_UNKNOWN, Outage, RecordRow, RunFigures, SuppressedSummary, TagFigures,
-    step_series::{IntervalStats, gain, good_exact},
+    step_series::{IntervalStats, good_exact},
 };
 use crate::plant::{
     alarm::manager::subject_name,
+    counter,
     def::{Condition, PlantDef, TagId},
     exact::Exact,
     record::{AlarmEvent, AlarmRecord},
@@ -34,9 +35,6 @@ pub struct TagDescription {
     pub counts: bool,
 }
 
-/// Units in which only counters of energy and charge count.
-const COUNTED: [&str; 12] = ["Wh", "kWh", "MWh", "GWh", "varh", "kvarh", "Mvarh", "VAh", "kVAh", "MVAh", "Ah", "kAh"];
-
 impl TagDescription {
     /// Name, unit and decimals of a tag, where the device may have chosen the last two: `latest` has the latest good values
     /// of the tags that hold them.
@@ -48,7 +46,7 @@ impl TagDescription {
             }
         };
         let unit = def.unit_by(|tag| latest.get(&tag).copied()).unwrap_or(&def.unit).to_owned();
-        let counts = def.counter.unwrap_or_else(|| COUNTED.contains(&unit.as_str()));
+        let counts = counter::counts_in(def, &unit);
         TagDescription { tag: def.name.clone(), unit, decimals, counts }
     }
 }
@@ -64,41 +62,34 @@ pub struct Figures {
     seconds: f64,
     first: Option<Exact>,
     stats: Option<IntervalStats>,
-    counted: Exact,
 }
 
 impl Figures {
     /// Over `from..until`; nothing has come yet.
     pub fn new(from: Timestamp, until: Timestamp) -> Figures {
-        Figures {
-            seconds: until.duration_since(from).as_secs_f64(),
-            first: None,
-            stats: None,
-            counted: Exact::default(),
-        }
+        Figures { seconds: until.duration_since(from).as_secs_f64(), first: None, stats: None }
     }
 
-    /// The next stretch, by its first value, its figures, and how far it counted from the first to the last.
-    pub fn add(&mut self, first: Exact, stats: IntervalStats, counted: Exact) {
+    /// The next stretch, by its first value and its figures.
+    pub fn add(&mut self, first: Exact, stats: IntervalStats) {
         self.first.get_or_insert(first);
-        self.counted = self.counted + self.stats.map_or(Exact::default(), |stats| gain(stats.last, first)) + counted;
         IntervalStats::add(&mut self.stats, stats);
     }
 
-    /// How long and how often the tag, 0 or 1, was on.
-    pub fn runs(self, tag: String) -> RunFigures {
+    /// How long the tag, 0 or 1, was on, and how often it was switched on.
+    pub fn runs(self, tag: String, starts: Exact) -> RunFigures {
         let two_states = self.stats.filter(|stats| 0.0 <= stats.min.near() && stats.max.near() <= 1.0);
         RunFigures {
             tag,
             on: two_states.map(|stats| Duration::from_secs_f64((stats.mean * stats.seconds).max(0.0))),
-            starts: two_states.map(|_| self.counted.near()),
+            starts: two_states.map(|_| starts.near()),
             good: self.stats.map_or(0.0, |stats| (stats.seconds / self.seconds).clamp(0.0, 1.0)),
         }
     }
 
-    /// The figures, when the last stretch has come.
-    pub fn end(self, label: TagDescription, in_alarm: Duration) -> TagFigures {
-        let Figures { seconds, first, stats, counted } = self;
+    /// The figures, when the last stretch has come, with what a counter counted.
+    pub fn end(self, label: TagDescription, counted: Exact, in_alarm: Duration) -> TagFigures {
+        let Figures { seconds, first, stats } = self;
         let (mean, difference) = match label.counts {
             true => (None, stats.map(|_| counted)),
             false => (stats.map(|stats| stats.shown_mean()), None),

@@ -6,6 +6,7 @@ pub mod period_parser;
 pub mod step_series;
 pub(crate) mod figures;
 pub mod batch;
+pub mod counters;
 pub mod control_runs;
 pub mod procedures;
 pub(crate) mod alarm_metrics;
@@ -272,6 +273,8 @@ pub struct ShiftReport {
     pub tags: Vec<TagFigures>,
     /// The same of earlier periods to compare with.
     pub compared: Vec<Compared>,
+    /// What counters did beside counting, in order of time.
+    pub counters: Vec<counters::CounterRow>,
     /// One row an actuator.
     pub runs: Vec<RunFigures>,
     /// When devices did not answer, and when no station ran.
@@ -282,6 +285,8 @@ pub struct ShiftReport {
     pub batches: Vec<batch::BatchReport>,
     /// The control runs in the period, newest first.
     pub control_runs: Vec<ControlRun>,
+    /// Of those that cross an edge of the period, what lies in it.
+    pub run_parts: Vec<control_runs::RunPart>,
     /// Alarms that were active while they were suppressed, shelved or out of service.
     pub suppressed: Vec<SuppressedSummary>,
     /// Alarm events in the period, oldest first.

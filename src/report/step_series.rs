@@ -170,13 +170,6 @@ impl IntervalStats {
     }
 }
 
-/// How far a counter counted between two values. One that shows less than half of its last value, but not less than
-/// nothing, was reset or has rolled over: it counts from zero. Any other step back is that of a balance, as of energy taken
-/// and fed back.
-pub fn gain(last: Exact, value: Exact) -> Exact {
-    if (0.0..last.near() / 2.0).contains(&value.near()) { value } else { value - last }
-}
-
 /// A good value that is a number. A stored NaN or infinity is no value, whatever its quality says.
 pub fn good_exact(sample: Sample) -> Option<Exact> {
     sample.good_exact().filter(|value| value.is_finite())

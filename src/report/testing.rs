@@ -8,12 +8,15 @@ use super::{
     Compared, Gap, Outage, Period, PeriodName, RecordRow, RunFigures, ShiftReport, SuppressedSummary, TagFigures,
     alarm_metrics,
     chart::{Chart, ChartCurve},
+    counters::CounterRow,
     curve::Bucket,
     figures::Figures,
-    step_series::StepSeries,
+    step_series::{HoldInterval, StepSeries},
 };
 use crate::plant::{
+    counter::{Counter, CounterEvent, CounterRule, CounterStep, Reading},
     def::{DeviceDef, DeviceId, Faceplate, Limits, LineId, MimicDef, PlantDef, Priority, ReportDef, ShiftDef, TagId},
+    exact::Exact,
     record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
     sample::Sample,
     tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
@@ -130,8 +133,27 @@ pub fn tag(id: u16, short: &str) -> TagDef {
 pub fn figures_of(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Figures {
     let (mut figures, mut steps) = (Figures::new(from, until), StepSeries::new(from, until));
     let held: Vec<_> = samples.filter_map(|sample| steps.next(sample)).collect();
-    held.into_iter().chain(steps.end()).for_each(|held| figures.add(held.value, held.into(), 0.0.into()));
+    held.into_iter().chain(steps.end()).for_each(|held| figures.add(held.value, held.into()));
     figures
+}
+
+/// What a counter counted by samples, which come in order of time, and what was not plain counting.
+pub fn counted_of(
+    samples: impl Iterator<Item = Sample>,
+    rule: CounterRule,
+    (from, until): (Timestamp, Timestamp),
+) -> (Exact, Vec<CounterStep>) {
+    let (mut counter, mut gain, mut found) = (Counter::new(rule), Exact::default(), Vec::new());
+    let mut steps = StepSeries::new(Timestamp::MIN, until);
+    let held: Vec<_> = samples.filter_map(|sample| steps.next(sample)).collect();
+    for HoldInterval { from: at, to, value } in held.into_iter().chain(steps.end()) {
+        let counted = counter.read(Reading { value, at, until: to });
+        if from <= at {
+            gain = gain + counted.gain;
+            found.extend(counted.step);
+        }
+    }
+    (gain, found)
 }
 
 /// The report of a morning: figures with and without values, a counter, every list filled, names that are formulas.
@@ -148,6 +170,20 @@ pub fn shift_report() -> ShiftReport {
         }],
         batches: Vec::new(),
         control_runs: Vec::new(),
+        run_parts: Vec::new(),
+        counters: vec![CounterRow {
+            tag: "PM-1.E".into(),
+            unit: "kWh".into(),
+            decimals: 1,
+            step: CounterStep {
+                at: at("2026-11-21T09:30+07"),
+                event: CounterEvent::Replaced,
+                old: 50_000.5.into(),
+                new: 300.0.into(),
+                counted: 0.0.into(),
+            },
+            note: String::new(),
+        }],
         compared: vec![Compared {
             period: Period {
                 name: named("night 2026-11-20"),

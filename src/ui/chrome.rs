@@ -197,7 +197,11 @@ pub fn last_command_label(cx: &ViewContext, pending: &LastCommand) -> (String, S
         (CommandKind::Refresh(_), Outcome::Verified) => (t!("requested").to_owned(), false),
         // Nothing was written that could be read back.
         (
-            CommandKind::Alarm(_) | CommandKind::HandOver | CommandKind::TakeOver | CommandKind::Connect(..),
+            CommandKind::Alarm(_)
+            | CommandKind::CorrectCounter { .. }
+            | CommandKind::HandOver
+            | CommandKind::TakeOver
+            | CommandKind::Connect(..),
             Outcome::Verified,
         ) => (t!("done").to_owned(), false),
         (_, outcome) => outcome_words(outcome),
@@ -275,6 +279,10 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<Exact>) -
         CommandKind::StopRestore(device) => t!("stop restore of {name}", name = cx.def().device(*device).name),
         CommandKind::StartProcedure(id) => t!("start procedure {name}", name = cx.def().procedure(*id).name),
         CommandKind::AbortProcedure(id) => t!("abort procedure {name}", name = cx.def().procedure(*id).name),
+        CommandKind::CorrectCounter { tag, amount } => {
+            let value = format!("{} {}", cx.snapshot.format(*tag, *amount), cx.snapshot.unit(*tag));
+            t!("correct {name} by {value}", name = cx.def().tag(*tag).name, value = value.trim_end())
+        }
         CommandKind::HandOver => t!("hand over").to_owned(),
         CommandKind::TakeOver => t!("take over").to_owned(),
     }

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     history::{
         ArchiveFile, HistoryError,
-        tiers::{Aggregate, CurvePart, Tier, pieces},
+        tiers::{Aggregate, CurvePart, Piece, Tier, pieces},
     },
     plant::{def::TagId, exact::Exact},
     report::{
@@ -40,10 +40,7 @@ impl Store {
         widest: Tier,
         mut each: impl FnMut(usize, CurvePart),
     ) -> Result<Vec<Gap>, HistoryError> {
-        let avoided = self.avoided.borrow().clone();
-        let files = self.files(None)?;
-        let kept = |tier| kept(&files, tier, &avoided);
-        let pieces = pieces(from.as_microsecond(), to.as_microsecond(), widest, &kept);
+        let pieces = self.pieces(from.as_microsecond()..to.as_microsecond(), widest)?;
         // Before anything is read. Those of aggregates are few in any period.
         let of_samples = pieces.iter().filter(|piece| piece.tier == Tier::Raw);
         if let Some(longest) = of_samples.max_by_key(|piece| piece.to - piece.from)
@@ -54,20 +51,39 @@ impl Store {
         let mut gaps = Vec::new();
         for piece in pieces {
             let (Some(from), Some(to)) = (instant(piece.from), instant(piece.to)) else { continue };
-            if piece.tier != Tier::Raw {
-                self.each_aggregate(tags, piece.tier, (from, to), &mut each)?;
-                continue;
+            gaps.extend(self.each_part_of(tags, (from, to), piece.tier, &mut each)?);
+        }
+        Ok(gaps)
+    }
+
+    /// What answers for a span, in pieces in order of time.
+    pub(super) fn pieces(&self, span: Range<i64>, widest: Tier) -> Result<Vec<Piece>, HistoryError> {
+        let avoided = self.avoided.borrow().clone();
+        let files = self.files(None)?;
+        Ok(pieces(span.start, span.end, widest, &|tier| kept(&files, tier, &avoided)))
+    }
+
+    /// The same as [`Store::each_part`], all of one tier.
+    pub(super) fn each_part_of(
+        &self,
+        tags: &[TagId],
+        (from, to): (Timestamp, Timestamp),
+        tier: Tier,
+        mut each: impl FnMut(usize, CurvePart),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        if tier != Tier::Raw {
+            self.each_aggregate(tags, tier, (from, to), &mut each)?;
+            return Ok(Vec::new());
+        }
+        let mut steps = vec![StepSeries::new(from, to); tags.len()];
+        let gaps = self.each_sample(tags, from, to, |place, sample| {
+            if let Some(held) = steps[place].next(sample) {
+                each(place, CurvePart::Held(held));
             }
-            let mut steps = vec![StepSeries::new(from, to); tags.len()];
-            gaps.extend(self.each_sample(tags, from, to, |place, sample| {
-                if let Some(held) = steps[place].next(sample) {
-                    each(place, CurvePart::Held(held));
-                }
-            })?);
-            for (place, steps) in steps.into_iter().enumerate() {
-                if let Some(held) = steps.end() {
-                    each(place, CurvePart::Held(held));
-                }
+        })?;
+        for (place, steps) in steps.into_iter().enumerate() {
+            if let Some(held) = steps.end() {
+                each(place, CurvePart::Held(held));
             }
         }
         Ok(gaps)

@@ -10,7 +10,7 @@ use super::{
 use crate::{
     history::{BATCHES_MAX, HistoryError},
     plant::{
-        batch::{Batch, BatchEvent, BatchRecord, batches},
+        batch::{Batch, BatchEvent, BatchRecord, batches, records_since},
         keyword::Keyword,
         record::AlarmEvent,
         time::elapsed,
@@ -49,7 +49,15 @@ impl Store {
         within(records.len() as u64, ROWS_MAX)?;
         // Its own end is that of its period.
         records.retain(|record| record.at <= until);
-        self.with_figures(batches(&records, until), until)
+        let mut reports = self.with_figures(batches(&records, until), until)?;
+        let parts = batches(&records_since(&records, from), until);
+        let with_figures = parts.len() <= BATCHES_MAX;
+        for (report, part) in reports.iter_mut().zip(parts).filter(|(report, _)| report.batch.from < from) {
+            let end = part.until(until);
+            let part = if with_figures { self.batch(part, end)? } else { BatchReport::new(part, end) };
+            report.part = Some(Box::new(part));
+        }
+        Ok(reports)
     }
 
     fn with_figures(&self, batches: Vec<Batch>, now: Timestamp) -> Result<Vec<BatchReport>, HistoryError> {

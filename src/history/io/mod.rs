@@ -62,6 +62,7 @@ pub mod tables;
 pub mod archive;
 pub mod archiver;
 pub mod aggregates;
+mod counts;
 mod copy;
 pub mod backup;
 pub mod restore;

@@ -15,6 +15,7 @@ use crate::{
         series::{self, Curve},
     },
     plant::{
+        counter,
         def::{Priority, TagId},
         exact::Exact,
         keyword::Keyword,
@@ -117,7 +118,27 @@ impl Store {
         if known.0 < known.1 {
             self.each_part(&tags.each, known, tier, |place, part| curves[place].add(part))?;
         }
-        Ok(tags.all(curves.into_iter().map(Curve::end)))
+        let mut series: Vec<Series> = curves.into_iter().map(Curve::end).collect();
+        if buckets == 1 && known.0 < known.1 {
+            self.add_counted(&mut series, known)?;
+        }
+        Ok(tags.all(series.into_iter()))
+    }
+
+    /// What counters counted from the value in force at one instant to that at another.
+    fn add_counted(&self, series: &mut [Series], (from, to): (Timestamp, Timestamp)) -> Result<(), HistoryError> {
+        let after = |at: Timestamp| at.checked_add(Duration::from_micros(1)).unwrap_or(at);
+        let counters: Vec<TagId> =
+            series.iter().map(|series| series.tag).filter(|tag| counter::may_count(self.def.tag(*tag))).collect();
+        if counters.is_empty() {
+            return Ok(());
+        }
+        let gathered = self.gather(&counters, std::iter::empty(), (after(from), after(to)))?;
+        for series in series.iter_mut().filter(|series| counters.contains(&series.tag)) {
+            let figures = gathered.rows(&self.def, &[series.tag], std::iter::empty());
+            series.counted = figures.first().and_then(|figures| figures.difference);
+        }
+        Ok(())
     }
 
     /// The values at equal distances: the first instant is one `every` after `from`. Nothing stands after `now`.

@@ -11,6 +11,7 @@ use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
+    counts::CountedTag,
     read::{ROWS_MAX, SAMPLES_MAX, action, chain_hash, check_span},
     sql,
     store::{Store, utc},
@@ -23,6 +24,7 @@ use crate::{
     },
     plant::{
         PlantDef,
+        counter::{self, CounterRule, CounterStep},
         def::{Section, TagId, TrendGroup},
         exact::Exact,
         record::AlarmRecord,
@@ -33,6 +35,7 @@ use crate::{
     report::{
         Compared, Gap, Outage, Period, RecordRow, RunFigures, ShiftReport, TagFigures, calendar,
         chart::{Chart, ChartCurve},
+        counters::CounterRow,
         figures::{self, Figures, TagDescription},
         step_series::ValuesAt,
     },
@@ -51,12 +54,12 @@ struct Gathered {
 
 impl Gathered {
     fn add(&mut self, part: CurvePart) {
-        let (first, stats, gain) = match part {
-            CurvePart::Held(held) => (held.value, held.into(), Exact::default()),
-            CurvePart::Aggregate(Aggregate { stats, first, gain, .. }) => (first, stats, gain),
+        let (first, stats) = match part {
+            CurvePart::Held(held) => (held.value, held.into()),
+            CurvePart::Aggregate(Aggregate { stats, first, .. }) => (first, stats),
         };
         if let Some(figures) = &mut self.figures {
-            figures.add(first, stats, gain);
+            figures.add(first, stats);
         }
         self.latest_good = Some(stats.last);
     }
@@ -67,6 +70,7 @@ pub(super) struct GatheredTags {
     span: (Timestamp, Timestamp),
     of: HashMap<TagId, Gathered>,
     latest: HashMap<TagId, f64>,
+    counted: HashMap<TagId, CountedTag>,
     pub unreadable: Vec<Gap>,
 }
 
@@ -86,15 +90,37 @@ impl GatheredTags {
             let label = TagDescription::new(def.tag(*tag), &self.latest);
             let events = by_subject.get(label.tag.as_str()).into_iter().flatten().copied();
             let in_alarm = figures::time_in_alarm(events, from, until);
-            Some(self.of.get(tag)?.figures?.end(label, in_alarm))
+            Some(self.of.get(tag)?.figures?.end(label, self.gain(*tag), in_alarm))
         };
         tags.iter().filter_map(row).collect()
     }
 
     /// The run hours of the actuators.
     fn runs(&self, def: &PlantDef) -> Vec<RunFigures> {
-        let row = |tag: TagId| Some(self.of.get(&tag)?.figures?.runs(def.tag(tag).name.clone()));
+        let row = |tag: TagId| Some(self.of.get(&tag)?.figures?.runs(def.tag(tag).name.clone(), self.gain(tag)));
         outputs(def).filter_map(row).collect()
+    }
+
+    /// What counters did beside counting, in order of time.
+    fn counters(&self, def: &PlantDef) -> Vec<CounterRow> {
+        let rows = self.counted.iter().flat_map(|(tag, counted)| {
+            let TagDescription { tag, unit, decimals, counts } = TagDescription::new(def.tag(*tag), &self.latest);
+            let row = move |(step, note): &(CounterStep, String)| CounterRow {
+                tag: tag.clone(),
+                unit: unit.clone(),
+                decimals,
+                step: *step,
+                note: note.clone(),
+            };
+            counted.steps.iter().filter(move |_| counts).map(row)
+        });
+        let mut rows: Vec<CounterRow> = rows.collect();
+        rows.sort_by(|one, other| (one.step.at, &one.tag).cmp(&(other.step.at, &other.tag)));
+        rows
+    }
+
+    fn gain(&self, tag: TagId) -> Exact {
+        self.counted.get(&tag).map_or(Exact::default(), |counted| counted.gain)
     }
 }
 
@@ -135,9 +161,10 @@ impl Store {
             None => (Vec::new(), None),
         };
         let tags = gathered.rows(def, &reported, active.iter().chain(&alarms));
-        let runs = gathered.runs(def);
+        let (counters, runs) = (gathered.counters(def), gathered.runs(def));
         let charts = self.charts((from, until), &gathered.latest)?;
         let (control_runs, left_out) = self.control_runs_of(from, until)?;
+        let run_parts = self.run_parts(&control_runs, (from, until))?;
         let mut unreadable = gathered.unreadable;
         unreadable.extend(left_out);
         let compared = self.compared(&reported, period, until)?;
@@ -155,11 +182,13 @@ impl Store {
             unreadable,
             tags,
             compared,
+            counters,
             runs,
             outages,
             charts,
             batches,
             control_runs,
+            run_parts,
             suppressed,
             alarms,
             alarm_metrics,
@@ -253,7 +282,9 @@ impl Store {
             .zip(&gathered)
             .filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?.near())))
             .collect();
-        Ok(GatheredTags { span: (from, until), of: tags.into_iter().zip(gathered).collect(), latest, unreadable })
+        let counted = self.count(counting(&self.def, &shown, &latest), (from, until))?.into_iter().collect();
+        let of = tags.into_iter().zip(gathered).collect();
+        Ok(GatheredTags { span: (from, until), of, latest, counted, unreadable })
     }
 
     fn record(
@@ -290,10 +321,25 @@ impl Store {
     }
 }
 
-/// The stored outputs of actuators that are on or off.
+/// The stored outputs of actuators that are on or off, and what else has its hours given; each once.
 fn outputs(def: &PlantDef) -> impl Iterator<Item = TagId> {
     let outputs = def.logic.actuators.iter().map(|actuator| actuator.output);
-    outputs.filter(|tag| def.tag(*tag).is_stored() && def.tag(*tag).point.kind == DataType::Bool)
+    let outputs = outputs.filter(|tag| def.tag(*tag).point.kind == DataType::Bool);
+    let asked = def.tags.iter().filter(|tag| tag.hours).map(|tag| tag.id);
+    let mut seen = HashSet::new();
+    outputs.chain(asked).filter(|tag| def.tag(*tag).is_stored()).filter(move |tag| seen.insert(*tag))
+}
+
+/// Those of some tags that count, and how.
+fn counting(def: &PlantDef, tags: &HashSet<TagId>, latest: &HashMap<TagId, f64>) -> Vec<(TagId, CountedTag)> {
+    let switched: HashSet<TagId> = outputs(def).collect();
+    let of_tag = |tag: &TagId| {
+        let of = def.tag(*tag);
+        let rule = || CounterRule::of(of, of.scaling_decimals(|tag| latest.get(&tag).copied()));
+        let counter = counter::may_count(of).then(|| CountedTag::counter(rule()));
+        Some((*tag, counter.or_else(|| switched.contains(tag).then(CountedTag::starts))?))
+    };
+    tags.iter().filter_map(of_tag).collect()
 }
 
 fn rows(from: Timestamp, until: Timestamp, interval: Duration) -> u64 {

@@ -14,8 +14,12 @@ use crate::{
     plant::{
         control_run::{ControlRun, Figure, RunCause, RunState},
         keyword::Keyword,
+        time::elapsed,
     },
-    report::{Gap, control_runs::RUNS_MAX},
+    report::{
+        Gap, batch,
+        control_runs::{RUNS_MAX, RunPart},
+    },
 };
 
 const COLUMNS: &str =
@@ -53,6 +57,29 @@ impl Store {
             Gap { from: from.min(first.from), to: first.until, why }
         });
         Ok((runs, left_out))
+    }
+
+    /// What lies in a period of the runs that cross an edge of it.
+    pub(super) fn run_parts(
+        &self,
+        runs: &[ControlRun],
+        (from, until): (Timestamp, Timestamp),
+    ) -> Result<Vec<RunPart>, HistoryError> {
+        let mut parts = Vec::new();
+        for run in runs.iter().filter(|run| run.from < from || until < run.until) {
+            let span = (run.from.max(from), run.until.min(until));
+            let rule = self.def.runs.iter().find(|rule| *self.def.device(rule.controller).name == *run.controller);
+            let energy = match rule.and_then(|rule| rule.energy).filter(|_| span.0 < span.1) {
+                Some((tag, _)) => {
+                    let gathered = self.gather(&[tag], std::iter::empty(), span)?;
+                    let figures = gathered.rows(&self.def, &[tag], std::iter::empty());
+                    figures.first().and_then(|figures| batch::energy(figures, elapsed(span.0, span.1)))
+                }
+                None => None,
+            };
+            parts.push(RunPart { run: run.label(), lasted: elapsed(span.0, span.1), energy });
+        }
+        Ok(parts)
     }
 
     /// The latest run of each controller.

@@ -179,6 +179,11 @@ pub fn actions(order: &str) -> String {
     format!("SELECT {ACTION} FROM operator_action WHERE utc >= ? AND utc < ? AND action NOT IN ({others}) {order}")
 }
 
+/// The corrections of counters in a span that were accepted, oldest first.
+pub const CORRECTIONS: &str =
+    "SELECT utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash
+    FROM operator_action WHERE action = ? AND outcome = 'verified' AND utc >= ? AND utc < ? ORDER BY utc, rowid";
+
 /// Actions in a span, newest first, with a part of who, of the action, and of the words of all columns; large and small
 /// letters are the same. An empty part is in everything.
 pub fn audit() -> String {
@@ -301,7 +306,7 @@ fn table_of(tier: Tier) -> &'static str {
 /// The tables in which minutes and hours are formed.
 pub const FORMED: [&str; 2] = ["m1_formed", "h1_formed"];
 
-/// Makes them, of this connection alone. `gain` is how far a counter counted from the first value to the last, `good_ms` for
+/// Makes them, of this connection alone. `gain` is how far it rose from the first value to the last, all rises added, `good_ms` for
 /// how long the values were good, `n` how many samples were stored.
 pub fn form_tables() -> String {
     let columns = "utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, min DOUBLE NOT NULL, max DOUBLE NOT NULL, mean DOUBLE NOT NULL,

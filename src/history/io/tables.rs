@@ -4,7 +4,7 @@
 //! | view | columns |
 //! |---|---|
 //! | `sample` | `utc`, `tag`, `value`, `unit`, `quality` (`good`, `uncertain: …`, `bad: …`), `exact` |
-//! | `m1`, `h1` | `utc` (begin), `tag`, `min`, `max`, `mean` (over good time), `first`, `last`, `gain` (of a counter), `good_ms`, `n` (samples), `unit`: of what is archived; `min_exact`, `max_exact`, `first_exact`, `last_exact`, `gain_exact` |
+//! | `m1`, `h1` | `utc` (begin), `tag`, `min`, `max`, `mean` (over good time), `first`, `last`, `gain` (all rises), `good_ms`, `n` (samples), `unit`: of what is archived; `min_exact`, `max_exact`, `first_exact`, `last_exact`, `gain_exact` |
 //! | `alarm` | `utc`, `subject`, `message`, `priority` (1–4), `event`, `value`, `limit_value`, `by_whom`, `reason`, `value_exact` |
 //! | `batch` | `utc` (begin), `until` (NULL while it runs), `batch`, `number`, `minutes`, `begin_seen`, `end_seen` |
 //! | `phase` | `utc` (begin of the batch), `batch`, `number`, `phase` (`unknown` as well), `minutes` |

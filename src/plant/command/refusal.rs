@@ -105,6 +105,12 @@ pub enum Refusal {
     /// The alarm does not accept the command.
     #[error("{0}")]
     Alarm(AlarmRefusal),
+    /// It does not count.
+    #[error("{}", t!("not a counter"))]
+    NotACounter,
+    /// Nothing would be corrected by it.
+    #[error("{}", t!("not an amount"))]
+    NotAnAmount,
 }
 
 /// Why a write is not confirmed.

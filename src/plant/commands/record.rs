@@ -3,6 +3,7 @@
 use crate::plant::{
     alarm::{AlarmCommand, manager::subject_name},
     command::{CommandKind, CommandStatus},
+    counter,
     def::{AlarmId, PlantDef},
     exact::Exact,
     number::digits,
@@ -42,6 +43,10 @@ pub(super) fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImag
         CommandKind::StopRestore(device) => ("stop restore", def.device(*device).name.clone(), None),
         CommandKind::StartProcedure(id) => (procedure::START, def.procedure(*id).name.to_string(), None),
         CommandKind::AbortProcedure(id) => (procedure::ABORT, def.procedure(*id).name.to_string(), None),
+        CommandKind::CorrectCounter { tag, amount } => {
+            let tag = def.tag(*tag);
+            (counter::CORRECT, tag.name.clone(), Some(value_text(image, tag, *amount)))
+        }
         CommandKind::HandOver => (HAND_OVER, def.name.clone(), None),
         CommandKind::TakeOver => (TAKE_OVER, def.name.clone(), None),
     };
@@ -92,7 +97,7 @@ pub fn alarm_action(def: &PlantDef, alarm_command: &AlarmCommand) -> (&'static s
 }
 
 /// A value as text with label or unit.
-pub(super) fn value_text(image: &ProcessImage, tag: &TagDef, value: impl Into<Exact>) -> String {
+pub fn value_text(image: &ProcessImage, tag: &TagDef, value: impl Into<Exact>) -> String {
     let value = value.into();
     match tag.label_of(value) {
         Some(label) => label.to_owned(),

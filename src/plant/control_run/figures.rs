@@ -5,7 +5,12 @@ use std::time::Duration;
 use jiff::Timestamp;
 
 use super::{BAND, ControlRun, Figure, GAP_MAX, RunDef, View};
-use crate::plant::{energy::Measures, exact::Exact, time::elapsed};
+use crate::plant::{
+    counter::{Counter, CounterRule, Reading},
+    energy::Measures,
+    exact::Exact,
+    time::elapsed,
+};
 
 /// Rise time is measured between these shares of the way from PV to SV.
 const RISE: [f64; 2] = [0.1, 0.9];
@@ -34,6 +39,8 @@ pub(super) struct Figures {
 struct Meter {
     /// The last good value.
     last: Option<f64>,
+    /// Of what counts.
+    counter: Option<Counter>,
     /// It was good at the last update.
     known: bool,
     kwh: f64,
@@ -70,6 +77,10 @@ impl Figures {
         let time = elapsed(self.last, view.at);
         self.pass(run, view.at);
         if let Some((tag, measures)) = def.energy {
+            if let Measures::Energy(kwh) = measures {
+                let decimals = view.plant.tag(tag).scaling_decimals(|tag| view.good(tag));
+                self.energy.count(view.good(tag), kwh, view.at, || CounterRule::of(view.plant.tag(tag), decimals));
+            }
             self.energy.add(view.good(tag), measures, time);
             run.energy = self.energy.last.map(|_| (self.energy.kwh, share(self.energy.good, run.lasted())));
         }
@@ -135,16 +146,16 @@ impl Figures {
 }
 
 impl Meter {
+    /// What a counter shows now; it counts on while it is not read.
+    fn count(&mut self, now: Option<f64>, kwh: f64, at: Timestamp, rule: impl Fn() -> CounterRule) {
+        let Some(value) = now.map(Exact::from) else { return };
+        let counter = self.counter.get_or_insert_with(|| Counter::new(rule()));
+        self.kwh += kwh * counter.read(Reading { value, at, until: at }).gain.near();
+    }
+
     fn add(&mut self, now: Option<f64>, measures: Measures, time: Duration) {
-        match (measures, self.last, now) {
-            (Measures::Power(kw), Some(before), _) if self.known => {
-                self.kwh += before * kw * time.as_secs_f64() / 3_600.0;
-            }
-            // A counter counts on while it is not read; one that is lower began again at 0.
-            (Measures::Energy(kwh), Some(before), Some(now)) => {
-                self.kwh += kwh * if before <= now { now - before } else { now };
-            }
-            (Measures::Power(_) | Measures::Energy(_), ..) => {}
+        if let (Measures::Power(kw), Some(before), true) = (measures, self.last, self.known) {
+            self.kwh += before * kw * time.as_secs_f64() / 3_600.0;
         }
         if self.known {
             self.good += time;

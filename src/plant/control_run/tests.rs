@@ -325,3 +325,23 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_counter_that_steps_back_a_little_or_is_replaced_counts_on() {
+    for (readings, expect) in [
+        (vec![5_000.0, 5_200.0, 5_199.9, 5_400.0], 400.0),
+        (vec![10_000.0, 10_005.0, 904.0, 908.0], 9.0),
+        (vec![10_000.0, 10_005.0, 98_000.0, 98_004.0], 9.0),
+        (vec![5_000.0, 5_001.0, 0.0, 5_002.0], 2.0),
+    ] {
+        let mut rig = Rig::new();
+        rig.def.energy = Some((RUN, Measures::Energy(1e-3)));
+        rig.step(0, Some(20.0), Some(20.0));
+        for (second, wh) in (10..).zip(&readings) {
+            rig.power = Sample::good(*wh, at(second));
+            rig.step(second, Some(40.0), Some(20.0));
+        }
+        let (kwh, _) = rig.shown().energy.expect("the counter was read");
+        assert!((kwh * 1e3 - expect).abs() < 1e-6, "{readings:?}: {kwh} kWh");
+    }
+}

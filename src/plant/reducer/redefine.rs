@@ -11,6 +11,7 @@ use super::{Effects, Plant};
 use crate::plant::{
     PlantDef,
     command::{CommandKind, NotConfirmed},
+    counter::CounterWatch,
     def::{DeviceDef, LineDef, LineId, ProcedureId},
     interlock::ActuatorTracker,
     line::Transport,
@@ -41,6 +42,7 @@ impl Plant {
         ended.records.extend(self.redefine_runs(def));
         self.alarm_manager.redefine(def);
         self.redefine_devices(&change, def);
+        self.counters = CounterWatch::default();
         let before = std::mem::replace(&mut self.def, def.clone());
         if !before.keeps_ids(def) || before.logic.actuators != def.logic.actuators {
             self.actuators = ActuatorTracker::default();

@@ -78,6 +78,7 @@ impl Plant {
             | CommandKind::StopTest(_)
             | CommandKind::StartProcedure(_)
             | CommandKind::AbortProcedure(_)
+            | CommandKind::CorrectCounter { .. }
             | CommandKind::HandOver
             | CommandKind::TakeOver => None,
         }

@@ -46,6 +46,7 @@ impl Plant {
             | CommandKind::StopRestore(_)
             | CommandKind::StartProcedure(_)
             | CommandKind::AbortProcedure(_)
+            | CommandKind::CorrectCounter { .. }
             | CommandKind::HandOver
             | CommandKind::TakeOver => {}
         }

@@ -1,11 +1,28 @@
 //! What everything outside sees of the plant.
 
+use std::sync::Arc;
+
 use jiff::SignedDuration;
 
 use super::Plant;
-use crate::plant::{control_run::RunTracker, program::ProgramWatch, snapshot::Snapshot};
+use crate::plant::{
+    PlantDef,
+    control_run::RunTracker,
+    program::ProgramWatch,
+    snapshot::{LineStatus, Snapshot},
+};
 
 impl Plant {
+    /// The definition of the plant.
+    pub fn def(&self) -> &Arc<PlantDef> {
+        &self.def
+    }
+
+    /// Every line as it stands.
+    pub fn lines(&self) -> &[LineStatus] {
+        &self.lines
+    }
+
     /// The plant as of its last event, command or tick.
     pub fn snapshot(&self) -> Snapshot {
         let lists = self.alarm_manager.lists();

@@ -125,7 +125,11 @@ toml_tables! {
         opt "store" store: StorePolicy,
         opt "store_every" store_every: Duration,
         /// Counts up, or not: by its unit if this is not said.
-        opt "counter" counter: bool,
+        opt "counter" counter: CounterKey,
+        /// The most that it counts in an hour.
+        opt "max_rate" max_rate: f64,
+        /// A report gives how long and how often it was on.
+        opt "hours" hours: bool,
         opt "confidence" confidence: Confidence,
         opt "source" source: String,
         opt "simulate" simulate: SimulateTable,
@@ -133,6 +137,11 @@ toml_tables! {
         opt "default" default: Choice,
         /// Part of parameter sets, or not.
         opt "set" in_sets: bool,
+    }
+
+    /// How a counter counts.
+    CounterTable, "counter" {
+        need "modulus" modulus: f64,
     }
 
     /// How a simulated device fills a tag.
@@ -267,6 +276,22 @@ keyword_enum! {
 /// The least role that may write something: one that writes at all.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct WriteRole(pub Role);
+
+/// Whether a tag counts up, and after how much it shows the same again.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum CounterKey {
+    Counts(bool),
+    Rolls(Option<At<f64>>),
+}
+
+impl Value for CounterKey {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<CounterKey> {
+        match value {
+            Node::Table(_) => CounterTable::read(value, at, problems).map(|table| CounterKey::Rolls(table.modulus)),
+            _ => bool::read(value, at, problems).map(CounterKey::Counts),
+        }
+    }
+}
 
 impl Value for WriteRole {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {

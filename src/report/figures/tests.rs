@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
-    plant::{def::Priority, sample::Cause},
+    plant::{counter::CounterRule, def::Priority, sample::Cause},
     report::step_series::ValuesAt,
-    report::testing::{at, figures_of, sec, tag, zone},
+    report::testing::{at, counted_of, figures_of, sec, tag, zone},
 };
 
 fn figures(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> TagFigures {
-    figures_of(samples, from, until).end(label(), Duration::ZERO)
+    figures_of(samples, from, until).end(label(), Exact::default(), Duration::ZERO)
 }
 
 fn label() -> TagDescription {
@@ -59,16 +59,20 @@ fn a_counter_has_a_difference_and_no_mean() {
         (vec![], None),
         (vec![(-10, 100.0)], Some(0.0)),
         (vec![(-10, 100.0), (20, 101.5), (60, 104.0), (110, 200.0)], Some(4.0)),
-        // Reset between 7 and 2: 5 before it, 2 and 1 after it.
-        (vec![(0, 2.0), (20, 7.0), (40, 2.0), (60, 3.0)], Some(8.0)),
-        // A balance goes back a little, and below zero.
-        (vec![(0, 50.0), (20, 49.5)], Some(-0.5)),
-        (vec![(0, -10.0), (20, -11.0), (40, -9.0)], Some(1.0)),
-        (vec![(0, 1.0), (20, -1.0), (40, 1.0)], Some(0.0)),
+        // Reset after 7: 5 before it, 0.2 and 1 after it.
+        (vec![(0, 2.0), (20, 7.0), (40, 0.2), (60, 1.2)], Some(6.2)),
+        // Never less than nothing.
+        (vec![(0, 50.0), (20, 49.5)], Some(0.0)),
+        (vec![(0, 50.0), (20, 49.5), (40, 50.5)], Some(0.5)),
     ] {
-        let samples = readings.iter().map(|(at, value)| Sample::good(*value, sec(*at)));
-        let got = figures_of(samples, sec(0), sec(100))
-            .end(TagDescription { unit: "kWh".into(), counts: true, ..label() }, Duration::ZERO);
+        let samples = || readings.iter().map(|(at, value)| Sample::good(*value, sec(*at)));
+        let rule = CounterRule { digit: 0.1, ..CounterRule::default() };
+        let (counted, _) = counted_of(samples(), rule, (sec(0), sec(100)));
+        let got = figures_of(samples(), sec(0), sec(100)).end(
+            TagDescription { unit: "kWh".into(), counts: true, ..label() },
+            counted,
+            Duration::ZERO,
+        );
         assert_eq!((got.difference, got.mean), (expect.map(Into::into), None), "{readings:?}");
     }
     let mut def = crate::report::testing::tag(0, "E");

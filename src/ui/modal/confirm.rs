@@ -172,6 +172,7 @@ impl Confirm {
             ConfirmAction::Command(CommandKind::StartProcedure(_)) => t!("start"),
             ConfirmAction::Command(CommandKind::AbortProcedure(_)) => t!("abort"),
             ConfirmAction::Command(CommandKind::ReadSets) => t!("read"),
+            ConfirmAction::Command(CommandKind::CorrectCounter { .. }) => t!("correct"),
             ConfirmAction::Command(CommandKind::HandOver) => t!("hand over"),
             ConfirmAction::Command(CommandKind::TakeOver) => t!("take over"),
             ConfirmAction::Command(CommandKind::SaveSet { replace: true, .. }) => t!("replace it"),

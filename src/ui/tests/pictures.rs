@@ -35,6 +35,7 @@ fn climbing(model: &Model, query: &Query) -> Vec<Series> {
             step,
             buckets,
             summary: Some(((0.4 * last).into(), (0.9 * last).into(), last.into())),
+            counted: None,
             good: 1.0,
         })
     };

@@ -75,6 +75,7 @@ mod tests {
             step: Duration::from_secs(1),
             buckets: values.iter().map(bucket).collect(),
             summary: None,
+            counted: None,
             good: 1.0,
         };
         assert_eq!(spark(&series, cells, 0.1, Glyphs::Braille), expect, "{values:?}");

@@ -103,6 +103,7 @@ every!(commands: CommandKind {
     CommandKind::StopRestore(_) => [CommandKind::StopRestore(DeviceId(0))],
     CommandKind::StartProcedure(_) => [CommandKind::StartProcedure(ProcedureId(0)), CommandKind::StartProcedure(ProcedureId(1))],
     CommandKind::AbortProcedure(_) => [CommandKind::AbortProcedure(ProcedureId(0))],
+    CommandKind::CorrectCounter { .. } => [CommandKind::CorrectCounter { tag: fixture::RUN, amount: 1.0.into() }],
     CommandKind::HandOver => [CommandKind::HandOver],
     CommandKind::TakeOver => [CommandKind::TakeOver],
 });

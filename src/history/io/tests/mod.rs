@@ -6,6 +6,7 @@ mod archive;
 mod backup;
 mod batches;
 mod compact;
+mod counts;
 pub(super) mod damage;
 mod epochs;
 mod exact;

@@ -10,7 +10,7 @@ use crate::{
         series::{Curve, Span, grid},
         tiers::Tier,
     },
-    plant::sample::Quality,
+    plant::{exact::Exact, sample::Quality},
     report::{figures::TagDescription, step_series::HOLD_MAX, testing::figures_of},
 };
 
@@ -65,7 +65,7 @@ proptest! {
             for (place, row) in report.tags.iter().enumerate() {
                 let figures = figures_of(samples(TagId(place as u16), from).filter(|s| s.at < until), from, until);
                 let label = TagDescription { tag: row.tag.clone(), unit: row.unit.clone(), decimals: row.decimals, counts: false };
-                prop_assert_eq!(row, &figures.end(label, Duration::ZERO));
+                prop_assert_eq!(row, &figures.end(label, Exact::default(), Duration::ZERO));
             }
             let stood = |tag: usize, at: Timestamp| by_itself(&store, TagId(tag as u16)).into_iter()
                 .rfind(|sample| sample.at <= at)

@@ -207,7 +207,15 @@ fn way(tag: TagId, segments: &[Segment], total: f64, dots: usize, cx: &ViewConte
         Some(Bucket { min: a.min(b), max: a.max(b), mean: (a + b) / 2.0, last: b.into() })
     };
     let buckets = (0..dots).map(bucket).collect();
-    Series { tag, from: cx.now, step: Duration::from_secs_f64(each * 60.0), buckets, summary: None, good: 1.0 }
+    Series {
+        tag,
+        from: cx.now,
+        step: Duration::from_secs_f64(each * 60.0),
+        buckets,
+        summary: None,
+        counted: None,
+        good: 1.0,
+    }
 }
 
 /// Time below the curve, with a mark where the program is.

@@ -115,7 +115,7 @@ mod tests {
     fn series(tag: TagId, values: impl Iterator<Item = Option<f64>>) -> Series {
         let bucket = |v: Option<f64>| v.map(|v| Bucket { min: v, max: v, mean: v, last: v.into() });
         let (from, step) = (now() - SignedDuration::from_hours(1), Duration::from_secs(60));
-        Series { tag, from, step, buckets: values.map(bucket).collect(), summary: None, good: 1.0 }
+        Series { tag, from, step, buckets: values.map(bucket).collect(), summary: None, counted: None, good: 1.0 }
     }
 
     #[test]

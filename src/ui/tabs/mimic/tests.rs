@@ -53,7 +53,15 @@ fn answer(model: &mut Model, effects: Vec<Effect>) {
                             last: value.into(),
                         })
                     };
-                    Series { tag, from, step, buckets: (0..buckets).map(bucket).collect(), summary: None, good: 1.0 }
+                    Series {
+                        tag,
+                        from,
+                        step,
+                        buckets: (0..buckets).map(bucket).collect(),
+                        summary: None,
+                        counted: None,
+                        good: 1.0,
+                    }
                 };
                 Answer::Series(tags.into_iter().map(series).collect())
             }

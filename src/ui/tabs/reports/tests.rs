@@ -159,7 +159,9 @@ fn report(period: Period, full: bool) -> ShiftReport {
         ..ActionRecord::new(at(20), "tech1", "write", "TIC-1.SV", "verified")
     };
     ShiftReport {
+        counters: Vec::new(),
         control_runs: Vec::new(),
+        run_parts: Vec::new(),
         period,
         until,
         audit: full.then_some(ChainHash { number: 1_042, hash: [0xA5; 32] }),

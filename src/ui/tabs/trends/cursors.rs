@@ -26,11 +26,16 @@ pub(super) struct Measured {
     pub ends: [Option<HeldValue>; 2],
     /// Least, mean and greatest good value, and the share of good time; `None` until the history has answered.
     pub figures: Option<Figures>,
+    /// What a counter counted, less than nothing where B comes before A.
+    pub counted: Option<Exact>,
 }
 
 impl Measured {
-    /// From A to B, of good values only.
+    /// From A to B, of good values only; of a counter what it counted.
     pub fn difference(&self) -> Option<Exact> {
+        if self.counted.is_some() {
+            return self.counted;
+        }
         let [a, b] = self.ends.map(|end| end.filter(|end| end.quality.is_good()).and_then(|end| end.value));
         Some(b? - a?)
     }
@@ -169,6 +174,8 @@ impl Trends {
             held.or_else(|| drawn(at).filter(|_| recent))
         };
         let figures = self.between.figures.value.as_ref().and_then(|all| all.get(place));
-        Some(Measured { ends: [end(0, a), end(1, b)], figures: figures.map(|series| (series.summary, series.good)) })
+        let counted = figures.and_then(|series| series.counted).map(|counted| if b < a { -counted } else { counted });
+        let figures = figures.map(|series| (series.summary, series.good));
+        Some(Measured { ends: [end(0, a), end(1, b)], figures, counted })
     }
 }

@@ -167,7 +167,7 @@ impl Stand {
         let apart = if count == 1 { now().duration_since(from).as_secs_f64() / 100.0 } else { 0.0 };
         let summary = (self.begin < now()).then_some(((58.25 - apart).into(), 64.0.into(), 70.0.into()));
         let good = if summary.is_some() { good } else { 0.0 };
-        Series { tag, from, step, buckets: (0..count).map(bucket).collect(), summary, good }
+        Series { tag, from, step, buckets: (0..count).map(bucket).collect(), summary, counted: None, good }
     }
 
     /// So many seconds pass, with a snapshot each; `value` is the PV.

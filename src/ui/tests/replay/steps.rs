@@ -18,7 +18,7 @@ fn batch(number: u32, from: i64, to: Option<i64>) -> BatchReport {
         phases: Vec::new(),
         unknown: Duration::ZERO,
     };
-    BatchReport { until: now(), tags: Vec::new(), energy: None, alarms: None, unreadable: Vec::new(), batch }
+    BatchReport::new(batch, now())
 }
 
 #[test]

@@ -21,7 +21,8 @@ fn trace(values: impl IntoIterator<Item = f64>) -> Trace {
     let mut trace = Trace::default();
     let buckets = values.into_iter().map(bucket).collect();
     let step = Duration::from_secs(1);
-    trace.set_past(Series { tag: TagId(0), from: at(0), step, buckets, summary: None, good: 1.0 }, at(0));
+    trace
+        .set_past(Series { tag: TagId(0), from: at(0), step, buckets, summary: None, counted: None, good: 1.0 }, at(0));
     trace
 }
 

@@ -174,6 +174,7 @@ mod tests {
             step: Duration::from_secs(10),
             buckets: values.iter().map(bucket).collect(),
             summary: None,
+            counted: None,
             good: 1.0,
         }
     }

@@ -27,7 +27,15 @@ fn curve(tag: crate::plant::def::TagId, from: jiff::Timestamp) -> Answer {
         Some(Bucket { min: mean, max: mean, mean, last: mean.into() })
     };
     let (step, summary) = (Duration::from_secs(22), Some((27.0.into(), 50.0.into(), 67.0.into())));
-    Answer::Series(vec![Series { tag, from, step, buckets: (0..60).map(bucket).collect(), summary, good: 1.0 }])
+    Answer::Series(vec![Series {
+        tag,
+        from,
+        step,
+        buckets: (0..60).map(bucket).collect(),
+        summary,
+        counted: None,
+        good: 1.0,
+    }])
 }
 
 /// Answers what was asked, and returns the begins of the curves.

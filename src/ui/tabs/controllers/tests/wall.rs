@@ -58,6 +58,7 @@ fn each_faceplate_has_the_curve_of_its_own_value() {
             step,
             buckets,
             summary: Some((low.into(), low.into(), high.into())),
+            counted: None,
             good: 1.0,
         }
     };

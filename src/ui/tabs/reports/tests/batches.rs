@@ -90,5 +90,5 @@ pub fn rising(tag: TagId, (from, to): (Timestamp, Timestamp), buckets: usize) ->
         Some(Bucket { min: value, max: value, mean: value, last: value.into() })
     };
     let summary = Some((0.0.into(), (minutes(buckets) / 2.0).into(), minutes(buckets).into()));
-    Series { tag, from, step, buckets: (0..buckets).map(bucket).collect(), summary, good: 1.0 }
+    Series { tag, from, step, buckets: (0..buckets).map(bucket).collect(), summary, counted: None, good: 1.0 }
 }

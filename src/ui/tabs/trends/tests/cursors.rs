@@ -74,12 +74,12 @@ fn figures_of_another_interval_are_not_shown() {
 fn only_good_values_make_a_difference() {
     let good = |value| Some(Sample::good(value, now()).into());
     let doubted = Some(Sample::good(5.0, now()).uncertain(Cause::Stale).into());
-    let check = |ends, expect| assert_eq!(Measured { ends, figures: None }.difference(), expect);
+    let check = |ends, expect| assert_eq!(Measured { ends, figures: None, counted: None }.difference(), expect);
     check([good(2.0), good(5.0)], Some(3.0.into()));
     check([good(2.0), doubted], None);
     check([None, good(2.0)], None);
     assert!(doubted.is_some_and(|held: crate::report::step_series::HeldValue| held.quality != Quality::Good));
-    let measured = Measured { ends: [good(2.0), good(5.0)], figures: None };
+    let measured = Measured { ends: [good(2.0), good(5.0)], figures: None, counted: None };
     assert_eq!(measured.slope(SignedDuration::from_secs(30)), Some(6.0));
     assert_eq!(measured.slope(SignedDuration::from_secs(-30)), Some(-6.0), "the other way round");
     assert_eq!(measured.slope(SignedDuration::ZERO), None);

@@ -1,0 +1,283 @@
+//! What counters counted in a span, and how often what is on or off was switched on, by readings and by what is kept of them.
+//!
+//! ```text
+//!   a week before          the span
+//!   ├──────────── hours ┼──┼─────── hours ──────┼── samples ──┤
+//!     how fast it counts  what it showed last   │
+//!                                     └─ samples of an hour that did not only count up
+//! ```
+
+use std::ops::Range;
+
+use duckdb::params;
+use jiff::Timestamp;
+
+use super::{
+    read::{SAMPLES_MAX, action},
+    sql,
+    store::{Store, instant, utc},
+};
+use crate::{
+    history::{
+        HistoryError,
+        tiers::{Aggregate, CurvePart, HOUR, Piece, Tier, floor, rise},
+    },
+    plant::{
+        counter::{self, Counter, CounterEvent, CounterRule, CounterStep, Reading, pace},
+        def::TagId,
+        exact::Exact,
+        record::ActionRecord,
+    },
+};
+
+/// How far back the last value of a counter is looked for that was not read for a week.
+const LATEST: i64 = 400 * 24 * HOUR;
+/// Samples before a span that are read without aggregates at most.
+const SAMPLES_BEFORE: i64 = 24 * HOUR;
+/// What was read in the hours before a span is read as the span is.
+const CLOSELY: i64 = 2 * HOUR;
+
+/// How a tag counts.
+#[derive(Debug, Clone)]
+pub(super) enum Counts {
+    /// A counter.
+    Counter(Box<Counter>),
+    /// On or off: what counts is that it is switched on. Its last value.
+    Starts(Option<Exact>),
+}
+
+/// What a tag counted in a span.
+#[derive(Debug, Clone)]
+pub(super) struct CountedTag {
+    counts: Counts,
+    /// In the span.
+    pub gain: Exact,
+    /// What was not plain counting, by the time when that was known; of a correction with who made it, and why.
+    pub steps: Vec<(CounterStep, String)>,
+}
+
+impl CountedTag {
+    pub fn counter(rule: CounterRule) -> CountedTag {
+        CountedTag::new(Counts::Counter(Box::new(Counter::new(rule))))
+    }
+
+    pub fn starts() -> CountedTag {
+        CountedTag::new(Counts::Starts(None))
+    }
+
+    fn new(counts: Counts) -> CountedTag {
+        CountedTag { counts, gain: Exact::default(), steps: Vec::new() }
+    }
+
+    /// The span begins: what was counted before is not in it.
+    fn begin(&mut self) {
+        (self.gain, self.steps) = (Exact::default(), Vec::new());
+    }
+
+    fn is_known(&self) -> bool {
+        match &self.counts {
+            Counts::Counter(counter) => counter.is_known(),
+            Counts::Starts(last) => last.is_some(),
+        }
+    }
+
+    /// A user's correction.
+    fn correct(&mut self, correction: &ActionRecord, amount: Exact) {
+        let (event, none) = (CounterEvent::Corrected, Exact::default());
+        let step = CounterStep { at: correction.at, event, old: none, new: none, counted: amount };
+        let reason = correction.note.as_deref().unwrap_or_default();
+        self.gain = self.gain + amount;
+        self.steps.push((step, format!("{}: {reason}", correction.by)));
+    }
+
+    /// The span is over.
+    fn end(&mut self) {
+        if let Counts::Counter(counter) = &self.counts {
+            self.steps.extend(counter.held().map(unsaid));
+        }
+    }
+
+    fn read(&mut self, value: Exact, at: Timestamp, until: Timestamp) {
+        match &mut self.counts {
+            Counts::Counter(counter) => {
+                let counted = counter.read(Reading { value, at, until });
+                self.gain = self.gain + counted.gain;
+                self.steps.extend(counted.step.map(unsaid));
+            }
+            Counts::Starts(last) => {
+                self.gain = self.gain + last.replace(value).map_or(Exact::default(), |last| rise(last, value));
+            }
+        }
+    }
+
+    /// A row of a tier; `false` where its readings are needed.
+    fn read_row(&mut self, row: &Aggregate, step: i64) -> bool {
+        match &mut self.counts {
+            // How long ago it was read last is known of a whole row only.
+            Counts::Counter(_) if !row.is_whole(step) => false,
+            Counts::Counter(counter) => {
+                let gain = counter.read_plain(&row.summary());
+                self.gain = self.gain + gain.unwrap_or_default();
+                gain.is_some()
+            }
+            Counts::Starts(last) => {
+                let first = last.replace(row.stats.last).map_or(Exact::default(), |last| rise(last, row.first));
+                self.gain = self.gain + first + row.gain;
+                true
+            }
+        }
+    }
+
+    /// A row of which no readings are kept.
+    fn read_kept(&mut self, row: &Aggregate) {
+        if let Counts::Counter(counter) = &mut self.counts {
+            let (gain, steps) = counter.read_rows(&row.summary());
+            self.gain = self.gain + gain;
+            self.steps.extend(steps.into_iter().map(unsaid));
+        }
+    }
+
+    fn skim(&mut self, row: &Aggregate) {
+        match &mut self.counts {
+            Counts::Counter(counter) => counter.skim(&row.summary()),
+            Counts::Starts(last) => *last = Some(row.stats.last),
+        }
+    }
+}
+
+fn unsaid(step: CounterStep) -> (CounterStep, String) {
+    (step, String::new())
+}
+
+impl Store {
+    /// Counts in a span, each tag from what it showed before it.
+    pub(super) fn count(
+        &self,
+        mut tags: Vec<(TagId, CountedTag)>,
+        (from, to): (Timestamp, Timestamp),
+    ) -> Result<Vec<(TagId, CountedTag)>, HistoryError> {
+        let (begin, end) = (from.as_microsecond(), to.as_microsecond());
+        let week = floor(begin - pace::HOURS * HOUR, HOUR);
+        self.count_before(&mut tags, week, begin)?;
+        let (known, mut unknown): (Vec<_>, Vec<_>) = tags.into_iter().partition(|(_, tag)| tag.is_known());
+        tags = known;
+        if !unknown.is_empty() {
+            self.count_before(&mut unknown, floor(begin - LATEST, HOUR), week)?;
+            tags.append(&mut unknown);
+        }
+        tags.iter_mut().for_each(|(_, tag)| tag.begin());
+        for piece in self.pieces(begin..end, Tier::Hour)? {
+            self.count_piece(&mut tags, piece, i64::MIN)?;
+        }
+        tags.iter_mut().for_each(|(_, tag)| tag.end());
+        for correction in self.list(sql::CORRECTIONS, params![counter::CORRECT, utc(from), utc(to)], action)? {
+            let amount = correction.new.as_deref().and_then(|new| new.split(' ').next()?.parse().ok());
+            let tag = tags.iter_mut().find(|(id, _)| *self.def.tag(*id).name == *correction.target);
+            if let (Some((_, tag)), Some(amount)) = (tag, amount) {
+                tag.correct(&correction, amount);
+            }
+        }
+        Ok(tags)
+    }
+
+    /// Finds what tags show at the end of a span.
+    fn count_before(&self, tags: &mut [(TagId, CountedTag)], from: i64, to: i64) -> Result<(), HistoryError> {
+        for mut piece in self.pieces(from..to, Tier::Hour)? {
+            if piece.tier == Tier::Raw
+                && SAMPLES_BEFORE < piece.to - piece.from
+                && !self.is_bounded(tags.len(), piece)?
+            {
+                piece.from = piece.to - SAMPLES_BEFORE;
+            }
+            self.count_piece(tags, piece, to - CLOSELY)?;
+        }
+        Ok(())
+    }
+
+    fn is_bounded(&self, tags: usize, piece: Piece) -> Result<bool, HistoryError> {
+        let (Some(from), Some(to)) = (instant(piece.from), instant(piece.to)) else { return Ok(true) };
+        match self.bounded(tags, from, to, to, SAMPLES_MAX) {
+            Ok(()) => Ok(true),
+            Err(HistoryError::TooManyRows { .. }) => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Counts in a piece. Of what lies before `closely` only the last rows of a tag are read closely, in which may lie what
+    /// is not decided at its end.
+    fn count_piece(&self, tags: &mut [(TagId, CountedTag)], piece: Piece, closely: i64) -> Result<(), HistoryError> {
+        let (Some(from), Some(to)) = (instant(piece.from), instant(piece.to)) else { return Ok(()) };
+        let ids: Vec<TagId> = tags.iter().map(|(id, _)| *id).collect();
+        let Some(step) = piece.tier.step() else {
+            self.each_part_of(&ids, (from, to), Tier::Raw, |place, part| {
+                if let CurvePart::Held(held) = part {
+                    tags[place].1.read(held.value, held.from, held.to);
+                }
+            })?;
+            return Ok(());
+        };
+        let mut rows: Vec<Vec<Aggregate>> = vec![Vec::new(); tags.len()];
+        self.each_part_of(&ids, (from, to), piece.tier, |place, part| {
+            if let CurvePart::Aggregate(row) = part {
+                rows[place].push(row);
+            }
+        })?;
+        for ((id, tag), rows) in tags.iter_mut().zip(rows) {
+            let near = rows.iter().position(|row| closely <= row.at).unwrap_or(rows.len());
+            let skimmed = near.min(rows.len().saturating_sub(2));
+            rows[..skimmed].iter().for_each(|row| tag.skim(row));
+            self.count_each(*id, tag, &rows[skimmed..], step)?;
+        }
+        Ok(())
+    }
+
+    fn count_each(&self, id: TagId, tag: &mut CountedTag, rows: &[Aggregate], step: i64) -> Result<(), HistoryError> {
+        let mut rows = rows.iter().peekable();
+        while let Some(row) = rows.next() {
+            if tag.read_row(row, step) {
+                continue;
+            }
+            // What follows at once and did not count plainly either is read with it.
+            let mut span = row.at..row.at + step;
+            let mut together = vec![*row];
+            while let Some(next) = rows.next_if(|next| next.at == span.end && !next.only_rises(step)) {
+                span.end = next.at + step;
+                together.push(*next);
+            }
+            self.count_closely(id, tag, span, &together, step)?;
+        }
+        Ok(())
+    }
+
+    /// Counts by the samples of a span, or by minutes where these are not kept.
+    fn count_closely(
+        &self,
+        id: TagId,
+        tag: &mut CountedTag,
+        span: Range<i64>,
+        rows: &[Aggregate],
+        step: i64,
+    ) -> Result<(), HistoryError> {
+        let (Some(from), Some(to)) = (instant(span.start), instant(span.end)) else { return Ok(()) };
+        let deleted = self.deleted_until(Tier::Raw)?.is_some_and(|until| from < until);
+        if !deleted {
+            self.each_part_of(&[id], (from, to), Tier::Raw, |_, part| {
+                if let CurvePart::Held(held) = part {
+                    tag.read(held.value, held.from, held.to);
+                }
+            })?;
+            return Ok(());
+        }
+        let mut kept = Vec::new();
+        if step == HOUR {
+            self.each_part_of(&[id], (from, to), Tier::Minute, |_, part| {
+                if let CurvePart::Aggregate(minute) = part {
+                    kept.push(minute);
+                }
+            })?;
+        }
+        let rows = if kept.is_empty() { rows } else { kept.as_slice() };
+        rows.iter().for_each(|row| tag.read_kept(row));
+        Ok(())
+    }
+}
