@@ -53,6 +53,7 @@ pub fn of_command(def: &PlantDef, kind: &CommandKind) -> Row {
             | Diagnostic::Identify { .. }
             | Diagnostic::Read { .. } => row("test", "--TS--"),
         },
+        CommandKind::CorrectCounter { .. } => row("correct counter", "---S--"),
         CommandKind::StopTest(_) => row("stop test", "--TS--"),
         CommandKind::ReadSets => look("read sets", "--TS--"),
         CommandKind::SaveSet { .. } => row("save set", "--TS--"),
@@ -98,6 +99,7 @@ pub fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
         CommandKind::Alarm(AlarmCommand::OutOfService(alarm)),
         CommandKind::Alarm(AlarmCommand::InService(alarm)),
         CommandKind::Refresh(device),
+        CommandKind::CorrectCounter { tag: tag(OPERATED[0]), amount: 1.0.into() },
         CommandKind::HandOver,
         CommandKind::TakeOver,
         CommandKind::Test(line, Diagnostic::Loopback { unit: 1, data: 7, count: 1 }),
