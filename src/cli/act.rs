@@ -1,6 +1,6 @@
 //! `sightglass write`, `ack` and `correct`: actions at a running station, with rights, checks and records as on the screen.
 
-use std::{io::IsTerminal, sync::Arc};
+use std::sync::Arc;
 
 use crate::plant::{
     Snapshot,
@@ -12,7 +12,7 @@ use crate::plant::{
     snapshot::ActiveAlarm,
 };
 
-use super::{CliError, client, in_runtime, prompt::ask, say};
+use super::{CliError, client, in_runtime, prompt, say};
 
 /// Arguments of `write`.
 #[derive(Debug, clap::Args)]
@@ -158,11 +158,11 @@ async fn confirm(snapshot: &Snapshot, tag: TagId, value: Exact, yes: bool) -> Re
     let question = def.confirm.clone().into_iter().chain(entry::rounded_text(snapshot, tag, value));
     let question = question.chain(entry::warnings(snapshot, tag, value)).collect::<Vec<_>>().join("; ");
     let change = format!("{} {} → {}", def.name, words(snapshot.sample(tag).good_exact()), words(Some(value)));
-    if !std::io::stdin().is_terminal() {
+    if !prompt::is_interactive() {
         return Err(CliError::Usage(format!("{change}: {question}: add --yes to write it")));
     }
     say(&question);
-    match &*ask(&format!("{change}: write it?"), "no").await? {
+    match &*prompt::ask(&format!("{change}: write it?"), "no").await? {
         "y" | "yes" => Ok(()),
         _ => Err(CliError::Failed("nothing was written".to_owned())),
     }

@@ -1,9 +1,14 @@
 //! Queries in plain lines, one answer each: they work over SSH and in every terminal.
 
-use std::io::{self, BufRead, Write};
+use std::io::{self, BufRead, IsTerminal, Write};
 
 use super::CliError;
 use crate::plant::visible::visible;
+
+/// Whether someone can answer.
+pub fn is_interactive() -> bool {
+    io::stdin().is_terminal()
+}
 
 /// The answer to a query; Enter takes the usual one. Ctrl-C and the end of the input are an error.
 pub async fn ask(query: &str, usual: &str) -> Result<String, CliError> {

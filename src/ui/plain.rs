@@ -8,7 +8,7 @@ use ratatui::layout::Rect;
 use super::{
     Clock, ViewContext,
     context::view_context,
-    modal::{confirm::subject, faceplate::unknown_text},
+    modal::{faceplate::unknown_text, reason::subject},
     preferences::Preferences,
     tabs::alarms::actions,
     theme::Theme,

@@ -232,16 +232,8 @@ pub fn is_unfinished(db: &Path) -> bool {
 
 /// Bytes of the database and its log.
 pub fn size(db: &Path) -> u64 {
-    bytes(db, &[""]) + log_size(db)
-}
-
-fn bytes(db: &Path, of: &[&str]) -> u64 {
-    of.iter().filter_map(|suffix| fs::metadata(with_suffix(db, suffix)).ok()).map(|meta| meta.len()).sum()
-}
-
-/// Bytes of the logs.
-pub fn log_size(db: &Path) -> u64 {
-    bytes(db, &LOGS)
+    let bytes = |suffix| fs::metadata(with_suffix(db, suffix)).map_or(0, |meta| meta.len());
+    LOGS.into_iter().chain([""]).map(bytes).sum()
 }
 
 /// Device and number of a file; `None` if it is not there. Another file at the same path differs.

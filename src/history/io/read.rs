@@ -45,7 +45,7 @@ impl Store {
             answer = self.look_up(query, now);
         }
         if self.changed.take() && answer.is_ok() {
-            // It may lack an hour that moved meanwhile, and nobody could tell.
+            // It may lack an hour that moved meanwhile, without a sign of it.
             answer = Err(HistoryError::Engine("the archive changed each time that it was read: try again".into()));
         }
         if let Err(error) = &answer

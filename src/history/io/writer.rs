@@ -21,6 +21,7 @@ use super::{
 use crate::{
     history::{HistoryError, words::joined},
     plant::{def::PlantDef, record::Record, snapshot::HistoryStatus},
+    profile::io::atomic::with_suffix,
 };
 
 /// Records kept while the store cannot take them: more than half an hour of a hundred a second.
@@ -217,9 +218,13 @@ impl Writer {
         self.failing = None;
         // A log that was removed by hand would take its commits with it: they go into the file at once.
         let no_log = rows > 0 && !files::has_log(&self.path);
-        if no_log || self.commits >= CHECKPOINT_EVERY || LOG_MAX < files::log_size(&self.path) {
+        if no_log || self.commits >= CHECKPOINT_EVERY || LOG_MAX < self.log_bytes() {
             self.checkpoint();
         }
+    }
+
+    fn log_bytes(&self) -> u64 {
+        with_suffix(&self.path, files::LOGS[0]).metadata().map_or(0, |log| log.len())
     }
 
     /// The stores that queries are answered from: this one, and each that is opened after it.

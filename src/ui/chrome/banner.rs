@@ -14,8 +14,8 @@ use crate::{
     },
     ui::{
         modal::{
-            confirm::subject,
             faceplate::{device_alarm_text, line_state_text},
+            reason::subject,
         },
         rights,
         widgets::value,

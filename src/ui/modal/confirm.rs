@@ -13,7 +13,7 @@ use super::{
 use crate::{
     access::{Credentials, control::reauthentication},
     plant::{
-        alarm::{AlarmCommand, manager::subject_name},
+        alarm::AlarmCommand,
         command::{Command, CommandKind},
         def::TagId,
         diagnostics::Diagnostic,
@@ -392,9 +392,4 @@ pub(super) fn write_notes(def: &TagDef) -> Vec<String> {
         Confidence::Low => notes.push(t!("! not verified: this row of the register map is inferred").to_owned()),
     }
     notes
-}
-
-/// The name of what an alarm watches.
-pub fn subject(cx: &ViewContext, alarm: crate::plant::def::AlarmId) -> String {
-    subject_name(cx.def(), cx.def().alarm(alarm).subject).to_owned()
 }

@@ -16,7 +16,7 @@ use crate::{
         UiAction, ViewContext,
         keys::{self, Hint},
         layout::Size,
-        modal::confirm::subject,
+        modal::reason::subject,
         rights,
         tabs::alarms::{guidance, suppressed_words},
         widgets::list::{Motion, Scroll},

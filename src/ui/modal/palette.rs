@@ -22,7 +22,7 @@ use crate::{
         UiAction, ViewContext,
         keys::{self, Chord, Global},
         layout::Size,
-        modal::confirm::subject,
+        modal::reason::subject,
         preferences::Bookmark,
         replay,
         tabs::{Tab, TabView, alarms},

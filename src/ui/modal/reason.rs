@@ -237,6 +237,11 @@ pub fn spelled(span: Duration) -> String {
     }
 }
 
+/// The name of what an alarm watches.
+pub fn subject(cx: &ViewContext, alarm: crate::plant::def::AlarmId) -> String {
+    crate::plant::alarm::manager::subject_name(cx.def(), cx.def().alarm(alarm).subject).to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

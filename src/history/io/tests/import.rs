@@ -157,7 +157,7 @@ fn an_import_that_was_killed_is_completed_by_the_next() {
 }
 
 #[test]
-fn an_import_that_reaches_into_an_archived_hour_is_in_its_minutes() {
+fn an_import_that_reaches_into_an_archived_hour_is_in_it() {
     let ((_one, db), (_two, plain)) = (folder(), folder());
     let (store, plain) = (open(&db, 0), open(&plain, 0));
     // The station recorded hour 0 and hour 2 from its second 140 on; hour 1 is missing.

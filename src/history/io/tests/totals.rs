@@ -61,7 +61,7 @@ fn a_total_goes_on_over_restarts_and_runs_that_did_not_know_it() {
 }
 
 #[test]
-fn a_total_goes_on_from_what_was_stored_last_whatever_the_clock_showed() {
+fn a_total_goes_on_from_what_was_stored_last_by_any_clock() {
     let total = |tag, at, value| Record::Sample(tag, Sample::good(value, sec(at)));
     let day = 86_400;
     // The clock was an hour, or a year, ahead and is set right; it is set forward, for good or for an hour.

@@ -8,7 +8,10 @@ use crate::{
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
-        modal::{Reason, confirm::subject, reason::spelled},
+        modal::{
+            Reason,
+            reason::{spelled, subject},
+        },
         preferences::{Bell, Preferences},
     },
 };

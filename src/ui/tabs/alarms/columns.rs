@@ -4,7 +4,7 @@ use super::{Alarms, guidance, list::Row};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{def::Subject, snapshot::ActiveAlarm},
-    ui::{chrome, layout::Size, modal::confirm::subject},
+    ui::{chrome, layout::Size, modal::reason::subject},
 };
 
 /// Columns of priority and state, with the blanks around them.

@@ -9,8 +9,8 @@ use crate::{
     },
     ui::{
         modal::{
-            confirm::subject,
             faceplate::{device_alarm_text, line_state_text},
+            reason::subject,
         },
         rights,
     },

@@ -10,7 +10,7 @@ use crate::{
         snapshot::SuppressedAlarm,
     },
     report::Period,
-    ui::modal::{confirm::subject, faceplate::device_text},
+    ui::modal::{faceplate::device_text, reason::subject},
 };
 
 /// Most actions that are read; the list says when there are more.

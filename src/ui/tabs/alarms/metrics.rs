@@ -11,7 +11,7 @@ use crate::{
         snapshot::ActiveAlarm,
     },
     report::{Period, alarm_metrics},
-    ui::{modal::confirm::subject, theme::Theme},
+    ui::{modal::reason::subject, theme::Theme},
 };
 
 /// How often the figures of a running shift are queried again, real time.

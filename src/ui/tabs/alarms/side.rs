@@ -4,7 +4,7 @@ use super::{Alarms, guidance, journal::event_text, recent};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::snapshot::ActiveAlarm,
-    ui::{modal::confirm::subject, rights},
+    ui::{modal::reason::subject, rights},
 };
 
 /// Least and greatest width; the list is at least so wide.

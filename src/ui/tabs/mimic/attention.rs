@@ -13,8 +13,8 @@ use crate::{
     ui::{
         chrome::since,
         modal::{
-            confirm::subject,
             faceplate::{device_text, line_state_text},
+            reason::subject,
         },
     },
 };
