@@ -105,8 +105,9 @@ fn frames(buffer: &[u8]) -> impl Iterator<Item = Range<usize>> {
     let ends = (0..=buffer.len()).filter(|end| buffer[..*end].ends_with(END));
     let mut from = 0;
     ends.filter_map(move |end| {
+        // Each byte is looked at once, also where no frame has begun.
+        let from = std::mem::replace(&mut from, end);
         let start = from + buffer[from..end].iter().rposition(|byte| *byte == b':')?;
-        from = end;
         Some(start..end)
     })
 }

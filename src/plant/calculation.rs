@@ -150,27 +150,33 @@ pub fn order(tags: &[TagDef]) -> (Vec<Inputs>, Option<Vec<TagId>>) {
 struct Walk<'a> {
     tags: &'a [TagDef],
     seen: Vec<bool>,
-    /// What is being visited, each needed by the one before.
-    path: Vec<TagId>,
+    /// What is being visited, each needed by the one before, with what it needs and how many of these were visited. No call
+    /// lies inside another: a chain may be as long as a plant has tags.
+    path: Vec<(TagId, Vec<TagId>, usize)>,
     order: Vec<Inputs>,
     cycle: Option<Vec<TagId>>,
 }
 
 impl Walk<'_> {
     fn visit(&mut self, tag: TagId) {
+        self.begin(tag);
+        while let Some((_, inputs, visited)) = self.path.last_mut() {
+            let next = inputs.get(*visited).copied();
+            *visited += 1;
+            match next {
+                Some(input) => self.begin(input),
+                None => self.order.extend(self.path.pop().map(|(tag, inputs, _)| (tag, inputs))),
+            }
+        }
+    }
+
+    fn begin(&mut self, tag: TagId) {
         let Some(calculation) = self.tags[tag.index()].calculation.as_deref() else { return };
-        if let Some(start) = self.path.iter().position(|on_path| *on_path == tag) {
-            self.cycle.get_or_insert_with(|| self.path[start..].to_vec());
-            return;
+        if !std::mem::replace(&mut self.seen[tag.index()], true) {
+            self.path.push((tag, calculation.inputs(), 0));
+        } else if let Some(start) = self.path.iter().position(|(on_path, ..)| *on_path == tag) {
+            self.cycle.get_or_insert_with(|| self.path[start..].iter().map(|(tag, ..)| *tag).collect());
         }
-        if std::mem::replace(&mut self.seen[tag.index()], true) {
-            return;
-        }
-        let inputs = calculation.inputs();
-        self.path.push(tag);
-        inputs.iter().for_each(|input| self.visit(*input));
-        self.path.pop();
-        self.order.push((tag, inputs));
     }
 }
 
@@ -262,5 +268,23 @@ mod tests {
         def.tags[deviation.index()].calculation =
             Some(Arc::new(Calculation { text: String::new(), over_time: None, expr }));
         assert_eq!(order(&def.tags).1, Some(vec![double, deviation]));
+    }
+
+    #[test]
+    fn a_chain_may_be_as_long_as_a_plant_has_tags() {
+        let mut tags = vec![fixture::plant().tags[0].clone(); 20_000];
+        for (n, tag) in (0..).zip(&mut tags) {
+            let expr = Expr::Tag(TagId((n + 1) % 20_000));
+            tag.id = TagId(n);
+            tag.calculation = Some(Arc::new(Calculation { text: String::new(), over_time: None, expr }));
+        }
+        assert_eq!(
+            order(&tags).1.map(|cycle| cycle.len()),
+            Some(20_000),
+            "each needs the next, the last one the first"
+        );
+        tags[19_999].calculation = None;
+        let (found, cycle) = order(&tags);
+        assert_eq!((found.len(), found[0].0, found[19_998].0, cycle), (19_999, TagId(19_998), TagId(0), None));
     }
 }

@@ -310,8 +310,15 @@ fn push(list: &mut Vec<Problem>, at: Span, message: String) -> &mut Problem {
     list.last_mut().expect("it was pushed one line above")
 }
 
+/// Longest word for which another is offered: the work grows with the product of their lengths.
+const NEAR_CHARS_MAX: usize = 200;
+
 /// The known word that was probably meant: at most one edit in three letters away.
 pub(crate) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+    let is_short = |word: &str| word.chars().nth(NEAR_CHARS_MAX).is_none();
+    if !is_short(word) {
+        return None;
+    }
     let lower = word.to_lowercase();
     let distance = |candidate: &str| strsim::damerau_levenshtein(&lower, &candidate.to_lowercase());
     let allowed = (word.chars().count() / 3).max(1);
@@ -319,6 +326,7 @@ pub(crate) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
     let allowed = if word.chars().count() == 1 { 0 } else { allowed };
     known
         .iter()
+        .filter(|candidate| is_short(candidate))
         .map(|candidate| (distance(candidate), *candidate))
         .filter(|(edits, _)| *edits <= allowed)
         .min()
@@ -340,6 +348,9 @@ mod tests {
         check("L/min", Some("l/min"));
         check("register", None);
         check("c", None);
+        let long = "x".repeat(NEAR_CHARS_MAX);
+        assert_eq!(nearest(&format!("{long}y"), &[&long]), None, "longer than any word that is known");
+        assert_eq!(nearest("y", &["yes", &long]), None);
     }
 
     #[test]

@@ -21,6 +21,8 @@ use crate::plant::{
 
 /// Parentheses inside each other, and `not` before `not`: more than anybody can read.
 const DEPTH_MAX: usize = 16;
+/// Words and signs of an expression: as many operations may lie inside each other.
+const TOKENS_MAX: usize = 1_000;
 /// What a comparison can be.
 const COMPARES: [(&str, Compare); 6] = [
     ("!=", Compare::Differs),
@@ -73,6 +75,12 @@ fn read<T>(
         .into_iter()
         .map(|(start, word)| (start, At { value: word, at: words.at.inside_quotes(start, word.len()) }))
         .unzip();
+    if let Some(token) = tokens.get(TOKENS_MAX) {
+        problems
+            .add(token.at, "the expression is too long")
+            .label(format!("expected at most {TOKENS_MAX} words and signs"));
+        return None;
+    }
     let mut reader =
         Reader { text, starts, tokens, next: 0, depth: 0, calls: 0, end: words.at, device, defs, problems };
     let found = what(&mut reader)?;

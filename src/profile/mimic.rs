@@ -17,6 +17,9 @@ use crate::plant::{
 /// What a terminal of 80 by 24 leaves for the mimic.
 const USUAL_ROOM: (u16, u16) = (80, 18);
 
+/// Most pages.
+const PAGES_MAX: usize = 100;
+
 /// The mimic of the process.
 pub(super) fn mimic(table: &MimicTable, defs: &Defs, problems: &mut Problems) -> MimicDef {
     let aliases = aliases(&table.aliases, problems);
@@ -47,6 +50,12 @@ fn titled<'a>(table: &'a MimicTable, problems: &mut Problems) -> Vec<(String, &'
             problem.label("expected `name` beside it: its heading, and what {page NAME} leads to");
         }
         (Some(_), Some(_)) | (None, _) => {}
+    }
+    let count = table.pages.len() + usize::from(table.pictures.is_some());
+    if let Some(last) = table.pages.last().filter(|_| PAGES_MAX < count) {
+        let problem = problems.add(last.at, format!("{count} pages of the mimic are too many"));
+        problem.label(format!("expected at most {PAGES_MAX}"));
+        return Vec::new();
     }
     let further = table.pages.iter().map(|page| (&page.value.name, &page.value.pictures));
     let (mut named, mut titled) = (Unique::default(), Vec::new());

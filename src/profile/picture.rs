@@ -23,6 +23,8 @@ use crate::plant::{
 
 /// Most columns and rows of a picture.
 const SIZE_MAX: (usize, usize) = (500, 200);
+/// Most pipes of a picture, from end or joint to end or joint: each may get its flow from all others.
+const PIPES_MAX: usize = 1_000;
 /// Blanks beyond a symbol that its value may use.
 const ROOM_MAX: usize = 30;
 /// Blanks that part two words in a row.
@@ -45,8 +47,7 @@ struct Placed {
 
 /// Reads a picture; what is wrong in it is added to the problems, the rest is returned.
 pub(super) fn picture(text: &At<String>, vocabulary: &Vocabulary, problems: &mut Problems) -> Picture {
-    let source = problems.text(text.at.source).to_owned();
-    let mut grid = Grid::new(text, &source);
+    let mut grid = Grid::new(text, problems.text(text.at.source));
     let (width, height) = grid.size();
     if width == 0 || width > SIZE_MAX.0 || height > SIZE_MAX.1 {
         let problem =
@@ -63,6 +64,11 @@ pub(super) fn picture(text: &At<String>, vocabulary: &Vocabulary, problems: &mut
     let (cells, areas) = taken(&grid, &placed, problems);
     let around = Surroundings { symbols: &cells, edges: &edges, areas: &areas };
     let pipes = pipes::take(&mut grid, &around, problems);
+    if PIPES_MAX < pipes.runs.len() {
+        let message = format!("a picture of {} pipes cannot be drawn", pipes.runs.len());
+        problems.add(grid.span(0, 0, 1), message).label(format!("expected at most {PIPES_MAX}"));
+        return Picture::default();
+    }
     let busy: BTreeSet<Point> = edges.iter().chain(&areas).chain(cells.keys()).chain(&pipes.cells).copied().collect();
     rooms(&grid, &mut placed, &busy);
     let words = words(&grid, &mut placed, &busy);

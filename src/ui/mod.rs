@@ -64,7 +64,7 @@ use replay::Replay;
 use screen_dump::ScreenDump;
 pub(crate) use screen_dump::text as text_of;
 use session_lock::SessionLock;
-pub(crate) use tabs::mimic::preview;
+pub use tabs::mimic::preview;
 use tabs::{Tab, Tabs, alarms::actions};
 use theme::Theme;
 pub(crate) use tour::Tour;

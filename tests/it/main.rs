@@ -24,6 +24,7 @@
 //! | `rights` | every command, request and query through the socket, by everybody who may be at a terminal |
 //! | `users` | wrong passwords, lockout, idle lock, second users, two operators at once |
 //! | `kills` | stations killed during writes, acknowledgements, logins and reports: what was reported as done is in the audit log |
+//! | `corpus` | bytes that fuzzing found worth keeping, read again by the functions that it calls |
 //! | `crashes` | stations that end at any operation on the disk, by a kill or a loss of power, as seeds say |
 //! | `outstanding` | stations killed and started again, with a slow device: a late reply to the old one is no value |
 //! | `tampering` | the audit log changed by hand: what `sightglass audit verify` says |
@@ -53,6 +54,7 @@ mod attach;
 mod backup;
 mod capture;
 mod commands;
+mod corpus;
 mod crashes;
 mod devices;
 mod durability;

@@ -110,6 +110,10 @@ fn errors_of_enabled_when_are_shown_at_their_place() {
     }
     let deep = format!("{}D1.T > 5", "not ".repeat(50));
     check("high = 80.0", &format!("high = 80.0\nenabled_when = '{deep}'"), &["parentheses nested too deeply"]);
+    // What is read from left to right is as deep as it is long.
+    for long in ["D1.T + ".repeat(600), "D1.T * ".repeat(600), "D1.T > 5 or ".repeat(600)] {
+        check("high = 80.0", &format!("high = 80.0\nenabled_when = '{long}D1.T > 5'"), &["the expression is too long"]);
+    }
 }
 
 #[test]

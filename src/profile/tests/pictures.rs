@@ -231,6 +231,13 @@ fn a_value_that_needs_more_room_is_warned_of() {
 }
 
 #[test]
+fn a_picture_with_too_many_pipes_is_reported() {
+    let mesh = |rows: usize| format!("\n{}", format!("        {}\n", "╬".repeat(20)).repeat(rows));
+    assert!(with(&mesh(20), "").is_ok());
+    check_wrong(&mesh(30), &["a picture of 1150 pipes cannot be drawn", "expected at most 1000"]);
+}
+
+#[test]
 fn pages_have_names_and_link_to_each_other() {
     let text = PLANT.replace(
         "picture = '''\n {D1.T  }\n'''",
@@ -260,6 +267,8 @@ fn pages_without_a_name_or_a_picture_are_reported() {
     check(&page("name = \"Hot\"\npicture = 'x'"), "duplicate page `Hot`");
     check(&page("name = \" \"\npicture = 'x'"), "a page without a name");
     check("name = \"Hot\"", "a page without a picture");
+    let many: String = (0..100).map(|n| format!("[[mimic.page]]\nname = \"{n}\"\npicture = 'x'\n")).collect();
+    check(&format!("name = \"Hot\"\npicture = 'x'\n{many}"), "101 pages of the mimic are too many");
     let unnamed = "picture = 'x'\n[[mimic.page]]\nname = \"Cold\"\npicture = 'x'";
     check(unnamed, "the first of several pages needs a name");
 }

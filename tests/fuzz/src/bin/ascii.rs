@@ -1,0 +1,4 @@
+//! Fuzzes `ascii`.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| sightglass_fuzz::ascii::run(data));

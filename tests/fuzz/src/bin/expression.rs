@@ -1,0 +1,4 @@
+//! Fuzzes `expression`.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| sightglass_fuzz::expression::run(data));

@@ -1,0 +1,4 @@
+//! Fuzzes `mimic`.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| sightglass_fuzz::mimic::run(data));

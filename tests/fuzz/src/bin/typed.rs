@@ -1,0 +1,4 @@
+//! Fuzzes `typed`.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| sightglass_fuzz::typed::run(data));
