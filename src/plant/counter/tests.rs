@@ -145,7 +145,7 @@ proptest! {
     /// What is counted is what was consumed, whatever happened to the readings; cut anywhere, the parts add up.
     #[test]
     fn what_is_counted_is_what_was_consumed(stories in proptest::collection::vec(story(), 1..60), cut in 0..400_usize) {
-        let (mut minute, mut shown, mut consumed) = (0_i64, 40_000.0, 0.0);
+        let (mut minute, mut shown, mut consumed, mut replaced) = (0_i64, 40_000.0, 0.0, 0.0);
         let mut readings = vec![(0, shown)];
         let mut go_on = |minute: &mut i64, shown: &mut f64, minutes: u32, readings: &mut Vec<(i64, f64)>| {
             *minute += i64::from(minutes);
@@ -162,7 +162,12 @@ proptest! {
                 }
                 Story::Outage(minutes) => go_on(&mut minute, &mut shown, minutes, &mut readings),
                 Story::Reset => { minute += 1; shown = 0.0; readings.push((minute * 60, shown)); }
-                Story::Replaced => { minute += 1; shown = 400_000.0 - shown / 2.0; readings.push((minute * 60, shown)); }
+                Story::Replaced => {
+                    // Not near what another showed before: that would be a false reading which is over.
+                    (minute, replaced) = (minute + 1, replaced + 1.0);
+                    shown = 400_000.0 + 7_919.0 * replaced;
+                    readings.push((minute * 60, shown));
+                }
             }
             // It counts on, so that what happened is decided.
             (0..2).for_each(|_| go_on(&mut minute, &mut shown, 1, &mut readings));
