@@ -363,3 +363,26 @@ fn what_was_deleted_is_answered_by_minutes() {
     std::fs::remove_file(db.with_extension("archive").join("raw/date=1970-01-01/01.parquet")).unwrap();
     assert_eq!(open().deleted_until(Tier::Raw).unwrap(), Some(sec(24 * HOUR_S)));
 }
+
+#[test]
+fn sql_gives_each_sample_the_unit_that_it_was_stored_in() {
+    use crate::history::io::tables::Tables;
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    store.append(&(0..30).map(|n| good(PV, 60 * n, 20.0)).collect::<Vec<_>>()).unwrap();
+    drop(store);
+    // The plant file changes the unit of PV.
+    let mut other = plant("Asia/Bangkok", &THREE);
+    let (name, old) = (other.tags[0].name.clone(), other.tags[0].unit.clone());
+    other.tags[0].unit = "°F".into();
+    let other = Arc::new(other);
+    let store = Store::open(&db, &other, sec(1_900)).unwrap().store;
+    store.append(&(0..30).map(|n| good(PV, 2_000 + 60 * n, 68.0)).collect::<Vec<_>>()).unwrap();
+    archive_all(&store, 3);
+    let Answer::Overview(overview) = store.answer(&Query::Overview, sec(3 * HOUR_S)).unwrap() else { panic!() };
+    let scratch = tempfile::tempdir().unwrap();
+    let tables = Tables::new(&other, &overview, scratch.path()).unwrap();
+    let select = format!("SELECT DISTINCT value || ' ' || unit FROM sample WHERE tag = '{name}' ORDER BY 1");
+    let rows: Vec<_> = tables.rows(&select, 9).unwrap().1.into_iter().flatten().flatten().collect();
+    assert_eq!(rows, [format!("20.0 {old}"), "68.0 °F".to_owned()]);
+}
