@@ -56,9 +56,8 @@ impl DecimalMark {
 fn is_grouped(found: &str) -> bool {
     let is_digit = |letter: char| letter.is_ascii_digit() || matches!(letter, '.' | ',' | '-' | '+');
     let is_group = |letter: char| letter.is_whitespace() || matches!(letter, '\'' | '\u{2019}' | '_');
-    found.starts_with(is_digit)
-        && found.ends_with(is_digit)
-        && found.chars().all(|letter| is_digit(letter) || is_group(letter))
+    let is_either = |letter: char| is_digit(letter) || is_group(letter);
+    found.trim_matches(is_digit).contains(is_group) && found.chars().all(is_either)
 }
 
 /// What was expected.
