@@ -12,7 +12,11 @@ use jiff::Timestamp;
 
 use crate::{
     attach::check::{BUCKETS_MAX, COLUMNS_MAX, SERIES_MAX},
-    history::{Answer, Query, bound::about, io::tables::Format},
+    history::{
+        Answer, Query,
+        bound::about,
+        io::tables::{Format, IN_ORDER},
+    },
     plant::{
         PlantDef,
         def::{CsvDialect, TagId},
@@ -51,7 +55,7 @@ pub struct Args {
     /// Time between two rows
     #[arg(long, value_name = "TIME", default_value = "10s", value_parser = span)]
     every: Duration,
-    /// Every stored sample instead, a row each: hour by hour, each hour by tag where it is archived
+    /// Every stored sample instead, a row each, in order of time and tag
     #[arg(long, conflicts_with = "every")]
     raw: bool,
     /// With --raw: csv or parquet
@@ -71,20 +75,28 @@ pub fn main(args: Args) -> Result<(), CliError> {
 }
 
 async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
-    let tags = tags(&def, &args.tags)?;
+    args.csv.refuse_unless(args.format == "csv")?;
+    let named = tags(&def, &args.tags);
     args.history.refuse_own_file(&def, &args.out)?;
     let (source, period) = args.history.open(&def).await?;
     let to = period.to.min(source.now());
     if args.raw {
         let csv = args.csv.dialect(&def);
         let format = if args.format == "parquet" { Format::Parquet } else { Format::Csv(csv) };
-        let sql = raw(&def, &tags, (period.from, to), format);
         let tables = HistoryTables::load(&def, &source).await?;
+        // A tag that the plant has no longer is exported all the same.
+        for tag in args.tags.iter().filter(|tag| def.tag_named(tag).is_none()) {
+            if !tables.knows(tag)? {
+                return Err(named.err().unwrap_or_else(unexpected));
+            }
+        }
+        let sql = raw(&args.tags, (period.from, to), format);
         return tables.export(&source, &sql, format, &args.out, RAW_TIME_MAX).await;
     }
     if args.format != "csv" {
         return Err(CliError::Usage("--format parquet needs --raw: found values at an interval".to_owned()));
     }
+    let tags = named?;
     let rows = rows(period.from, to, args.every, tags.len())?;
     let latest = latest(&source, &def, &tags, period.from, to).await?;
     let (mut progress, mut done) = (Progress::new((rows * tags.len()) as u64), 0);
@@ -110,12 +122,11 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     source.export(&args.out, &bytes).await
 }
 
-/// The stored samples of some tags in a span, with the local time of the plant. A text has all digits of a value; a column
-/// of numbers needs another beside it for those that a DOUBLE rounds.
-fn raw(def: &PlantDef, tags: &[TagId], (from, to): (Timestamp, Timestamp), format: Format) -> String {
-    let quoted = |text: &str| format!("'{}'", text.replace('\'', "''"));
-    let names: Vec<String> = tags.iter().map(|tag| quoted(&def.tag(*tag).name)).collect();
-    let zone = quoted(def.time_zone.iana_name().unwrap_or("UTC"));
+/// The stored samples of some tags, or of all, in a span, with the local time of the plant. A text has all digits of a value;
+/// a column of numbers needs another beside it for those that a DOUBLE rounds.
+fn raw(tags: &[String], (from, to): (Timestamp, Timestamp), format: Format) -> String {
+    let names: Vec<String> = tags.iter().map(|tag| format!("'{}'", tag.replace('\'', "''"))).collect();
+    let only = if names.is_empty() { String::new() } else { format!("AND tag IN ({})", names.join(", ")) };
     let text = "coalesce(rtrim(rtrim(exact::VARCHAR, '0'), '.'), value::VARCHAR)";
     let (value, exact) = match format {
         Format::Csv(CsvDialect { decimal: ',', .. }) => (format!("replace({text}, '.', ',') AS value"), ""),
@@ -123,11 +134,10 @@ fn raw(def: &PlantDef, tags: &[TagId], (from, to): (Timestamp, Timestamp), forma
         Format::Parquet | Format::Json => ("value".to_owned(), ", exact"),
     };
     format!(
-        "SELECT utc, timezone({zone}, timezone('UTC', utc)) AS time_local, tag, {value}, unit, quality{exact} FROM sample
-         WHERE utc >= make_timestamp({}) AND utc < make_timestamp({}) AND tag IN ({})",
+        "SELECT utc, local_time(utc) AS time_local, tag, {value}, unit, quality{exact} FROM stored
+         WHERE utc >= make_timestamp({}) AND utc < make_timestamp({}) {only} ORDER BY {IN_ORDER}",
         from.as_microsecond(),
         to.as_microsecond(),
-        names.join(", ")
     )
 }
 
@@ -201,7 +211,18 @@ fn values(answer: Answer) -> Result<Vec<Vec<Option<HeldValue>>>, CliError> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
+    use crate::{
+        history::io::{import, store::Store, tables::Tables},
+        plant::{
+            exact::Exact,
+            record::Record,
+            sample::{Cause, Quality, Sample},
+        },
+        report::testing::{THREE, plant},
+    };
 
     #[test]
     fn a_table_that_is_too_long_says_what_fits() {
@@ -216,5 +237,70 @@ mod tests {
         // What it says can be done.
         assert_eq!(rows(365, 1_577, 1_000), Ok(19_997));
         assert!(rows(1, 100_000, 1).is_err_and(|error| error.contains("expected 1 or more")));
+    }
+
+    /// Every quality that is stored, samples of one instant, and the night in which a clock is set back.
+    fn records() -> Vec<Record> {
+        let causes = Cause::ALL.into_iter().filter(|cause| cause.is_stored());
+        let qualities = causes.flat_map(|cause| [Quality::Uncertain(cause), Quality::Bad(cause), Quality::Good]);
+        let begin: Timestamp = "2026-10-24T23:30:00Z".parse().expect("a time");
+        let mut samples: Vec<(TagId, Sample)> = (0..)
+            .zip(qualities.cycle().take(400))
+            .map(|(n, quality): (i64, _)| {
+                let at = begin + jiff::SignedDuration::from_millis(n / 3 * 40_123);
+                let value = ((n * 7_919) % 4_001 - 2_000) as f64 / 4.0;
+                let value = Some(Exact::from(value)).filter(|_| !quality.is_bad());
+                (TagId(u16::from(n % 5 < 2)), Sample::new(value, quality, at))
+            })
+            .collect();
+        samples.sort_by_key(|(_, sample)| sample.at);
+        samples.into_iter().map(|(tag, sample)| Record::Sample(tag, sample)).collect()
+    }
+
+    #[test]
+    fn what_is_exported_is_imported_as_it_was_stored() {
+        let (from, to): (Timestamp, Timestamp) =
+            ("2026-10-24T22:00:00Z".parse().expect("a time"), "2026-10-25T06:00:00Z".parse().expect("a time"));
+        for (zone, separator, decimal, bom) in [
+            ("Asia/Bangkok", ',', '.', false),
+            ("Europe/Berlin", ';', ',', true),
+            ("America/St_Johns", '\t', '.', true),
+            ("Europe/Berlin", ';', '.', false),
+        ] {
+            let folder = tempfile::tempdir().expect("a folder");
+            let def = Arc::new(plant(zone, &THREE));
+            let store = Store::open(&folder.path().join("h.duckdb"), &def, from).expect("a history").store;
+            store.append(&records()).expect("it stores");
+            let Ok(Answer::Unarchived(unarchived)) = store.answer(&Query::Unarchived { from, to }, to) else {
+                panic!()
+            };
+            let Ok(Answer::Overview(overview)) = store.answer(&Query::Overview, to) else { panic!() };
+            let tables = Tables::new(&def, &overview, folder.path()).expect("an engine");
+            tables.add_samples(unarchived).expect("room");
+            let mut expect: BTreeMap<TagId, Vec<Sample>> = BTreeMap::new();
+            for record in records() {
+                let Record::Sample(tag, sample) = record else { panic!() };
+                expect.entry(tag).or_default().push(sample);
+            }
+            let dialect = CsvDialect { separator, decimal, bom };
+            let plain = CsvDialect::default();
+            for (sql, dialect) in [
+                (raw(&[], (from, to), Format::Csv(dialect)), dialect),
+                ("SELECT * FROM sample;".to_owned(), plain),
+                ("SELECT utc AS time, tag, value, exact, quality FROM sample".to_owned(), plain),
+                ("SELECT local_time(utc) AS time_local, tag, value, quality FROM sample".to_owned(), plain),
+            ] {
+                let write = |name: &str| {
+                    let file = folder.path().join(name);
+                    let written = tables.write(&sql, &file, Format::Csv(dialect));
+                    written.map(|_| std::fs::read(&file).expect("a file")).expect("it writes")
+                };
+                let bytes = write("one");
+                assert!(bytes == write("other"), "the same bytes each time: {sql}");
+                assert_eq!(bytes.starts_with("\u{feff}".as_bytes()), dialect.bom, "{sql}");
+                let rows = import::parse(&def, &*bytes, Timestamp::UNIX_EPOCH, to);
+                assert_eq!(rows.as_ref(), Ok(&expect), "{zone}, {dialect:?}: {sql}");
+            }
+        }
     }
 }

@@ -57,6 +57,7 @@ impl ListArgs {
         query: impl FnOnce(Period) -> Query,
         rows: &Rows<T>,
     ) -> Result<(), CliError> {
+        self.csv.refuse_unless(self.out.is_some())?;
         if let Some(out) = &self.out {
             self.history.refuse_own_file(def, out)?;
         }

@@ -93,6 +93,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 }
 
 fn write(args: &WriteArgs) -> Result<(), CliError> {
+    args.csv.refuse_unless(args.format.iter().any(|format| format.extension().ends_with("csv")))?;
     let def = args.history.load()?;
     if let Some(out) = &args.out {
         args.history.refuse_own_file(&def, out)?;

@@ -93,6 +93,14 @@ impl HistoryArgs {
 }
 
 impl CsvArgs {
+    /// Refuses settings that nothing would obey.
+    pub fn refuse_unless(&self, is_csv: bool) -> Result<(), CliError> {
+        match is_csv || !(self.bom || self.separator.is_some()) {
+            true => Ok(()),
+            false => Err(CliError::Usage("--bom and --separator are of CSV: found another format".to_owned())),
+        }
+    }
+
     /// The dialect to write.
     pub fn dialect(&self, def: &PlantDef) -> CsvDialect {
         def.report.csv.with(self.separator.as_deref(), self.bom)

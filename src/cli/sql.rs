@@ -17,16 +17,15 @@ use super::{
 };
 use crate::{
     history::{
-        Answer, HistoryError, Overview, Query,
+        Answer, HistoryError, Overview, Query, Unarchived,
         io::tables::{Format, Row, Tables},
     },
     plant::{
         PlantDef,
         batch::Batch,
         control_run::ControlRun,
-        def::{CsvDialect, TagId},
+        def::CsvDialect,
         record::{ActionRecord, AlarmRecord},
-        sample::Sample,
     },
     station::io::reports::REPORTS_MAX,
     ui::widgets::text::width as width_of,
@@ -44,8 +43,9 @@ const ADDRESS_SPACE_MAX: u64 = 2 << 30;
 const SILENT: Duration = Duration::from_millis(500);
 
 const VIEWS: &str = "\
-Views (times are UTC):
+Views (times are UTC, and end with Z in CSV and JSON; local_time(utc) is the local time of the plant, with its offset):
   sample   utc, tag, value, unit, quality, exact (quality: 'good', 'uncertain: …', 'bad: …')
+           of tags that the plant has no longer, too, and in the unit that was stored; listed in order of time and tag
   m1, h1   minutes and hours of what is archived: utc (begin), tag, min, max, mean, first, last, gain, good_ms, n, unit,
            min_exact, max_exact, first_exact, last_exact, gain_exact
   alarm    utc, subject, message, priority, event, value, limit_value, by_whom, reason, value_exact
@@ -148,12 +148,18 @@ impl HistoryTables {
                 return Err(unexpected());
             };
             tables.add_reports(made.reports)?;
-            unarchived(source, &overview, |samples| tables.add_samples(def, samples)).await?;
+            unarchived(source, &overview, |samples| tables.add_samples(samples)).await?;
             // An hour that was archived meanwhile would be missing or double.
             if self::overview(source).await?.files == overview.files {
                 return Ok(HistoryTables { tables, folder });
             }
         }
+    }
+
+    /// Have samples of such a tag ever been stored?
+    pub fn knows(&self, tag: &str) -> Result<bool, CliError> {
+        let sql = format!("SELECT 1 FROM stored WHERE tag = '{}'", tag.replace('\'', "''"));
+        Ok(!self.tables.rows(&sql, 1)?.1.is_empty())
     }
 
     /// Writes the result of a SELECT to a file, `-` to standard output.
@@ -232,7 +238,7 @@ async fn overview(source: &Source) -> Result<Overview, CliError> {
 async fn unarchived(
     source: &Source,
     overview: &Overview,
-    mut each: impl FnMut(Vec<(TagId, Sample)>) -> Result<(), HistoryError>,
+    mut each: impl FnMut(Unarchived) -> Result<(), HistoryError>,
 ) -> Result<(), CliError> {
     let end = source.now().checked_add(Duration::from_secs(1)).unwrap_or(Timestamp::MAX);
     let (mut from, mut span) = (overview.oldest.unwrap_or(end), Duration::from_secs(600));
@@ -241,7 +247,7 @@ async fn unarchived(
         match source.query(Query::Unarchived { from, to }).await {
             Ok(Answer::Unarchived(samples)) => {
                 // Without a bound: after a start with a wrong clock there is nothing for half a century.
-                span = if samples.len() < PAGE { span.saturating_mul(4) } else { span };
+                span = if samples.samples.len() < PAGE { span.saturating_mul(4) } else { span };
                 each(samples)?;
                 from = to;
             }

@@ -1,8 +1,8 @@
 //! Samples from a CSV file of another program: what is accepted, line by line, and which of them fill a gap.
 //!
 //! A row is one sample: `tag`, `time` (with offset, or a local time of the plant), `value`, and if there is such a column
-//! `quality`, in any order. Where there is a column `exact`, as SQL gives it, what it holds is the value. Cells stand
-//! between commas, or between semicolons; then the decimal mark is a comma.
+//! `quality`, in any order. A time whose column has `utc` in its name is UTC. Where there is a column `exact`, as SQL gives it,
+//! what it holds is the value. Cells stand between commas, semicolons or tabs; the decimal mark is the [first](DecimalMark).
 
 use std::collections::BTreeMap;
 
@@ -15,20 +15,22 @@ use crate::{
         PlantDef,
         def::TagId,
         exact::Exact,
-        keyword::Keyword,
         sample::{Cause, Quality, Sample},
         scale,
         tag::TagDef,
         time::elapsed,
     },
-    report::step_series::HOLD_MAX,
+    report::{
+        decimal_mark::{DecimalMark, NumberError},
+        step_series::HOLD_MAX,
+    },
 };
 
 /// Samples of one file: they are all in memory.
 const ROWS_MAX: usize = 2_000_000;
 /// Problems that are kept in words; all are counted.
 const PROBLEMS_MAX: usize = 10;
-/// The names of columns, by what they are; of the times the first that is there counts.
+/// The names of columns, by what they are; of the times the first that is there counts, and before them any with `utc` in it.
 const TIMES: [&str; 5] = ["time_utc", "utc", "time", "timestamp", "time_local"];
 const OTHERS: [&str; 5] = ["tag", "value", "exact", "quality", "unit"];
 
@@ -64,37 +66,37 @@ impl Import {
 
 /// Where the cells of a row stand.
 struct Columns {
+    count: usize,
     tag: usize,
     time: usize,
+    is_utc: bool,
     value: usize,
     exact: Option<usize>,
     quality: Option<usize>,
     unit: Option<usize>,
-    decimal_comma: bool,
+    mark: DecimalMark,
 }
 
-/// Reads the rows behind a header, whose cells stand between semicolons where the decimal mark is a comma. `Err`: every
-/// problem with its line; nothing of the file is used then. Times lie from `oldest` up to `now`.
+/// A row of a file with the line on which it begins; or why it is none.
+pub type Record = (u64, Result<csv::StringRecord, String>);
+
+/// Reads the rows behind a header with this mark between its cells. `Err`: every problem with its line; nothing of the file is
+/// used then. Times lie from `oldest` up to `now`. Rows of one instant keep their order.
 pub fn parse(
     def: &PlantDef,
     header: &csv::StringRecord,
-    decimal_comma: bool,
-    records: impl Iterator<Item = csv::Result<csv::StringRecord>>,
+    separator: u8,
+    records: impl Iterator<Item = Record>,
     [oldest, now]: [Timestamp; 2],
 ) -> Result<Rows, Vec<String>> {
-    let columns = columns(header, decimal_comma).map_err(|why| vec![format!("line 1: {why}")])?;
+    let mut columns = columns(header, separator).map_err(|why| vec![format!("line 1: {why}")])?;
     let (mut rows, mut problems, mut wrong, mut count) = (Rows::new(), Vec::new(), 0, 0);
-    for record in records {
-        let line = |record: &csv::StringRecord| record.position().map_or(0, csv::Position::line);
-        let row = match &record {
-            Ok(record) => columns.row(def, record, oldest, now).map_err(|why| format!("line {}: {why}", line(record))),
-            Err(error) => Err(error.to_string()),
-        };
-        match row {
+    for (line, record) in records {
+        match record.and_then(|record| columns.row(def, line, &record, [oldest, now])) {
             Ok((tag, sample)) => rows.entry(tag).or_default().push(sample),
             Err(why) => {
                 wrong += 1;
-                problems.extend((problems.len() < PROBLEMS_MAX).then_some(why));
+                problems.extend((problems.len() < PROBLEMS_MAX).then(|| format!("line {line}: {why}")));
             }
         }
         count += 1;
@@ -102,15 +104,7 @@ pub fn parse(
             return Err(vec![format!("found more than {ROWS_MAX} rows: split the file")]);
         }
     }
-    for (tag, rows) in &mut rows {
-        rows.sort_by_key(|sample| sample.at);
-        let doubles = rows.windows(2).filter(|pair| pair[0].at == pair[1].at);
-        for pair in doubles {
-            wrong += 1;
-            let why = format!("{}: found two rows of {}, expected one", def.tag(*tag).name, pair[0].at);
-            problems.extend((problems.len() < PROBLEMS_MAX).then_some(why));
-        }
-    }
+    rows.values_mut().for_each(|rows| rows.sort_by_key(|sample| sample.at));
     match wrong {
         0 if rows.is_empty() => Err(vec!["found no row behind the header".to_owned()]),
         0 => Ok(rows),
@@ -121,34 +115,43 @@ pub fn parse(
     }
 }
 
-fn columns(header: &csv::StringRecord, decimal_comma: bool) -> Result<Columns, String> {
+fn columns(header: &csv::StringRecord, separator: u8) -> Result<Columns, String> {
     let named = |name: &str| header.iter().position(|column| column.eq_ignore_ascii_case(name));
     let known = || TIMES.into_iter().chain(OTHERS);
-    if let Some(other) = header.iter().position(|column| !known().any(|known| column.eq_ignore_ascii_case(known))) {
+    let is_utc = |column: &str| column.to_ascii_lowercase().contains("utc");
+    let is_known = |column: &str| is_utc(column) || known().any(|known| column.eq_ignore_ascii_case(known));
+    if let Some(other) = header.iter().position(|column| !is_known(column)) {
         let known: Vec<&str> = known().collect();
         // Not in its own words: until its columns are known, a file may be any file, even one of passwords.
         return Err(format!("column {} is none of samples, expected {}", other + 1, known.join(", ")));
     }
     let needed = |what: &str| named(what).ok_or_else(|| format!("found no column `{what}`"));
+    let utc = header.iter().position(is_utc);
+    let time = utc.or_else(|| TIMES.into_iter().find_map(named));
     Ok(Columns {
+        count: header.len(),
         tag: needed("tag")?,
-        time: TIMES.into_iter().find_map(named).ok_or_else(|| format!("found no column {}", TIMES.join(" or ")))?,
+        time: time.ok_or_else(|| format!("found no column {}", TIMES.join(" or ")))?,
+        is_utc: utc.is_some(),
         value: needed("value")?,
         exact: named("exact"),
         quality: named("quality"),
         unit: named("unit"),
-        decimal_comma,
+        mark: DecimalMark::of(separator),
     })
 }
 
 impl Columns {
     fn row(
-        &self,
+        &mut self,
         def: &PlantDef,
+        line: u64,
         record: &csv::StringRecord,
-        oldest: Timestamp,
-        now: Timestamp,
+        [oldest, now]: [Timestamp; 2],
     ) -> Result<(TagId, Sample), String> {
+        if record.len() != self.count {
+            return Err(format!("found {} cells, expected {}", record.len(), self.count));
+        }
         let cell = |column: usize| record.get(column).unwrap_or_default();
         let name = cell(self.tag);
         let tag = def.tag_named(name).ok_or_else(|| format!("found the tag `{name}`, which {} has not", def.name))?;
@@ -161,7 +164,7 @@ impl Columns {
         if let Some(unit) = unit {
             return Err(format!("{name}: found the unit `{unit}`, expected `{}`", tag_def.unit));
         }
-        let at = in_milliseconds(time(def, cell(self.time))?);
+        let at = in_milliseconds(time(def, cell(self.time), self.is_utc)?);
         if at < oldest || now < at {
             return Err(format!("found the time {at}, expected one from {oldest:.0} to {now:.0}"));
         }
@@ -176,56 +179,56 @@ impl Columns {
             (Quality::Bad(_), found) => {
                 return Err(format!("{name}: found the value `{found}`, which is bad: expected none"));
             }
-            (Quality::Good | Quality::Uncertain(_), found) => Some(self.value(tag_def, found)?),
+            (Quality::Good | Quality::Uncertain(_), found) => Some(value(tag_def, found, line, &mut self.mark)?),
         };
         Ok((tag, Sample::new(value, quality, at)))
     }
-
-    fn value(&self, tag: &TagDef, found: &str) -> Result<Exact, String> {
-        if let Some((value, _)) = tag.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(found)) {
-            return Ok(Exact::whole(*value));
-        }
-        let number = if self.decimal_comma { found.replace(',', ".") } else { found.to_owned() };
-        let number = number.parse::<Exact>().ok().filter(|number| number.is_finite());
-        let is_bit = |value: Exact| value == 0.0 || value == 1.0;
-        let fits = |value: &Exact| match (tag.enum_labels.is_empty(), tag.point.table.is_bits()) {
-            (false, _) => tag.label_of(*value).is_some(),
-            (true, true) => is_bit(*value),
-            // With decimals that the device announces its range is smaller still.
-            (true, false) => scale::to_raw(tag, *value, 0).is_some(),
-        };
-        let labels: Vec<&str> = tag.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
-        let expected = if labels.is_empty() { "a number that its type can hold".into() } else { labels.join(", ") };
-        number.filter(fits).ok_or_else(|| format!("{}: found `{found}`, expected {expected}", tag.name))
-    }
 }
 
-/// An instant with its offset, or a local time of the plant that was there once.
-fn time(def: &PlantDef, found: &str) -> Result<Timestamp, String> {
+fn value(tag: &TagDef, found: &str, line: u64, mark: &mut DecimalMark) -> Result<Exact, String> {
+    if let Some((value, _)) = tag.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(found)) {
+        return Ok(Exact::whole(*value));
+    }
+    let is_bit = |value: Exact| value == 0.0 || value == 1.0;
+    let fits = |value: &Exact| match (tag.enum_labels.is_empty(), tag.point.table.is_bits()) {
+        (false, _) => tag.label_of(*value).is_some(),
+        (true, true) => is_bit(*value),
+        // With decimals that the device announces its range is smaller still.
+        (true, false) => scale::to_raw(tag, *value, 0).is_some(),
+    };
+    let labels: Vec<&str> = tag.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
+    let expected = match (mark.read(found, line), labels.is_empty()) {
+        (Ok(number), _) if fits(&number) => return Ok(number),
+        (_, false) => labels.join(", "),
+        (Err(NumberError::NotANumber) | Ok(_), true) => "a number that its type can hold".to_owned(),
+        (Err(why), true) => why.to_string(),
+    };
+    Err(format!("{}: found `{found}`, expected {expected}", tag.name))
+}
+
+/// An instant with its offset, or a time without: of UTC where its column says so, else a local time of the plant that was
+/// there once.
+fn time(def: &PlantDef, found: &str, is_utc: bool) -> Result<Timestamp, String> {
     if let Ok(at) = found.parse::<Timestamp>() {
         return Ok(at);
     }
-    let has_offset = found.contains(['+', 'Z', 'z', '[']);
-    let local: Option<DateTime> = found.parse().ok().filter(|_| !has_offset);
-    let local =
-        local.ok_or_else(|| format!("found the time `{found}`, expected 2026-11-21T06:00:00 or with an offset"))?;
-    let unambiguous = def.time_zone.to_ambiguous_timestamp(local).unambiguous();
+    // A minus is one only behind the date.
+    let has_offset = found.contains(['+', 'Z', 'z', '[']) || found.get(10..).is_some_and(|time| time.contains('-'));
+    let civil: Option<DateTime> = found.parse().ok().filter(|_| !has_offset);
+    let civil =
+        civil.ok_or_else(|| format!("found the time `{found}`, expected 2026-11-21T06:00:00 or with an offset"))?;
+    let zone = if is_utc { &TimeZone::UTC } else { &def.time_zone };
+    let unambiguous = zone.to_ambiguous_timestamp(civil).unambiguous();
     unambiguous.map_err(|_| format!("found the local time `{found}`, which was twice or never: expected an offset"))
 }
 
+/// What the program writes; nothing is good, and no cause is that the value is old.
 fn quality_of(found: &str) -> Option<Quality> {
-    let cause = |words: &str| match words.trim_start_matches(':').trim() {
-        "" => Some(Cause::Stale),
-        words => Cause::from_word(words)
-            .filter(|cause| Quality::Bad(*cause).code() <= Quality::Bad(Cause::StationOff).code()),
-    };
     match found {
-        "" | "good" => Some(Quality::Good),
-        _ => match (found.strip_prefix("uncertain"), found.strip_prefix("bad")) {
-            (Some(words), _) => cause(words).map(Quality::Uncertain),
-            (None, Some(words)) => cause(words).map(Quality::Bad),
-            (None, None) => None,
-        },
+        "" => Some(Quality::Good),
+        "uncertain" => Some(Quality::Uncertain(Cause::Stale)),
+        "bad" => Some(Quality::Bad(Cause::Stale)),
+        word => Quality::from_word(word).filter(|quality| quality.cause().is_none_or(Cause::is_stored)),
     }
 }
 

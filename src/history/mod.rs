@@ -215,11 +215,20 @@ pub enum Answer {
     /// Samples in order of time.
     Samples(Vec<(TagId, Sample)>),
     /// The same of those that are not archived.
-    Unarchived(Vec<(TagId, Sample)>),
+    Unarchived(Unarchived),
     /// What is stored.
     Overview(Box<Overview>),
     /// What the unit holds.
     Registers(LiveReading),
+}
+
+/// Samples that are not archived, of every tag that was ever stored.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Unarchived {
+    /// Name and unit of their tags, as they were stored.
+    pub tags: Vec<(String, String)>,
+    /// The place of its tag in `tags`, and the sample; in order of time, and of storing.
+    pub samples: Vec<(u16, Sample)>,
 }
 
 /// The automatic reports on record.

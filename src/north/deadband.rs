@@ -31,7 +31,7 @@ impl Deadband {
 }
 
 /// Another quality, a change beyond the deadband, or a value that was sent too long ago.
-fn differs(def: &MqttDef, tag: TagId, sent: Sample, sample: Sample) -> bool {
+pub(super) fn differs(def: &MqttDef, tag: TagId, sent: Sample, sample: Sample) -> bool {
     if sent.quality != sample.quality {
         return true;
     }

@@ -5,12 +5,15 @@
 //!              ├OVERLAP┤── window ──┤
 //!                      what was committed late stands here: read again, sent once
 //! ```
+//!
+//! What is read again is decided again: each sample is compared with what was sent last before its own time, so that what a
+//! deadband has left out stays left out, and what comes late is compared with its neighbour.
 
-use std::{collections::HashSet, time::Duration};
+use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::deadband::Deadband;
+use super::deadband::differs;
 use crate::plant::{
     def::{MqttDef, TagId},
     sample::Sample,
@@ -26,9 +29,6 @@ const SPAN_MIN: Duration = Duration::from_millis(1);
 /// Fewer samples in a window make the next one longer.
 const FEW: usize = 5_000;
 
-/// Time, tag, value and quality: two samples may have one time.
-type Key = (Timestamp, TagId, [Option<u64>; 2], u8);
-
 /// The state of the samples that go out. A window is asked of the history, its samples are sent, and when the broker has
 /// acknowledged them the cursor moves to its end.
 #[derive(Debug)]
@@ -36,9 +36,9 @@ pub struct Forwarder {
     cursor: Timestamp,
     span: Duration,
     overlap: Duration,
-    /// What was sent of the last `OVERLAP` before the cursor.
-    sent: HashSet<Key>,
-    deadband: Deadband,
+    sent: Sent,
+    /// What was sent before this instant is not known: there, no deadband leaves anything out.
+    unknown_before: Timestamp,
 }
 
 /// What is sent next.
@@ -50,16 +50,32 @@ pub struct Batch {
     pub samples: Vec<(TagId, Sample)>,
 }
 
+/// What was sent of each tag in the last `OVERLAP` before the cursor, and the last one before that, in order of time.
+#[derive(Debug, Clone)]
+struct Sent(Vec<Vec<Sample>>);
+
 impl Forwarder {
     /// Everything before the cursor has been read once, and is at the broker. `speed`: plant seconds per real second.
     pub fn new(cursor: Timestamp, tags: usize, speed: f64) -> Forwarder {
         let overlap = OVERLAP.mul_f64(speed.max(1.0));
-        Forwarder { cursor, span: SPAN, overlap, sent: HashSet::new(), deadband: Deadband::new(tags) }
+        Forwarder { cursor, span: SPAN, overlap, sent: Sent(vec![Vec::new(); tags]), unknown_before: cursor }
+    }
+
+    /// The same where it is known what was sent last, see [`Forwarder::sent`].
+    pub fn knowing(self, sent: impl Iterator<Item = (TagId, Sample)>) -> Forwarder {
+        let mut known = Forwarder { unknown_before: Timestamp::MIN, ..self };
+        sent.for_each(|(tag, sample)| known.sent.add(tag, sample));
+        known
     }
 
     /// What is read next begins `OVERLAP` before this instant.
     pub fn cursor(&self) -> Timestamp {
         self.cursor
+    }
+
+    /// What the next one must know, to go on where this one ends.
+    pub fn sent(&self) -> impl Iterator<Item = (TagId, Sample)> {
+        (0..).zip(&self.sent.0).flat_map(|(tag, sent)| sent.iter().map(move |sample| (TagId(tag), *sample)))
     }
 
     /// Everything before this instant is at the broker: what is later may still be committed.
@@ -72,7 +88,7 @@ impl Forwarder {
     pub fn window(&mut self, now: Timestamp) -> (Timestamp, Timestamp) {
         if now < self.cursor {
             self.cursor = now;
-            self.sent.clear();
+            self.sent.0.iter_mut().for_each(Vec::clear);
         }
         (self.complete_until(), self.cursor.checked_add(self.span).unwrap_or(now).min(now))
     }
@@ -87,27 +103,53 @@ impl Forwarder {
         if samples.len() < FEW {
             self.span = (self.span * 4).min(SPAN_MAX);
         }
-        let mut deadband = self.deadband.clone();
+        let mut sent = self.sent.clone();
         let is_due = |(tag, sample): &(TagId, Sample)| {
-            !self.sent.contains(&key(*tag, sample)) && (def.deadband(*tag) == 0.0 || deadband.pass(def, *tag, *sample))
+            let all = def.deadband(*tag) == 0.0 || sample.at < self.unknown_before;
+            let is_due = sent.lacks(*tag, *sample, |before| all || differs(def, *tag, before, *sample));
+            if is_due {
+                sent.add(*tag, *sample);
+            }
+            is_due
         };
         Batch { until, samples: samples.into_iter().filter(is_due).collect() }
     }
 
     /// The broker has acknowledged all of a batch.
-    pub fn on_delivered(&mut self, def: &MqttDef, batch: &Batch) {
-        for (tag, sample) in &batch.samples {
-            self.deadband.pass(def, *tag, *sample);
-            self.sent.insert(key(*tag, sample));
-        }
+    pub fn on_delivered(&mut self, batch: &Batch) {
+        batch.samples.iter().for_each(|(tag, sample)| self.sent.add(*tag, *sample));
         self.cursor = batch.until;
-        let from = self.complete_until();
-        self.sent.retain(|(at, ..)| from <= *at);
+        self.sent.forget(self.complete_until());
     }
 }
 
-fn key(tag: TagId, sample: &Sample) -> Key {
-    (sample.at, tag, [sample.value, sample.rest].map(|part| part.map(f64::to_bits)), sample.quality.code())
+impl Sent {
+    /// Was it not sent yet, and does it differ from what was sent last before its time?
+    fn lacks(&self, tag: TagId, sample: Sample, differs: impl Fn(Sample) -> bool) -> bool {
+        let Some(sent) = self.0.get(tag.index()) else { return false };
+        let before = &sent[..behind(sent, sample.at)];
+        let is_sent = before.iter().rev().take_while(|sent| sent.at == sample.at).any(|sent| *sent == sample);
+        !is_sent && before.last().is_none_or(|before| differs(*before))
+    }
+
+    fn add(&mut self, tag: TagId, sample: Sample) {
+        if let Some(sent) = self.0.get_mut(tag.index()) {
+            sent.insert(behind(sent, sample.at), sample);
+        }
+    }
+
+    /// Forgets what was before an instant, but for the last of each tag.
+    fn forget(&mut self, from: Timestamp) {
+        for sent in &mut self.0 {
+            let before = sent.partition_point(|sample| sample.at < from);
+            sent.drain(..before.saturating_sub(1));
+        }
+    }
+}
+
+/// Where a sample of this time stands: behind those of the same time.
+fn behind(sent: &[Sample], at: Timestamp) -> usize {
+    sent.partition_point(|sample| sample.at <= at)
 }
 
 #[cfg(test)]
@@ -139,7 +181,7 @@ mod tests {
         let window = forwarder.window(at(now));
         let batch = forwarder.on_samples(&mqtt(), window.1, stored.answer(now, window));
         out.extend(batch.samples.iter().filter_map(|(_, sample)| sample.value));
-        forwarder.on_delivered(&mqtt(), &batch);
+        forwarder.on_delivered(&batch);
     }
 
     #[test]
@@ -154,7 +196,8 @@ mod tests {
         }
         out.sort_by(f64::total_cmp);
         assert_eq!(out, (0..400).map(f64::from).collect::<Vec<_>>());
-        assert!(forwarder.sent.len() < 40, "what is remembered has a bound: {}", forwarder.sent.len());
+        let remembered = forwarder.sent().count();
+        assert!(remembered < 40, "what is remembered has a bound: {remembered}");
     }
 
     #[test]
@@ -168,7 +211,7 @@ mod tests {
         let window = forwarder.window(at(2_000));
         let second = forwarder.on_samples(&mqtt(), window.1, stored.answer(2_000, window));
         assert_eq!(second.samples, first.samples);
-        forwarder.on_delivered(&mqtt(), &second);
+        forwarder.on_delivered(&second);
         let mut out = Vec::new();
         run(&mut forwarder, &stored, 3_000, &mut out);
         assert_eq!(out, [0.0; 0]);
@@ -218,7 +261,102 @@ mod tests {
         let rows = vec![sample(0, 1.0), sample(100, 1.2), sample(200, 1.6), sample(300, 1.7)];
         let batch = forwarder.on_samples(&def, at(1_000), rows.clone());
         assert_eq!(batch.samples, [rows[0], rows[2]]);
-        forwarder.on_delivered(&def, &batch);
+        forwarder.on_delivered(&batch);
         assert_eq!(forwarder.on_samples(&def, at(2_000), vec![sample(1_100, 1.7)]).samples, []);
+    }
+
+    /// What is sent of a history, a window each second, by a forwarder that is stopped and goes on after some of them.
+    fn sent_of(def: &MqttDef, stored: &Stored, seconds: i64, restarts: &[i64]) -> Vec<(TagId, i64, f64)> {
+        let mut forwarder = Forwarder::new(at(0), 3, 1.0);
+        let mut out = Vec::new();
+        for second in 1..=seconds {
+            let window = forwarder.window(at(second * 1_000));
+            let batch = forwarder.on_samples(def, window.1, stored.answer(second * 1_000, window));
+            let millis = |at: Timestamp| at.as_millisecond() - at_0();
+            out.extend(batch.samples.iter().filter_map(|(tag, sample)| Some((*tag, millis(sample.at), sample.value?))));
+            forwarder.on_delivered(&batch);
+            if restarts.contains(&second) {
+                let known: Vec<_> = forwarder.sent().collect();
+                forwarder = Forwarder::new(forwarder.cursor(), 3, 1.0).knowing(known.into_iter());
+            }
+        }
+        out
+    }
+
+    fn at_0() -> i64 {
+        at(0).as_millisecond()
+    }
+
+    #[test]
+    fn what_a_deadband_left_out_is_not_sent_later() {
+        let def = MqttDef { deadbands: vec![0.5, 2.0, 0.0], ..mqtt() };
+        let stored =
+            Stored([(0, 1.0), (100, 1.4), (200, 2.0), (300, 2.1)].map(|(ms, value)| (0, sample(ms, value))).into());
+        let expect = [(TagId(0), 0, 1.0), (TagId(0), 200, 2.0)];
+        assert_eq!(sent_of(&def, &stored, 30, &[]), expect);
+        assert_eq!(sent_of(&def, &stored, 30, &[1, 5, 10, 11, 12]), expect, "by a station that is restarted");
+    }
+
+    #[test]
+    fn windows_and_restarts_change_nothing_of_what_is_sent() {
+        let def = MqttDef { deadbands: vec![0.5, 2.0, 0.0], ..mqtt() };
+        // Three tags that wander, each sample committed at its time.
+        let mut seed = 1_u64;
+        let mut next = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) as f64 / f64::from(1_u32 << 31)
+        };
+        let mut rows = Vec::new();
+        let mut values = [0.0; 3];
+        for (n, tag) in (0..900_i64).zip([0_u16, 1, 2].into_iter().cycle()) {
+            let value = &mut values[usize::from(tag)];
+            *value += next() - 0.5;
+            rows.push((n * 70, (TagId(tag), Sample::good(*value, at(n * 70)))));
+        }
+        let stored = Stored(rows);
+        let mut forwarder = Forwarder::new(at(0), 3, 1.0);
+        let all = forwarder.on_samples(&def, at(100_000), stored.answer(100_000, (at(0), at(100_000)))).samples;
+        let mut all: Vec<_> = all
+            .iter()
+            .map(|(tag, sample)| (*tag, sample.at.as_millisecond() - at_0(), sample.value.unwrap_or(f64::NAN)))
+            .collect();
+        let mut sent = sent_of(&def, &stored, 80, &[7, 8, 30, 55]);
+        let of = |tag: u16| all.iter().filter(|(of, ..)| *of == TagId(tag)).count();
+        assert!(of(2) == 300 && of(1) < of(0) && of(0) < 200, "{} {} {}", of(0), of(1), of(2));
+        all.sort_by_key(|(tag, at, _)| (*at, *tag));
+        sent.sort_by_key(|(tag, at, _)| (*at, *tag));
+        assert_eq!(sent, all);
+    }
+
+    #[test]
+    fn what_comes_late_is_compared_with_its_neighbour() {
+        let def = MqttDef { deadbands: vec![0.5, 0.0, 0.0], ..mqtt() };
+        // Two samples of the time before that of the last one are committed three seconds later: one as its neighbour, one not.
+        let rows = [
+            (0, 0, 1.0),
+            (0, 900, 5.0),
+            (4_000, 300, 1.2),
+            (4_000, 600, 9.0),
+            (4_500, 4_500, 5.2),
+            (5_000, 5_000, 5.6),
+        ];
+        let stored = Stored(rows.map(|(committed, ms, value)| (committed, sample(ms, value))).into());
+        let sent: Vec<_> = sent_of(&def, &stored, 20, &[]).into_iter().map(|(_, _, value)| value).collect();
+        assert_eq!(sent, [1.0, 5.0, 9.0, 5.6]);
+    }
+
+    #[test]
+    fn where_it_is_not_known_what_was_sent_all_is_sent() {
+        let def = MqttDef { deadbands: vec![0.5], ..mqtt() };
+        let stored =
+            Stored([(0, 1.0), (100, 1.4), (200, 2.0), (300, 1.3)].map(|(ms, value)| (0, sample(ms, value))).into());
+        // After a failure: the last one is sent, so the broker has no value that is further off than the deadband.
+        let mut forwarder = Forwarder::new(at(1_000), 1, 1.0);
+        let window = forwarder.window(at(1_000));
+        let batch = forwarder.on_samples(&def, window.1, stored.answer(1_000, window));
+        assert_eq!(
+            batch.samples.iter().filter_map(|(_, sample)| sample.value).collect::<Vec<_>>(),
+            [1.0, 1.4, 2.0, 1.3]
+        );
     }
 }

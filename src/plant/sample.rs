@@ -6,7 +6,10 @@ use std::fmt;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{exact::Exact, keyword::keyword_enum};
+use super::{
+    exact::Exact,
+    keyword::{Keyword, keyword_enum},
+};
 
 /// Quality of a value, as in OPC UA. Ordered: `Good < Uncertain < Bad`, so `max` is "the worst of".
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -65,6 +68,31 @@ keyword_enum! {
     }
 }
 
+impl Cause {
+    /// Can a stored sample have it?
+    pub fn is_stored(self) -> bool {
+        match self {
+            Cause::NotAuthorised | Cause::Unreadable | Cause::NotStored => false,
+            Cause::NotRead
+            | Cause::Timeout
+            | Cause::Corrupt
+            | Cause::Exception
+            | Cause::Stale
+            | Cause::DeviceDown
+            | Cause::NotConnected
+            | Cause::SensorFault
+            | Cause::Unscaled
+            | Cause::Undefined
+            | Cause::StationOff
+            | Cause::NotReadBack
+            | Cause::NotHeard
+            | Cause::Stated
+            | Cause::Reloaded
+            | Cause::Unproven => true,
+        }
+    }
+}
+
 /// `good`, `uncertain: stale`, `bad: response timeout`.
 impl fmt::Display for Quality {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -83,6 +111,16 @@ impl Quality {
             Quality::Good => "good".to_owned(),
             Quality::Uncertain(cause) => format!("uncertain: {}", cause.word()),
             Quality::Bad(cause) => format!("bad: {}", cause.word()),
+        }
+    }
+
+    /// What [`Quality::word`] has written.
+    pub fn from_word(word: &str) -> Option<Quality> {
+        match word.split_once(": ") {
+            Some(("uncertain", cause)) => Cause::from_word(cause).map(Quality::Uncertain),
+            Some(("bad", cause)) => Cause::from_word(cause).map(Quality::Bad),
+            Some(_) => None,
+            None => (word == "good").then_some(Quality::Good),
         }
     }
 
@@ -202,10 +240,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_quality_survives_its_stored_code() {
+    fn every_quality_survives_its_stored_code_and_its_word() {
         let all = Cause::ALL.into_iter().flat_map(|c| [Quality::Uncertain(c), Quality::Bad(c)]);
         for quality in all.chain([Quality::Good]) {
             assert_eq!(Quality::from_code(quality.code()), Some(quality));
+            assert_eq!(Quality::from_word(&quality.word()), Some(quality));
         }
         assert_eq!(Quality::from_code(63), None);
         assert_eq!(Quality::from_code(255), None);

@@ -38,7 +38,7 @@ pub fn export_csv(
     let cells = |column: &Column, row: usize| {
         let stood = column.values.get(row).copied().flatten();
         let good = stood.filter(|stood| stood.quality.is_good()).and_then(|stood| stood.value);
-        let quality = stood.map_or_else(|| "none".to_owned(), |stood| stood.quality.to_string());
+        let quality = stood.map_or_else(|| "none".to_owned(), |stood| stood.quality.word());
         [number(good, column.decimals, dialect), plain(quality)]
     };
     let header = std::iter::once(plain("time")).chain(columns.iter().flat_map(head)).collect();

@@ -15,6 +15,7 @@ pub(crate) mod chart;
 pub mod document;
 pub mod content;
 mod csv;
+pub mod decimal_mark;
 pub(crate) mod shift_csv;
 pub(crate) mod record_csv;
 pub(crate) mod typeface;

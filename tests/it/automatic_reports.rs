@@ -142,7 +142,7 @@ fn a_station_killed_while_it_writes_makes_each_report_once() {
     let sql = "SELECT count(*) AS n FROM report WHERE event = 'made' AND period = 'day'";
     let listed =
         place.command(&["sql", "tank.toml", sql, "--csv", "--history", "tank.duckdb"]).output().expect("it runs");
-    assert_eq!(String::from_utf8_lossy(&listed.stdout), format!("n\n{}\n", expected.len()));
+    assert_eq!(String::from_utf8_lossy(&listed.stdout), format!("n\r\n{}\r\n", expected.len()));
     let db = duckdb::Connection::open(place.folder.path().join("tank.duckdb")).expect("the history");
     let count = |query: &str| db.query_row(query, [], |row| row.get::<_, usize>(0)).expect("a count");
     assert_eq!(count("SELECT count(*) FROM report WHERE event = 'made'"), expected.len());

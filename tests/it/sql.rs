@@ -29,7 +29,8 @@ fn sql_reads_archive_and_database_as_one() {
     let by_tag = "SELECT tag, count(*) AS n, sum(value)::DECIMAL(12, 1) AS sum, unit, quality FROM sample
         GROUP BY ALL ORDER BY tag";
     let sum = (0..93_600).map(|second| (second % 1_000) as f64 / 10.0).sum::<f64>();
-    let csv = format!("tag,n,sum,unit,quality\nTIC-1.PV,93600,{sum:.1},°C,good\nTIC-1.SV,93600,6552000.0,°C,good\n");
+    let csv =
+        format!("tag,n,sum,unit,quality\r\nTIC-1.PV,93600,{sum:.1},°C,good\r\nTIC-1.SV,93600,6552000.0,°C,good\r\n");
     assert_eq!(sql(&[by_tag, "--csv"]), (Some(0), csv));
     let (code, text) =
         sql(&["SELECT tag, count(*) AS n, sum(n)::INTEGER AS samples FROM m1 GROUP BY tag ORDER BY tag"]);
@@ -72,12 +73,17 @@ fn raw_samples_are_exported_whole() {
     let (code, text) = export("csv");
     assert_eq!(code, Some(0), "{text}");
     let text = std::fs::read_to_string(&out).unwrap();
-    let mut lines: Vec<&str> = text.lines().collect();
+    let mut lines: Vec<&str> = text.split_terminator("\r\n").collect();
     assert_eq!(lines.remove(0), "utc,time_local,tag,value,unit,quality");
-    lines.sort_unstable();
+    assert!(lines.is_sorted(), "in order of time");
     assert_eq!(lines.len(), 7_204);
-    assert_eq!(lines[0], "2026-03-03 04:59:58,2026-03-03 11:59:58,TIC-1.PV,79.8,°C,good");
-    assert_eq!(lines[7_203], "2026-03-03 07:00:01,2026-03-03 14:00:01,TIC-1.PV,0.1,°C,good");
+    assert_eq!(lines[0], "2026-03-03T04:59:58Z,2026-03-03T11:59:58+07:00,TIC-1.PV,79.8,°C,good");
+    assert_eq!(lines[7_203], "2026-03-03T07:00:01Z,2026-03-03T14:00:01+07:00,TIC-1.PV,0.1,°C,good");
+    // The same bytes each time, with a mark before them for who asks for it.
+    let args = ["export", "--raw", "--bom", "--from", "2026-03-03T11:59:58", "--to", "2026-03-03T14:00:02"];
+    assert_eq!(run(&history, &[&args[..], &["--tags", "TIC-1.PV"]].concat()), (Some(0), format!("\u{feff}{text}")));
+    let (code, said) = run(&history, &[&args[..], &["--format", "parquet"]].concat());
+    assert!(code == Some(2) && said.contains("--bom and --separator are of CSV"), "{said}");
     // A history that lacks them takes them back.
     let other = folder.path().join("other.duckdb");
     let def = sightglass::profile::load(Path::new("tank"), &sightglass::profile::Search::shipped()).unwrap();
@@ -136,7 +142,7 @@ fn samples_of_a_wrong_clock_are_answered_like_others() {
     assert_eq!(code, Some(0), "{text}");
     // With the end of its curve.
     let count = "SELECT count(*) AS n FROM sample WHERE tag = 'TIC-1.PV'";
-    assert_eq!(run(&history, &["sql", count, "--csv"]), (Some(0), "n\n93602\n".to_owned()));
+    assert_eq!(run(&history, &["sql", count, "--csv"]), (Some(0), "n\r\n93602\r\n".to_owned()));
 }
 
 #[test]
@@ -153,4 +159,69 @@ fn a_value_of_any_size_is_bounded() {
     // On a screen a long value is cut.
     let (code, text) = run(&history, &["sql", "SELECT repeat('x', 100000)"]);
     assert!(code == Some(0) && text.len() < 10_000, "{code:?}, {} bytes", text.len());
+}
+
+/// A plant file with one tag of this unit, at this place on Earth.
+fn plant_file(folder: &Path, zone: &str, tag: &str, unit: &str) -> String {
+    let file = folder.join(format!("{tag}-{unit}.toml"));
+    let text = format!(
+        "title = 'P'\ntime_zone = '{zone}'\n[[line]]\nname = 'L'\nmode = 'tcp'\nhost = '127.0.0.1'\ntcp_port = 15021\n\
+         [[device]]\nname = 'D'\nline = 'L'\nunit = 1\n[[device.tag]]\nname = '{tag}'\ntable = 'holding'\naddress = 0\n\
+         type = 'uint16'\nscale = 0.1\nunit = '{unit}'\n"
+    );
+    std::fs::write(&file, text).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+#[test]
+fn each_sample_keeps_the_unit_and_the_tag_it_was_stored_with() {
+    let folder = folder();
+    let history = folder.path().join("h.duckdb");
+    let [celsius, fahrenheit, other] = [("T", "°C"), ("T", "°F"), ("U", "bar")]
+        .map(|(tag, unit)| plant_file(folder.path(), "Europe/Berlin", tag, unit));
+    let import = |plant: &str, rows: &str| {
+        let file = folder.path().join("rows.csv");
+        std::fs::write(&file, format!("tag,time,value\n{rows}")).unwrap();
+        let (code, text) = run_at(&history, &["history", "import", plant, file.to_str().unwrap()]);
+        assert_eq!(code, Some(0), "{text}");
+    };
+    let raw = |plant: &str| {
+        let (code, text) = run_at(
+            &history,
+            &["export", plant, "--raw", "--from", "2025-10-26T00:00:00Z", "--to", "2025-10-26T03:00:00Z"],
+        );
+        assert_eq!(code, Some(0), "{text}");
+        text
+    };
+    import(&celsius, "D.T,2025-10-26T00:30:00.25Z,20.5\nD.T,2025-10-26T01:30:00Z,21.5\n");
+    let expect = "utc,time_local,tag,value,unit,quality\r\n\
+        2025-10-26T00:30:00.25Z,2025-10-26T02:30:00.25+02:00,D.T,20.5,°C,good\r\n\
+        2025-10-26T01:30:00Z,2025-10-26T02:30:00+01:00,D.T,21.5,°C,good\r\n";
+    assert!(raw(&celsius).starts_with(expect), "{}", raw(&celsius));
+    let first = raw(&celsius);
+    for plant in [&fahrenheit, &other] {
+        assert_eq!(raw(plant), first, "in the database, with {plant}");
+    }
+    assert_eq!(run_at(&history, &["history", "compact", &celsius]).0, Some(0));
+    import(&fahrenheit, "D.T,2025-10-26T02:30:00Z,68.5\n");
+    let both = raw(&fahrenheit);
+    assert!(both.contains(",D.T,20.5,°C,good\r\n") && both.contains(",D.T,68.5,°F,good\r\n"), "{both}");
+    assert_eq!(raw(&other), both, "in the archive and the database");
+    let sql = |select: &str| run_at(&history, &["sql", &other, select, "--csv"]);
+    let (code, listed) = sql("SELECT utc, unit FROM sample WHERE value IS NOT NULL;");
+    let rows = "utc,unit\r\n2025-10-26T00:30:00.25Z,°C\r\n2025-10-26T01:30:00Z,°C\r\n2025-10-26T02:30:00Z,°F\r\n";
+    assert_eq!((code, listed.as_str()), (Some(0), rows));
+    // And back, where it was at home.
+    let copy = folder.path().join("copy.duckdb");
+    let file = folder.path().join("back.csv");
+    std::fs::write(&file, &first).unwrap();
+    let (code, text) = run_at(&copy, &["history", "import", &celsius, file.to_str().unwrap()]);
+    assert_eq!(code, Some(0), "{text}");
+    let args = [
+        "sql",
+        &celsius,
+        "SELECT utc, tag, value, unit, quality, exact FROM sample WHERE utc < '2025-10-26 02:00'",
+        "--csv",
+    ];
+    assert_eq!(run_at(&copy, &args), run_at(&history, &args));
 }

@@ -55,8 +55,12 @@ fn what_is_wrong_is_said_with_line_and_expectation() {
         (format!("{pv},2026-11-21T05:00Z,"), "found ``, expected a number"),
         (format!("{sv},2026-11-21T05:00Z,7"), "found `7`, expected OFF, ON"),
         (format!("{run},2026-11-21T05:00Z,99999999"), "expected a number that its type can hold"),
-        (format!("{pv},2026-11-21T05:00Z,1\n{pv},2026-11-21T05:00Z,2"), "found two rows of 2026-11-21T05:00:00Z"),
-        (format!("{pv},2026-11-21T05:00Z"), "found record with 2 fields"),
+        (format!("{pv},2026-11-21T05:00Z"), "line 2: found 2 cells, expected 3"),
+        (
+            format!("{pv},2026-11-21T05:00Z,\"1,5\""),
+            "found `1,5`, expected a decimal point, as cells stand between commas",
+        ),
+        (format!("{pv},2026-11-21 05:00:00 -07:00,1"), "found the time `2026-11-21 05:00:00 -07:00`, expected 2026-"),
     ] {
         let problems = read(&format!("tag,time,value\n{rows}\n")).unwrap_err();
         assert!(problems[0].contains(expect), "{problems:?}, expected {expect}");
@@ -133,5 +137,88 @@ fn only_rows_without_a_value_in_force_are_accepted() {
         let mut all = [stored, again].concat();
         all.sort_by_key(|stored| stored.sample.at);
         assert_eq!(decide(&all, &seconds), Vec::<i64>::new(), "once more");
+    }
+}
+
+#[test]
+fn a_thousands_mark_is_no_decimal_mark() {
+    let [pv, ..] = names();
+    let check = |values: [&str; 2], separator: &str, expect: &str| {
+        let [one, other] = values;
+        let row = |value: &str| [pv.as_str(), "2026-11-21T05:00Z", value].join(separator);
+        let text = [["tag", "time", "value"].join(separator), row(one), row(other)].join("\r\n");
+        assert_eq!(read(&text), Err(vec![format!("line 3: {pv}: found `{other}`, expected {expect}")]), "{values:?}");
+    };
+    check(["1,5", "1.234"], ";", "a decimal comma, as on line 2");
+    check(["1.5", "1,234"], ";", "a decimal point, as on line 2");
+    check(["1.5", "1,234"], "\t", "a decimal point, as on line 2");
+    for grouped in ["1.234,5", "1 234", "1'234", "1\u{a0}234,5"] {
+        check(["1,5", grouped], ";", "a number without marks between thousands");
+    }
+}
+
+#[test]
+fn a_column_that_says_utc_is_utc() {
+    let [pv, ..] = names();
+    // Berlin had its clocks set back at 01:00 UTC, and forward on 2026-03-29.
+    for (time, expect) in [
+        ("2026-11-21 05:00:00.123", "2026-11-21T05:00:00.123Z"),
+        ("2026-11-21T05:00:00Z", "2026-11-21T05:00:00Z"),
+        ("2026-11-21T05:00:00-02:00", "2026-11-21T07:00:00Z"),
+        ("2026-10-25 00:30:00", "2026-10-25T00:30:00Z"),
+        ("2026-10-25 02:30:00", "2026-10-25T02:30:00Z"),
+        ("2026-03-29 02:30:00", "2026-03-29T02:30:00Z"),
+    ] {
+        for column in ["utc", "time_utc", "UTC", "Time (UTC)", "timestamp_utc"] {
+            let text = format!("time_local,{column},tag,value\nx,{time},{pv},1\n");
+            assert_eq!(read(&text), Ok(Rows::from([(TagId(0), vec![Sample::good(1.0, at(expect))])])), "{text}");
+        }
+    }
+    // A local time with its offset is known in the doubled hour.
+    let text = format!("time,tag,value\n2026-10-25T02:30:00+02:00,{pv},1\n2026-10-25T02:30:00+01:00,{pv},2\n");
+    let times = read(&text).map(|rows| rows[&TagId(0)].iter().map(|sample| sample.at).collect::<Vec<_>>());
+    assert_eq!(times, Ok(vec![at("2026-10-25T00:30:00Z"), at("2026-10-25T01:30:00Z")]));
+}
+
+#[test]
+fn every_quality_that_is_stored_is_imported() {
+    let [pv, ..] = names();
+    let of = |cause| [Quality::Uncertain(cause), Quality::Bad(cause)];
+    for quality in Cause::ALL.into_iter().flat_map(of).chain([Quality::Good]) {
+        let value = if quality.is_bad() { "" } else { "1.5" };
+        let read = read(&format!("utc,tag,value,quality\n2026-11-21T05:00:00Z,{pv},{value},{}\n", quality.word()));
+        let expect = Sample::new(Some(1.5.into()).filter(|_| !quality.is_bad()), quality, at("2026-11-21T05:00:00Z"));
+        match quality.cause().is_none_or(Cause::is_stored) {
+            true => assert_eq!(read, Ok(Rows::from([(TagId(0), vec![expect])])), "{quality:?}"),
+            false => assert!(read.is_err(), "{quality:?} is of no stored sample"),
+        }
+    }
+}
+
+#[test]
+fn rows_of_one_instant_keep_their_order() {
+    let [pv, ..] = names();
+    let row = |value: &str| format!("2026-11-21T05:00:00Z,{pv},{value}\n");
+    let text = format!("utc,tag,value\n{}{}{}2026-11-21T04:00:00Z,{pv},0\n", row("3"), row("1"), row("2"));
+    let values = read(&text).map(|rows| rows[&TagId(0)].iter().map(|sample| sample.value).collect::<Vec<_>>());
+    assert_eq!(values, Ok(vec![Some(0.0), Some(3.0), Some(1.0), Some(2.0)]));
+}
+
+#[test]
+fn a_line_has_its_number_whatever_ends_it() {
+    let [pv, ..] = names();
+    let good = format!("2026-11-21T05:00:00Z,{pv},1,");
+    let quoted = format!("\"2026-11-21T05:00:00Z\n\",{pv},\"\n1\",\"\n\"");
+    for end in ["\n", "\r\n", "\r"] {
+        for last in ["", end] {
+            let text =
+                ["utc,tag,value,quality", &good, "", &quoted, &good, "2026-11-21T05:00:00Z,X,1,"].join(end) + last;
+            // The quoted row has three line ends within.
+            let problems = read(&text).unwrap_err();
+            assert!(
+                problems[0].starts_with("line 9: found the tag `X`") && problems.len() == 1,
+                "{text:?}: {problems:?}"
+            );
+        }
     }
 }

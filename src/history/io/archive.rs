@@ -312,10 +312,7 @@ pub(super) fn folder(db: &Path) -> PathBuf {
 
 /// Files of a tier as a table in SQL, with or without what their numbers lack: NULL for a file that has no such columns.
 pub(super) fn table(folder: &Path, files: &[ArchiveFile], rests: bool) -> String {
-    let list = |files: &[ArchiveFile]| {
-        let paths: Vec<String> = files.iter().map(|file| quoted(&folder.join(&file.path))).collect();
-        format!("read_parquet([{}], hive_partitioning = false)", paths.join(", "))
-    };
+    let list = |files: &[ArchiveFile]| format!("read_parquet([{}], hive_partitioning = false)", paths(folder, files));
     if files.iter().all(|file| file.rests == rests) {
         return list(files);
     }
@@ -326,6 +323,11 @@ pub(super) fn table(folder: &Path, files: &[ArchiveFile], rests: bool) -> String
     // One after the other, as they follow each other in time.
     let parts: Vec<String> = files.chunk_by(|one, next| one.rests == next.rests).map(alike).collect();
     format!("({})", parts.join(" UNION ALL "))
+}
+
+/// The paths of files as a list in SQL.
+pub(super) fn paths(folder: &Path, files: &[ArchiveFile]) -> String {
+    files.iter().map(|file| quoted(&folder.join(&file.path))).collect::<Vec<_>>().join(", ")
 }
 
 /// Has any of these files what its numbers lack?

@@ -153,10 +153,68 @@ pub fn parse(def: &PlantDef, mut text: impl BufRead, oldest: Timestamp, now: Tim
     // A header has some columns: what is no file of samples may have no line at all.
     (&mut text).take(HEADER_BYTES_MAX).read_until(b'\n', &mut first).map_err(|error| first_line(error.to_string()))?;
     let first = first.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&first);
-    let separator = if first.contains(&b';') { b';' } else { b',' };
-    let mut reader = csv::ReaderBuilder::new().delimiter(separator).trim(csv::Trim::All).from_reader(first.chain(text));
-    let header = reader.headers().map_err(|error| first_line(error.to_string()))?.clone();
-    import::parse(def, &header, separator == b';', reader.records(), [oldest, now])
+    let separator = [b';', b'\t'].into_iter().find(|mark| first.contains(mark)).unwrap_or(b',');
+    let text = LineEnds { text: first.chain(text), before: b'\n', written: b'\n' };
+    let mut reader = csv::ReaderBuilder::new().delimiter(separator).flexible(true).from_reader(text);
+    let mut header = reader.headers().map_err(|error| first_line(error.to_string()))?.clone();
+    header.trim();
+    import::parse(def, &header, separator, records(reader), [oldest, now])
+}
+
+/// The rows of a file, each with the line on which it begins: what ends a line is counted behind it, and may stand in cells.
+fn records(mut reader: csv::Reader<impl Read>) -> impl Iterator<Item = import::Record> {
+    let mut row = csv::ByteRecord::new();
+    std::iter::from_fn(move || match reader.read_byte_record(&mut row) {
+        Ok(false) => None,
+        Ok(true) => {
+            let within = row.as_slice().iter().filter(|byte| **byte == b'\n').count() as u64;
+            let line = reader.position().line().saturating_sub(1 + within);
+            let text = csv::StringRecord::from_byte_record(row.clone()).map_err(|error| error.to_string());
+            Some((
+                line,
+                text.map(|mut text| {
+                    text.trim();
+                    text
+                }),
+            ))
+        }
+        Err(error) => Some((reader.position().line(), Err(error.to_string()))),
+    })
+}
+
+/// A text of which each line ends with one line feed, the last one too, whatever ends them in the file.
+struct LineEnds<R> {
+    text: R,
+    /// The byte of the file before.
+    before: u8,
+    /// The last byte that was handed over.
+    written: u8,
+}
+
+impl<R: BufRead> Read for LineEnds<R> {
+    fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
+        let mut count = 0;
+        while count == 0 && !to.is_empty() {
+            let text = self.text.fill_buf()?;
+            if text.is_empty() {
+                // What has no end gets one.
+                let is_open = std::mem::replace(&mut self.written, b'\n') != b'\n';
+                to[0] = b'\n';
+                return Ok(usize::from(is_open));
+            }
+            let taken = text.len().min(to.len());
+            for byte in &text[..taken] {
+                let is_second = std::mem::replace(&mut self.before, *byte) == b'\r' && *byte == b'\n';
+                if !is_second {
+                    self.written = if *byte == b'\r' { b'\n' } else { *byte };
+                    to[count] = self.written;
+                    count += 1;
+                }
+            }
+            self.text.consume(taken);
+        }
+        Ok(count)
+    }
 }
 
 impl Store {
@@ -201,7 +259,11 @@ impl Store {
     /// row fills a gap depends on what is stored before it, so an import that was interrupted is completed by the next one
     /// of the same file. Rows are archived with the hours that they belong to.
     pub fn import_piece(&self, importing: &mut Importing) -> Result<bool, HistoryError> {
-        let left = importing.rows.len().saturating_sub(IMPORT_PIECE);
+        let mut left = importing.rows.len().saturating_sub(IMPORT_PIECE);
+        // What happened at one instant is never cut.
+        while 0 < left && importing.rows[left - 1].1.at == importing.rows[left].1.at {
+            left -= 1;
+        }
         let piece = &importing.rows[left..];
         self.commit(piece.iter().map(|(_, sample)| sample.at), self.epoch(), || {
             let mut appender = self.db.appender("sample")?;

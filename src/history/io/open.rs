@@ -277,7 +277,7 @@ impl Store {
     }
 
     /// Stored numbers by (name, unit). A tag whose unit was changed is another tag: its old numbers would be misread.
-    fn dictionary(&self) -> duckdb::Result<HashMap<(String, String), u16>> {
+    pub(super) fn dictionary(&self) -> duckdb::Result<HashMap<(String, String), u16>> {
         let mut statement = self.db.prepare(sql::TAGS)?;
         let rows = statement.query_map([], |row| Ok(((row.get(1)?, row.get(2)?), row.get(0)?)))?;
         rows.collect()

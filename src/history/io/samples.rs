@@ -1,8 +1,6 @@
 //! Stored samples of many tags, read once, piece by piece in order of time: the memory that a query needs does not
 //! grow with its period.
 
-use std::collections::HashMap;
-
 use duckdb::{
     arrow::{
         array::{Array, AsArray, StructArray},
@@ -19,7 +17,7 @@ use super::{
     store::{Store, engine, instant, utc},
 };
 use crate::{
-    history::{ArchiveFile, HistoryError, tiers::Tier},
+    history::{ArchiveFile, HistoryError, Unarchived, tiers::Tier},
     plant::{
         def::TagId,
         exact::Exact,
@@ -234,8 +232,8 @@ impl Store {
         Ok(rows)
     }
 
-    /// The samples of this plant's tags that are not archived, in a span.
-    pub(super) fn unarchived(&self, from: Timestamp, to: Timestamp) -> Result<Vec<(TagId, Sample)>, HistoryError> {
+    /// The samples that are not archived, in a span: also those of tags that the plant has no longer, or with another unit.
+    pub(super) fn unarchived(&self, from: Timestamp, to: Timestamp) -> Result<Unarchived, HistoryError> {
         check_span(from, to)?;
         let row = |row: &duckdb::Row| {
             let (micros, value, rest): (_, Option<f64>, Option<f64>) = (row.get(0)?, row.get(2)?, row.get(4)?);
@@ -244,10 +242,15 @@ impl Store {
         let params = params![utc(from), utc(to), UNARCHIVED_MAX + 1];
         let rows: Vec<(u16, Row)> = self.list(sql::UNARCHIVED, params, row)?;
         within(rows.len() as u64, UNARCHIVED_MAX)?;
-        let tags: HashMap<u16, TagId> =
-            self.def.tags.iter().filter_map(|tag| Some((self.id(tag.id)?, tag.id))).collect();
-        let sample = |(tag, row): (u16, Row)| Some((*tags.get(&tag)?, row.sample()?.1));
-        Ok(rows.into_iter().filter_map(sample).collect())
+        let (mut numbers, mut tags) = (vec![u16::MAX; usize::from(u16::MAX) + 1], Vec::new());
+        for (place, (tag, number)) in (0..).zip(self.dictionary().map_err(engine)?) {
+            numbers[usize::from(number)] = place;
+            tags.push(tag);
+        }
+        let is_known = |place: &u16| usize::from(*place) < tags.len();
+        let sample =
+            |(tag, row): (u16, Row)| Some((Some(numbers[usize::from(tag)]).filter(is_known)?, row.sample()?.1));
+        Ok(Unarchived { samples: rows.into_iter().filter_map(sample).collect(), tags })
     }
 
     /// Whether one of these files was replaced by another while it was read.

@@ -14,28 +14,31 @@
 //!
 //! Of a number of more than 15 digits, as of a 64-bit counter, all of them stand in `exact`; where a DOUBLE would round it, the
 //! column that is one is NULL.
+//!
+//! A TIMESTAMP is UTC, and a file says so, unless its name has `local` in it; `local_time(utc)` is the local time of the plant with
+//! its offset.
 
 use std::{path::Path, sync::Arc, time::Duration};
 
 use duckdb::{Connection, params};
 
 use super::{
-    archive::{any_rests, quoted, table},
+    archive::{any_rests, paths, quoted, table},
     interrupt::{Interrupt, Open},
     runs::seconds,
     store::{engine, utc},
 };
 use crate::{
-    history::{ArchiveFile, HistoryError, Overview, tiers::Tier},
+    history::{ArchiveFile, HistoryError, Overview, Unarchived, tiers::Tier},
     plant::{
         PlantDef,
         batch::Batch,
         control_run::ControlRun,
-        def::{CsvDialect, TagId},
+        def::CsvDialect,
         exact::Exact,
         record::{ActionRecord, AlarmRecord},
         report::ReportRecord,
-        sample::{Quality, Sample},
+        sample::{Cause, Quality, Sample},
     },
 };
 
@@ -44,6 +47,11 @@ const MEMORY: &str = "256MB";
 
 /// Letters of a value in a table for a screen.
 const CELL_MAX: usize = 2_000;
+
+/// The view of that name.
+const SAMPLE: &str = "SELECT utc, tag, value, unit, quality, exact FROM stored";
+/// By time and tag; what is of one instant and tag as it was stored.
+pub const IN_ORDER: &str = "utc, tag, place, n";
 
 /// An engine with the tables.
 pub struct Tables {
@@ -78,7 +86,11 @@ impl Tables {
              SET lock_configuration = true;
              CREATE TABLE tags (id USMALLINT, name VARCHAR, unit VARCHAR);
              CREATE TABLE qualities (code UTINYINT, quality VARCHAR);
-             CREATE TABLE unarchived (utc TIMESTAMP, tag VARCHAR, value DOUBLE, rest DOUBLE, quality UTINYINT);
+             CREATE TABLE unarchived (utc TIMESTAMP, tag VARCHAR, unit VARCHAR, value DOUBLE, rest DOUBLE, quality UTINYINT);
+             CREATE MACRO local_clock(t) AS timezone({zone}, timezone('UTC', t));
+             CREATE MACRO local_offset(t) AS (epoch_ms(local_clock(t)) - epoch_ms(t)) // 60000;
+             CREATE MACRO local_time(t) AS replace(local_clock(t)::VARCHAR, ' ', 'T') || printf('%s%02d:%02d',
+                CASE WHEN local_offset(t) < 0 THEN '-' ELSE '+' END, abs(local_offset(t)) // 60, abs(local_offset(t)) % 60);
              CREATE TABLE alarm (utc TIMESTAMP, subject VARCHAR, message VARCHAR, priority UTINYINT, event VARCHAR,
                 value DOUBLE, limit_value DOUBLE, by_whom VARCHAR, reason VARCHAR, value_exact DECIMAL(38, 6));
              CREATE TABLE action (utc TIMESTAMP, by_whom VARCHAR, from_where VARCHAR, action VARCHAR, target VARCHAR,
@@ -94,10 +106,12 @@ impl Tables {
                 format VARCHAR, file VARCHAR, sha256 VARCHAR, event VARCHAR, attempts UINTEGER, error VARCHAR);",
             folder = quoted(&folder.join("")),
             archive = quoted(Path::new(&archive)),
+            zone = quoted(Path::new(def.time_zone.iana_name().unwrap_or("UTC"))),
         ))?;
         tables.fill(
             "qualities",
-            (0..=u8::MAX).filter_map(|code| Some((code, Quality::from_code(code)?))),
+            // A number that no version wrote is no value.
+            (0..=u8::MAX).map(|code| (code, Quality::from_code(code).unwrap_or(Quality::Bad(Cause::Corrupt)))),
             |to, (code, quality)| to.append_row(params![code, quality.word()]),
         )?;
         let dictionary = overview.folder.join("tag.parquet");
@@ -105,16 +119,15 @@ impl Tables {
             tables
                 .run(&format!("INSERT INTO tags SELECT id, name, unit FROM read_parquet({})", quoted(&dictionary)))?;
         }
-        // Tags that were never archived have no number.
-        tables.fill("tags", def.tags.iter(), |to, tag| to.append_row(params![None::<u16>, tag.name, tag.unit]))?;
         tables.run(&views(overview))?;
         Ok(tables)
     }
 
     /// Adds samples that are not archived.
-    pub fn add_samples(&self, def: &PlantDef, samples: Vec<(TagId, Sample)>) -> Result<(), HistoryError> {
+    pub fn add_samples(&self, Unarchived { tags, samples }: Unarchived) -> Result<(), HistoryError> {
         self.fill("unarchived", samples.into_iter(), |to, (tag, Sample { at, value, rest, quality })| {
-            to.append_row(params![utc(at), def.tag(tag).name, value, rest, quality.code()])
+            let (name, unit) = &tags[usize::from(tag)];
+            to.append_row(params![utc(at), name, unit, value, rest, quality.code()])
         })
     }
 
@@ -201,15 +214,11 @@ impl Tables {
 
     /// Refuses what is not one SELECT. The message is that of the engine, with the place.
     pub fn check(&self, sql: &str) -> Result<(), HistoryError> {
-        let parsed: String = self
-            .db
-            .query_row("SELECT json_serialize_sql(?::VARCHAR)::VARCHAR", params![sql], |row| row.get(0))
-            .map_err(|error| HistoryError::Sql(error.to_string()))?;
-        let parsed: serde_json::Value = serde_json::from_str(&parsed).unwrap_or_default();
+        let parsed = self.parse(sql)?;
         let statements = parsed["statements"].as_array().map_or(0, Vec::len);
         match (parsed["error"].as_bool(), statements) {
             // Names and types are checked, nothing is read.
-            (Some(false), 1) => self.db.prepare(sql).map(drop).map_err(|error| HistoryError::Sql(error.to_string())),
+            (Some(false), 1) => self.db.prepare(sql).map(drop).map_err(wrong),
             (Some(true), _) if parsed["error_type"] == "not implemented" => {
                 Err(HistoryError::Sql("the history is read only: expected one SELECT".to_owned()))
             }
@@ -222,23 +231,69 @@ impl Tables {
         }
     }
 
+    fn parse(&self, sql: &str) -> Result<serde_json::Value, HistoryError> {
+        let text = "SELECT json_serialize_sql(?::VARCHAR)::VARCHAR";
+        let parsed: String = self.db.query_row(text, params![sql], |row| row.get(0)).map_err(wrong)?;
+        Ok(serde_json::from_str(&parsed).unwrap_or_default())
+    }
+
+    /// A SELECT as a part of another. Where it lists samples and names no order, they come in that of time and tag.
+    fn select(&self, sql: &str) -> Result<String, HistoryError> {
+        let parsed = self.parse(sql)?;
+        let node = &parsed["statements"][0]["node"];
+        let of = |name: &str| node[name].as_array().map(Vec::as_slice).unwrap_or_default();
+        let is_plain = |column: &serde_json::Value| column["class"] == "STAR" || column["class"] == "COLUMN_REF";
+        let is_list = node["from_table"]["table_name"] == "sample"
+            && of("select_list").iter().all(is_plain)
+            && of("group_expressions").is_empty()
+            && of("modifiers").iter().all(|modifier| modifier["type"] == "LIMIT_MODIFIER");
+        if is_list {
+            self.run(&format!("CREATE OR REPLACE VIEW sample AS {SAMPLE} ORDER BY {IN_ORDER}"))?;
+        }
+        Ok(sql.trim_end_matches(|end: char| end == ';' || end.is_whitespace()).to_owned())
+    }
+
     /// Writes the result of a SELECT into a file of the engine's folder. Returns its rows.
     pub fn write(&self, sql: &str, file: &Path, format: Format) -> Result<u64, HistoryError> {
         let options = match format {
-            Format::Csv(csv) => format!("FORMAT csv, HEADER true, DELIMITER '{}'", csv.separator),
+            Format::Csv(csv) => {
+                format!("FORMAT csv, HEADER true, DELIMITER '{}', NEW_LINE '\\r\\n'", csv.separator)
+            }
             Format::Json => "FORMAT json, ARRAY true".to_owned(),
             Format::Parquet => "FORMAT parquet, PARQUET_VERSION v1, COMPRESSION zstd".to_owned(),
         };
-        let copy = format!("COPY (FROM ({sql}\n)) TO {} ({options})", quoted(file));
-        let rows = self.db.execute(&copy, []).map_err(|error| HistoryError::Sql(error.to_string()))?;
+        let copy = format!("COPY (FROM ({}\n)) TO {} ({options})", self.in_utc(sql, format)?, quoted(file));
+        let rows = self.db.execute(&copy, []).map_err(wrong)?;
         Ok(rows as u64)
+    }
+
+    /// The SELECT, with times that say that they are UTC, and the byte order mark before the first heading.
+    fn in_utc(&self, sql: &str, format: Format) -> Result<String, HistoryError> {
+        let select = self.select(sql)?;
+        let describe = format!("SELECT column_name, column_type FROM (DESCRIBE SELECT * FROM ({select}\n))");
+        let mut statement = self.db.prepare(&describe).map_err(wrong)?;
+        let columns = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).map_err(wrong)?;
+        let columns: Vec<(String, String)> = columns.collect::<duckdb::Result<_>>().map_err(wrong)?;
+        let column = |(n, (name, kind)): (usize, &(String, String))| {
+            let is_utc = kind.starts_with("TIMESTAMP") && !kind.ends_with("TIME ZONE") && !name.contains("local");
+            let value = match (is_utc, format) {
+                (false, _) => format!("c{n}"),
+                (true, Format::Parquet) => format!("timezone('UTC', c{n})"),
+                (true, Format::Csv(_) | Format::Json) => format!("replace(c{n}::VARCHAR, ' ', 'T') || 'Z'"),
+            };
+            let bom = if n == 0 && matches!(format, Format::Csv(csv) if csv.bom) { "\u{feff}" } else { "" };
+            format!("{value} AS \"{bom}{}\"", name.replace('"', "\"\""))
+        };
+        let values: Vec<String> = columns.iter().enumerate().map(column).collect();
+        let names: Vec<String> = (0..columns.len()).map(|n| format!("c{n}")).collect();
+        Ok(format!("SELECT {} FROM ({select}\n) AS r({})", values.join(", "), names.join(", ")))
     }
 
     /// The names of the columns and at most so many rows of a SELECT.
     pub fn rows(&self, sql: &str, limit: usize) -> Result<(Vec<String>, Vec<Row>), HistoryError> {
-        let wrong = |error: duckdb::Error| HistoryError::Sql(error.to_string());
         // A screen shows no more of a value.
-        let texts = format!("SELECT left(COLUMNS(*)::VARCHAR, {CELL_MAX}) FROM ({sql}\n) LIMIT {limit}");
+        let select = self.select(sql)?;
+        let texts = format!("SELECT left(COLUMNS(*)::VARCHAR, {CELL_MAX}) FROM ({select}\n) LIMIT {limit}");
         let mut statement = self.db.prepare(&texts).map_err(wrong)?;
         let mut rows = statement.query([]).map_err(wrong)?;
         let mut all = Vec::new();
@@ -267,6 +322,10 @@ impl Tables {
     }
 }
 
+fn wrong(error: duckdb::Error) -> HistoryError {
+    HistoryError::Sql(error.to_string())
+}
+
 fn views(overview: &Overview) -> String {
     let of = |tier: Tier| overview.files.iter().filter(move |file| file.tier == tier);
     let read = |tier: Tier| {
@@ -274,21 +333,22 @@ fn views(overview: &Overview) -> String {
         let rests = any_rests(&files);
         (!files.is_empty()).then(|| (table(&overview.folder, &files, rests), rests))
     };
-    let archived = read(Tier::Raw).map(|(files, rests)| {
-        let rest = if rests { "f.rest" } else { "NULL" };
+    let raw: Vec<ArchiveFile> = of(Tier::Raw).cloned().collect();
+    let archived = raw.chunk_by(|one, next| one.rests == next.rests).map(|files| {
+        let rest = if files[0].rests { "f.rest" } else { "NULL::DOUBLE" };
         format!(
-            "SELECT f.utc, t.name AS tag, f.value, {rest} AS rest, f.quality FROM {files} f
-             JOIN tags t ON t.id = f.tag UNION ALL "
+            "SELECT f.utc, t.name AS tag, t.unit, f.value, {rest} AS rest, f.quality, 0 AS place, f.file_row_number AS n
+             FROM read_parquet([{}], hive_partitioning = false, file_row_number = true) f JOIN tags t ON t.id = f.tag",
+            paths(&overview.folder, files)
         )
     });
-    let units = "(SELECT name, any_value(unit) AS unit FROM tags GROUP BY name)";
+    let unarchived = "SELECT utc, tag, unit, value, rest, quality, 1 AS place, rowid AS n FROM unarchived".to_owned();
     let mut sql = format!(
-        "CREATE VIEW sample AS SELECT s.utc, s.tag, {} AS value, u.unit, q.quality, {} AS exact
-         FROM ({}SELECT utc, tag, value, rest, quality FROM unarchived) s
-         JOIN qualities q ON q.code = s.quality JOIN {units} u ON u.name = s.tag;",
+        "CREATE VIEW stored AS SELECT s.utc, s.tag, {} AS value, s.unit, q.quality, {} AS exact, s.place, s.n
+         FROM ({}) s JOIN qualities q ON q.code = s.quality; CREATE VIEW sample AS {SAMPLE};",
         held("s.value", "s.rest"),
         exact("s.value", "s.rest"),
-        archived.unwrap_or_default()
+        archived.chain([unarchived]).collect::<Vec<_>>().join(" UNION ALL ")
     );
     for tier in [Tier::Minute, Tier::Hour] {
         let word = tier.word();

@@ -14,7 +14,7 @@ use tokio::{
 use super::{
     answers::AnswerStatus,
     broker::{Broker, Inbox},
-    cursor,
+    cursor::{self, Cursor},
 };
 use crate::{
     bus::io::clock::Clock,
@@ -86,13 +86,23 @@ pub(crate) async fn run(task: NorthTask, mut stopped: watch::Receiver<bool>) {
     let path = cursor::beside(&task.history_file);
     let now = task.clock.utc();
     let (cursor, damaged) = match cursor::read(&path) {
-        Ok(cursor) => (cursor.unwrap_or(now), None),
-        Err(why) => (now, Some(why)),
+        Ok(cursor) => (cursor, None),
+        Err(why) => (None, Some(why)),
     };
-    let forwarder = Forwarder::new(cursor, task.def.tags.len(), task.clock.speed());
+    let forwarder = forwarder(&task, cursor.unwrap_or(Cursor { at: now, sent: None }));
     let state = Deadband::new(task.def.tags.len());
     let status = NorthStatus { sent_until: forwarder.complete_until(), error: damaged, ..NorthStatus::default() };
-    let mut north = North { task, path, forwarder, state, status, broker: None, alarm: None, not_subscribed: None };
+    let mut north = North {
+        task,
+        path,
+        forwarder,
+        has_delivered: false,
+        state,
+        status,
+        broker: None,
+        alarm: None,
+        not_subscribed: None,
+    };
     if let Some(why) = &north.status.error {
         tracing::error!(why, "samples before now are not sent");
         north.tell(FaultState::Occurred(why.as_str().into()));
@@ -101,9 +111,24 @@ pub(crate) async fn run(task: NorthTask, mut stopped: watch::Receiver<bool>) {
         _ = stopped.wait_for(|stopped| *stopped) => {}
         () = north.follow() => {}
     }
+    if let Err(why) = north.keep_sent().await {
+        tracing::warn!(why, "the next start sends the last seconds once more");
+    }
     if let Some(broker) = north.broker.take() {
         // Otherwise the broker says itself that the station is gone.
         let _ = timeout(LEAVE_MAX, broker.leave(&north.task.mqtt)).await;
+    }
+}
+
+/// Goes on where the station before has ended.
+fn forwarder(task: &NorthTask, Cursor { at, sent }: Cursor) -> Forwarder {
+    let forwarder = Forwarder::new(at, task.def.tags.len(), task.clock.speed());
+    match sent {
+        Some(sent) => {
+            let known = |(name, sample): (String, Sample)| Some((task.def.tag_named(&name)?, sample));
+            forwarder.knowing(sent.into_iter().filter_map(known))
+        }
+        None => forwarder,
     }
 }
 
@@ -111,6 +136,7 @@ struct North {
     task: NorthTask,
     path: PathBuf,
     forwarder: Forwarder,
+    has_delivered: bool,
     /// Which values of the state were published on this connection.
     state: Deadband,
     status: NorthStatus,
@@ -238,13 +264,27 @@ impl North {
     async fn deliver(&mut self, batch: &Batch) -> Result<(), String> {
         let messages = payload::samples(&self.task.mqtt, &self.task.def, &batch.samples);
         let refused = self.publish(&messages).await?;
-        self.forwarder.on_delivered(&self.task.mqtt, batch);
+        self.forwarder.on_delivered(batch);
+        self.has_delivered = true;
         self.status.sent += batch.samples.len() as u64;
         self.status.refused += refused;
         self.status.sent_until = self.forwarder.complete_until();
-        let (path, cursor) = (self.path.clone(), self.forwarder.cursor());
-        let written = spawn_blocking(move || cursor::write(&path, cursor)).await;
-        // What was sent is sent once more after a restart; nothing is lost.
+        // After a failure, what was sent lately is sent once more; nothing is lost.
+        self.write_cursor(None).await
+    }
+
+    /// A station that stops writes down what it has sent, so that the next one sends nothing twice.
+    async fn keep_sent(&self) -> Result<(), String> {
+        if !self.has_delivered {
+            return Ok(());
+        }
+        let name = |(tag, sample)| (self.task.def.tag(tag).name.clone(), sample);
+        self.write_cursor(Some(self.forwarder.sent().map(name).collect())).await
+    }
+
+    async fn write_cursor(&self, sent: Option<Vec<(String, Sample)>>) -> Result<(), String> {
+        let (path, cursor) = (self.path.clone(), Cursor { at: self.forwarder.cursor(), sent });
+        let written = spawn_blocking(move || cursor::write(&path, &cursor)).await;
         written.unwrap_or_else(|error| Err(error.to_string()))
     }
 

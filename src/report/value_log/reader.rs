@@ -3,12 +3,11 @@
 use jiff::{SignedDuration, Timestamp};
 
 use crate::{
-    plant::{
-        exact::Exact,
-        keyword::Keyword,
-        sample::{Cause, Quality, Sample},
+    plant::sample::{Cause, Quality, Sample},
+    report::{
+        decimal_mark::{DecimalMark, NumberError},
+        export::QUALITY,
     },
-    report::export::QUALITY,
     t,
 };
 
@@ -45,30 +44,25 @@ pub struct LoggedValue {
     pub samples: Vec<Sample>,
 }
 
-/// Cells between these stand on a line.
-#[derive(Debug, Clone, Copy)]
-struct Dialect {
-    separator: u8,
-    decimal: char,
-}
-
 /// Reads a log, or the table of `sightglass export`, as it was written or as a spreadsheet with commas in its numbers
 /// saves it. `Err`: it is none.
 pub fn parse(bytes: &[u8]) -> Result<ValueLog, String> {
     let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
     let mut lines = bytes.split(|byte| *byte == b'\n').enumerate();
     let first = lines.next().map_or(&[][..], |(_, line)| line);
-    let semicolons = first.starts_with(b"time_utc;") || first.starts_with(b"time;");
-    let dialect = match semicolons {
-        true => Dialect { separator: b';', decimal: ',' },
-        false => Dialect { separator: b',', decimal: '.' },
+    let begins = |separator: &u8| {
+        [&b"time_utc"[..], b"time"]
+            .iter()
+            .any(|time| first.strip_prefix(*time).and_then(<[u8]>::first) == Some(separator))
     };
-    let mut log = ValueLog { columns: columns(first, dialect)?, ..ValueLog::default() };
+    let separator = [b';', b'\t'].into_iter().find(begins).unwrap_or(b',');
+    let mut mark = DecimalMark::of(separator);
+    let mut log = ValueLog { columns: columns(first, separator)?, ..ValueLog::default() };
     // When each row was, the line before it was lost where `true`.
     let mut rows: Vec<(Timestamp, bool)> = Vec::new();
     let mut lost = false;
     for (n, line) in lines.filter(|(_, line)| !line.trim_ascii().is_empty()) {
-        match row(line, dialect, &log.columns) {
+        match row(n as u64 + 1, line, (separator, &mut mark), &log.columns) {
             Ok((at, cells)) => {
                 rows.push((at, std::mem::take(&mut lost)));
                 for (column, cell) in log.columns.iter_mut().zip(cells) {
@@ -123,8 +117,8 @@ fn end_what_is_not_followed(log: &mut ValueLog, rows: &[(Timestamp, bool)]) {
 }
 
 /// The columns, by the heading.
-fn columns(line: &[u8], dialect: Dialect) -> Result<Vec<LoggedValue>, String> {
-    let cells = cells(line, dialect).unwrap_or_default();
+fn columns(line: &[u8], separator: u8) -> Result<Vec<LoggedValue>, String> {
+    let cells = cells(line, separator).unwrap_or_default();
     let wrong = || {
         let found = short(line);
         t!(
@@ -148,8 +142,13 @@ fn columns(line: &[u8], dialect: Dialect) -> Result<Vec<LoggedValue>, String> {
 type Cell = Result<(Sample, u8), String>;
 
 /// A row: its time, and of each value what was read and its decimals, or what is damaged.
-fn row(line: &[u8], dialect: Dialect, columns: &[LoggedValue]) -> Result<(Timestamp, Vec<Cell>), String> {
-    let cells = cells(line, dialect).ok_or_else(|| t!("found `{found}`, expected text", found = short(line)))?;
+fn row(
+    n: u64,
+    line: &[u8],
+    (separator, mark): (u8, &mut DecimalMark),
+    columns: &[LoggedValue],
+) -> Result<(Timestamp, Vec<Cell>), String> {
+    let cells = cells(line, separator).ok_or_else(|| t!("found `{found}`, expected text", found = short(line)))?;
     let expected = 1 + 2 * columns.len();
     if cells.len() != expected {
         let (found, count) = (short(line), cells.len());
@@ -159,20 +158,29 @@ fn row(line: &[u8], dialect: Dialect, columns: &[LoggedValue]) -> Result<(Timest
         let found = short(cells[0].as_bytes());
         t!("found the time `{found}`, expected one such as 2026-11-23T14:05:12.000Z", found)
     })?;
-    Ok((at, cells[1..].chunks_exact(2).map(|pair| cell(at, &pair[0], &pair[1], dialect)).collect()))
+    Ok((at, cells[1..].chunks_exact(2).map(|pair| cell(at, (&pair[0], n), &pair[1], mark)).collect()))
 }
 
-fn cell(at: Timestamp, value: &str, quality: &str, dialect: Dialect) -> Cell {
+fn cell(at: Timestamp, (value, line): (&str, u64), quality: &str, mark: &mut DecimalMark) -> Cell {
     let expected = || {
         let found = short(quality.as_bytes());
         t!("found the quality `{found}`, expected good, or uncertain or bad with a cause", found)
     };
     match (quality_of(quality).ok_or_else(expected)?, value) {
         (Quality::Good, value) => {
-            let plain = if dialect.decimal == ',' { value.replace(',', ".") } else { value.to_owned() };
-            let found = || t!("found `{found}`, expected a number", found = short(value.as_bytes()));
-            let number = plain.parse::<Exact>().ok().filter(|number| number.is_finite()).ok_or_else(found)?;
-            let decimals = plain.split_once('.').map_or(0, |(_, digits)| digits.len().min(6));
+            let number = mark.read(value, line).map_err(|error| {
+                let found = short(value.as_bytes());
+                match error {
+                    NumberError::OtherMark { mark, .. } => {
+                        t!("found `{found}`, expected the decimal mark `{mark}`", found, mark)
+                    }
+                    NumberError::Thousands => {
+                        t!("found `{found}`, expected a number without marks between thousands", found)
+                    }
+                    NumberError::NotANumber => t!("found `{found}`, expected a number", found),
+                }
+            })?;
+            let decimals = value.split_once(['.', ',']).map_or(0, |(_, digits)| digits.len().min(6));
             Ok((Sample::good(number, at), u8::try_from(decimals).unwrap_or(0)))
         }
         (quality, "") => Ok((Sample::bad(quality.cause().unwrap_or(Cause::NotRead), at), 0)),
@@ -183,24 +191,15 @@ fn cell(at: Timestamp, value: &str, quality: &str, dialect: Dialect) -> Cell {
     }
 }
 
-/// What [`Quality::word`] has written; `none` is what an export says where nothing was stored.
+/// `none` is what an export says where nothing was stored.
 fn quality_of(word: &str) -> Option<Quality> {
-    match word.split_once(": ") {
-        Some(("uncertain", cause)) => Cause::from_word(cause).map(Quality::Uncertain),
-        Some(("bad", cause)) => Cause::from_word(cause).map(Quality::Bad),
-        Some(_) => None,
-        None => match word {
-            "good" => Some(Quality::Good),
-            "none" => Some(Quality::Bad(Cause::NotRead)),
-            _ => None,
-        },
-    }
+    if word == "none" { Some(Quality::Bad(Cause::NotRead)) } else { Quality::from_word(word) }
 }
 
 /// The cells of one line; a quote that is never closed ends with its line. `None`: it is no text.
-fn cells(line: &[u8], dialect: Dialect) -> Option<Vec<String>> {
+fn cells(line: &[u8], separator: u8) -> Option<Vec<String>> {
     let mut reader = csv::ReaderBuilder::new();
-    let reader = reader.has_headers(false).delimiter(dialect.separator).buffer_capacity(line.len().clamp(64, 4_096));
+    let reader = reader.has_headers(false).delimiter(separator).buffer_capacity(line.len().clamp(64, 4_096));
     let record = reader.from_reader(line).into_records().next()?.ok()?;
     Some(record.iter().map(str::to_owned).collect())
 }
@@ -238,7 +237,30 @@ mod tests {
         assert_eq!(log.end, "2026-11-23T14:00:03Z".parse().expect("a time"));
         assert!(log.problems.is_empty());
         let spreadsheet = LOG.replace(',', ";").replace("70.", "70,").replace("71.", "71,");
-        assert_eq!(parse(format!("\u{feff}{spreadsheet}").as_bytes()), Ok(log));
+        assert_eq!(parse(format!("\u{feff}{spreadsheet}").as_bytes()), Ok(log.clone()));
+        // What a plant with these marks exports.
+        for separator in [";", "\t"] {
+            assert_eq!(parse(LOG.replace(',', separator).as_bytes()), Ok(log.clone()), "{separator}");
+        }
+    }
+
+    #[test]
+    fn another_decimal_mark_than_before_is_damage() {
+        let text = LOG.replace(',', ";").replace("70.0;", "70,0;").replace("70.25", "1.234");
+        let log = parse(text.as_bytes()).expect("a log");
+        assert_eq!(log.problems[0], "line 3, SV: found `1.234`, expected the decimal mark `,`");
+        assert_eq!(values(&log, 0)[..2], [Some(70.0), None]);
+    }
+
+    #[test]
+    fn every_quality_that_is_written_is_read() {
+        let all = Cause::ALL.into_iter().flat_map(|cause| [Quality::Uncertain(cause), Quality::Bad(cause)]);
+        for quality in all {
+            let text = format!("time_utc,SV,SV quality\r\n2026-11-23T14:00:00.000Z,,{}\r\n", quality.word());
+            let log = parse(text.as_bytes()).expect("a log");
+            let read = log.columns[0].samples.first().map(|sample| sample.quality.cause());
+            assert_eq!((read, log.problems), (Some(quality.cause()), vec![]));
+        }
     }
 
     #[test]

@@ -363,37 +363,3 @@ fn what_was_deleted_is_answered_by_minutes() {
     std::fs::remove_file(db.with_extension("archive").join("raw/date=1970-01-01/01.parquet")).unwrap();
     assert_eq!(open().deleted_until(Tier::Raw).unwrap(), Some(sec(24 * HOUR_S)));
 }
-
-#[test]
-fn an_hour_is_never_missing_while_it_is_archived() {
-    let (_folder, db) = folder();
-    let hours = 60;
-    let records: Vec<Record> = (0..hours * HOUR_S / 30).map(|n| good(PV, 30 * n, n as f64)).collect();
-    let store = filled(&db, &records);
-    let reader = store.try_clone().unwrap();
-    use std::sync::atomic::{AtomicI64, Ordering::Relaxed};
-    let done = Arc::new(AtomicI64::new(0));
-    let at_work = Arc::clone(&done);
-    let asking = std::thread::spawn(move || {
-        let (mut asked, mut wrong) = (0, Vec::new());
-        loop {
-            let hour = at_work.load(Relaxed);
-            if hour >= hours - 1 {
-                return (asked, wrong);
-            }
-            let (from, to) = (sec(hour * HOUR_S), sec((hour + 1) * HOUR_S));
-            // One that is refused while the archive changes is asked again.
-            let answer = reader.answer(&Query::Samples { from, to }, sec(hours * HOUR_S));
-            let Ok(Answer::Samples(samples)) = answer else { continue };
-            asked += 1;
-            wrong.extend((samples.len() != 120).then_some((hour, samples.len())));
-        }
-    });
-    for hour in 0..hours - 1 {
-        done.store(hour, Relaxed);
-        store.archive(&Job::Hour(hour * HOUR)).unwrap();
-    }
-    done.store(hours, Relaxed);
-    let (asked, wrong) = asking.join().unwrap();
-    assert!(0 < asked && wrong.is_empty(), "of {asked} answers {} lack their hour: {wrong:?}", wrong.len());
-}

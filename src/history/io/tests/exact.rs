@@ -134,11 +134,9 @@ fn in_sql_a_value_is_never_a_double_that_rounds_it() {
         let scratch = tempfile::tempdir().unwrap();
         let overview = overview(store);
         let tables = Tables::new(&def(), &overview, scratch.path()).unwrap();
-        let unarchived = (overview.samples > 0).then(|| {
-            let sample = |at: i64| (PV, Sample::good(Exact::whole(counted(at)), sec(at)));
-            vec![sample(0), sample(10), (SV, Sample::good(1.5, sec(0)))]
-        });
-        tables.add_samples(&def(), unarchived.unwrap_or_default()).unwrap();
+        let unarchived = Query::Unarchived { from: sec(0), to: sec(20) };
+        let Ok(Answer::Unarchived(unarchived)) = store.answer(&unarchived, sec(20)) else { panic!("no samples") };
+        tables.add_samples(unarchived).unwrap();
         tables.rows(sql, 9).unwrap().1
     };
     let row = |cells: &[&str]| -> Vec<Option<String>> {

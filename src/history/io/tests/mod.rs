@@ -16,6 +16,7 @@ mod past;
 mod flips;
 mod import;
 mod alarm_metrics;
+mod moved;
 mod pieces;
 mod power;
 mod procedures;
