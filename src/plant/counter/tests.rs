@@ -162,7 +162,7 @@ proptest! {
                 }
                 Story::Outage(minutes) => go_on(&mut minute, &mut shown, minutes, &mut readings),
                 Story::Reset => { minute += 1; shown = 0.0; readings.push((minute * 60, shown)); }
-                Story::Replaced => { minute += 1; shown = 400_000.0 - shown / 2.0; readings.push((minute * 60, shown)); }
+                Story::Replaced => { minute += 1; shown = 100_000.0 + 2_000.0 * minute as f64; readings.push((minute * 60, shown)); }
             }
             // It counts on, so that what happened is decided.
             (0..2).for_each(|_| go_on(&mut minute, &mut shown, 1, &mut readings));
