@@ -41,6 +41,7 @@ pub fn of_command(def: &PlantDef, kind: &CommandKind) -> Row {
         CommandKind::Connect(_, true) => row("connect", "--TS--"),
         CommandKind::Configure(_) => row("configure", "---S--"),
         CommandKind::SaveSettings(_) => row("save settings", "---S--"),
+        CommandKind::CorrectCounter { .. } => row("correct counter", "---S--"),
         CommandKind::Test(_, diagnostic) => match diagnostic {
             Diagnostic::Scan(Scan { serials, .. }) if serials.is_empty() => row("test", "--TS--"),
             Diagnostic::Send(_)
@@ -53,7 +54,6 @@ pub fn of_command(def: &PlantDef, kind: &CommandKind) -> Row {
             | Diagnostic::Identify { .. }
             | Diagnostic::Read { .. } => row("test", "--TS--"),
         },
-        CommandKind::CorrectCounter { .. } => row("correct counter", "---S--"),
         CommandKind::StopTest(_) => row("stop test", "--TS--"),
         CommandKind::ReadSets => look("read sets", "--TS--"),
         CommandKind::SaveSet { .. } => row("save set", "--TS--"),
