@@ -133,10 +133,12 @@ fn in_sql_a_value_is_never_a_double_that_rounds_it() {
         let overview = overview(store);
         let tables = Tables::new(&def(), &overview, scratch.path()).unwrap();
         let unarchived = (overview.samples > 0).then(|| {
-            let sample = |at: i64| (PV, Sample::good(Exact::whole(counted(at)), sec(at)));
-            vec![sample(0), sample(10), (SV, Sample::good(1.5, sec(0)))]
+            let tag = |tag: TagId| (def().tag(tag).name.clone(), def().tag(tag).unit.clone());
+            let sample = |at: i64| (0, Sample::good(Exact::whole(counted(at)), sec(at)));
+            let samples = vec![sample(0), sample(10), (1, Sample::good(1.5, sec(0)))];
+            crate::history::Unarchived { tags: vec![tag(PV), tag(SV)], samples }
         });
-        tables.add_samples(&def(), unarchived.unwrap_or_default()).unwrap();
+        tables.add_samples(unarchived.unwrap_or_default()).unwrap();
         tables.rows(sql, 9).unwrap().1
     };
     let row = |cells: &[&str]| -> Vec<Option<String>> {
