@@ -16,7 +16,8 @@ use super::CliError;
 /// Refuses to write to the history, its log and notes, the audit log, its note and its key, the users file or the
 /// alarm-state file, under whatever name they are reached.
 pub fn refuse(out: &Path, history: &Path) -> Result<(), CliError> {
-    let beside = ["", ".wal", ".last", ".opening", ".blocks"].map(|suffix| atomic::with_suffix(history, suffix));
+    let beside =
+        ["", ".wal", ".last", ".opening", ".blocks", ".cut"].map(|suffix| atomic::with_suffix(history, suffix));
     let log = audit_log::beside(history);
     let of_log = [audit_log::head_of(&log), sealing::beside(&log), log];
     let others = [users_beside(history), alarm_file::beside(history)];

@@ -186,7 +186,7 @@ fn every_quality_that_is_stored_is_imported() {
     let of = |cause| [Quality::Uncertain(cause), Quality::Bad(cause)];
     for quality in Cause::ALL.into_iter().flat_map(of).chain([Quality::Good]) {
         let value = if quality.is_bad() { "" } else { "1.5" };
-        let read = read(&format!("utc,tag,value,quality\n2026-11-21T05:00:00Z,{pv},{value},{}\n", quality.word()));
+        let read = read(&format!("utc,tag,value,quality\n2026-11-21T05:00:00Z,{pv},{value},\"{}\"\n", quality.word()));
         let expect = Sample::new(Some(1.5.into()).filter(|_| !quality.is_bad()), quality, at("2026-11-21T05:00:00Z"));
         match quality.cause().is_none_or(Cause::is_stored) {
             true => assert_eq!(read, Ok(Rows::from([(TagId(0), vec![expect])])), "{quality:?}"),

@@ -1,8 +1,11 @@
 //! What is done about damage at an opening.
 
-use std::{fs::File, path::Path};
+use std::{
+    fs::{self, File},
+    path::{Path, PathBuf},
+};
 
-use jiff::Timestamp;
+use jiff::{Timestamp, tz::TimeZone};
 
 use super::{
     blocks,
@@ -13,8 +16,14 @@ use super::{
 };
 use crate::{
     history::{HistoryError, engine_error, words::plain},
-    profile::io::atomic::with_suffix,
+    profile::io::{
+        atomic::{sync_folder, with_suffix},
+        regular,
+    },
 };
+
+/// A log as it was before its end was cut off.
+const WHOLE: &str = ".cut";
 
 /// What an operator reads of damage that was gone at the second try.
 fn unread_at_first(why: &str) -> String {
@@ -30,7 +39,6 @@ pub type Tried<T> = Result<(Store, Option<String>, T), Failure>;
 pub fn mend<T>(
     path: &Path,
     now: Timestamp,
-    noted: &Noted,
     try_open: &dyn Fn() -> Tried<T>,
     report: &mut dyn FnMut(Proven),
 ) -> Result<(Tried<T>, Option<String>), HistoryError> {
@@ -50,23 +58,18 @@ pub fn mend<T>(
             Probe::Untried(_) | Probe::Damaged(_) => {}
         }
         let Err(Failure::Damaged(why)) = &opened else { break };
-        let proven = Proven { part, why: why.clone(), target: files::set_aside(path, part, now)? };
-        if part == SetAside::Log && copy_logs_before_damage(&proven, path)? {
-            opened = try_open();
-            match &opened {
-                // What was cut off had never been confirmed.
-                Ok((store, ..)) if missing(noted, &store.last_commit(), false).is_none() => {
-                    tracing::warn!(proven.why, "a commit never ended: it is cut off the log");
-                    files::remove_logs(&proven.target);
+        if part == SetAside::Log
+            && let Some(log) = cut_log(path, why)?
+        {
+            match try_open() {
+                Err(Failure::Damaged(_)) => put_log_back(path, &log)?,
+                tried => {
+                    opened = tried;
                     break;
                 }
-                Ok(_) => {
-                    report(proven);
-                    break;
-                }
-                Err(_) => files::remove_logs(path),
             }
         }
+        let proven = Proven { part, why: why.clone(), target: files::set_aside(path, part, now)? };
         report(proven);
         opened = try_open();
     }
@@ -103,14 +106,45 @@ pub fn missing(noted: &Noted, open: &LastCommit, set_aside: bool) -> Option<Stri
     }
 }
 
-/// Copies logs that were set aside as those of `db`, up to the entry that cannot be read. `false` where none is named.
-fn copy_logs_before_damage(Proven { why, target, .. }: &Proven, db: &Path) -> Result<bool, HistoryError> {
-    let Some((log, sound)) = engine_error::damaged_log_entry(why) else { return Ok(false) };
+/// Cuts a log before the entry that cannot be read, in place: whatever ends the station now, a log without its end stays, and
+/// the whole one beside it. Gives the log; `None` where no entry is named.
+fn cut_log(db: &Path, why: &str) -> Result<Option<PathBuf>, HistoryError> {
+    let Some((log, sound)) = engine_error::damaged_log_entry(why) else { return Ok(None) };
     if !files::LOGS.iter().any(|name| with_suffix(db, name) == log) {
-        return Ok(false);
+        return Ok(None);
     }
-    files::copy_logs(target, db)?;
-    let cut = File::options().write(true).open(log).and_then(|file| file.set_len(sound).and_then(|()| file.sync_all()));
-    cut.map_err(|error| HistoryError::Engine(format!("{}: {error}", log.display())))?;
-    Ok(true)
+    let whole = with_suffix(db, WHOLE);
+    let cut = || {
+        regular::copy(log, &whole)?;
+        File::open(&whole)?.sync_all()?;
+        sync_folder(&whole)?;
+        let log = File::options().write(true).open(log)?;
+        log.set_len(sound).and_then(|()| log.sync_all())
+    };
+    cut().map_err(|error| HistoryError::Engine(format!("{}: {error}", log.display())))?;
+    tracing::warn!(why, "the end of the log is cut off");
+    Ok(Some(log.to_owned()))
+}
+
+fn put_log_back(db: &Path, log: &Path) -> Result<(), HistoryError> {
+    let put_back = fs::rename(with_suffix(db, WHOLE), log);
+    put_back.map_err(|error| HistoryError::Engine(format!("{}: {error}", log.display())))
+}
+
+/// What becomes of the whole log once the history is open, in this opening or in one after a kill: what was cut off had never
+/// been confirmed, unless something is missing now. Then it is kept, and said where.
+pub fn end_cut(db: &Path, now: Timestamp, is_missing: bool) -> Option<String> {
+    let whole = with_suffix(db, WHOLE);
+    if !whole.exists() {
+        return None;
+    }
+    if !is_missing {
+        let _ = fs::remove_file(&whole);
+        return None;
+    }
+    let stamp = now.to_zoned(TimeZone::UTC).strftime("%Y%m%dT%H%M%SZ");
+    let kept = with_suffix(db, &format!(".damaged-{stamp}.wal"));
+    let moved =
+        fs::rename(&whole, &kept).inspect_err(|error| tracing::error!(%error, "the damaged log stays where it is"));
+    Some(format!("its damaged log is set aside as {}", if moved.is_ok() { kept } else { whole }.display()))
 }

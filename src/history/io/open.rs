@@ -11,7 +11,7 @@ use super::{
     compact, disk,
     files::{self, Failure, Opening},
     last::{self, Noted},
-    mend::{mend, missing, said_of},
+    mend::{end_cut, mend, missing, said_of},
     probe,
     read::action,
     restore, room, sql,
@@ -160,7 +160,7 @@ impl Store {
             let read = read(&store).map_err(|error| failure(path, error))?;
             Ok((store, archive, read))
         };
-        let (opened, repaired) = mend(path, now, &noted, &try_open, &mut report)?;
+        let (opened, repaired) = mend(path, now, &try_open, &mut report)?;
         let (store, archive, read) = opened.map_err(|failure| {
             if fresh {
                 files::remove(path);
@@ -171,7 +171,8 @@ impl Store {
             }
         })?;
         let missing = missing(&noted, &store.last_commit(), trouble.is_some());
-        let trouble = joined([&trouble.or(repaired), &missing, &archive]);
+        let kept = end_cut(path, now, missing.is_some());
+        let trouble = joined([&trouble.or(repaired), &missing, &kept, &archive]);
         store.note_last_commit();
         drop(opening);
         Ok(Opened { store, trouble, read })

@@ -256,7 +256,7 @@ mod tests {
     fn every_quality_that_is_written_is_read() {
         let all = Cause::ALL.into_iter().flat_map(|cause| [Quality::Uncertain(cause), Quality::Bad(cause)]);
         for quality in all {
-            let text = format!("time_utc,SV,SV quality\r\n2026-11-23T14:00:00.000Z,,{}\r\n", quality.word());
+            let text = format!("time_utc,SV,SV quality\r\n2026-11-23T14:00:00.000Z,,\"{}\"\r\n", quality.word());
             let log = parse(text.as_bytes()).expect("a log");
             let read = log.columns[0].samples.first().map(|sample| sample.quality.cause());
             assert_eq!((read, log.problems), (Some(quality.cause()), vec![]));

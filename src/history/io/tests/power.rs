@@ -125,3 +125,35 @@ fn a_disk_that_takes_no_blocks_is_waited_for() {
     fs::rename(&aside, &kept).unwrap();
     assert_eq!(Store::open(&torn, &def(), sec(20)).unwrap().trouble, None);
 }
+
+#[test]
+fn a_cut_of_the_log_that_was_killed_is_ended_later() {
+    let (folder, db) = folder();
+    die_after_writing(&db);
+    let whole = with_suffix(&db, ".cut");
+    // It was copied, and perhaps cut, when the station was killed.
+    fs::write(&whole, "the log before").unwrap();
+    let opened = Store::open(&db, &def(), sec(20)).unwrap();
+    assert_eq!((opened.trouble, whole.exists()), (None, false));
+    drop(opened.store);
+    // Something that was confirmed is missing: the log before is kept.
+    let noted = fs::read(with_suffix(&db, ".last")).unwrap();
+    let store = Store::open(&db, &def(), sec(30)).unwrap().store;
+    store.append(&[good(PV, 31, 1.0)]).unwrap();
+    let later = fs::read(with_suffix(&db, ".last")).unwrap();
+    assert_ne!(noted, later);
+    drop(store);
+    fs::write(&whole, "the log before").unwrap();
+    let (file, last) = (fs::read(&db).unwrap(), with_suffix(&db, ".last"));
+    let store = Store::open(&db, &def(), sec(40)).unwrap().store;
+    store.append(&[good(PV, 41, 1.0)]).unwrap();
+    let confirmed = fs::read(&last).unwrap();
+    drop(store);
+    fs::write(&db, file).unwrap();
+    fs::write(&last, confirmed).unwrap();
+    fs::write(&whole, "the log before").unwrap();
+    let trouble = Store::open(&db, &def(), sec(50)).unwrap().trouble.expect("a commit is missing");
+    assert!(trouble.contains("its damaged log is set aside as"), "{trouble}");
+    let kept = fs::read_dir(folder.path()).unwrap().flatten();
+    assert_eq!(kept.filter(|file| file.file_name().to_string_lossy().contains("damaged")).count(), 1);
+}
