@@ -3,12 +3,12 @@
 use std::collections::HashMap;
 
 use duckdb::params;
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::{
     read::{ROWS_MAX, alarm, line_minute},
     sql,
-    store::{Store, engine, instant, utc},
+    store::{Store, after, engine, instant, utc},
 };
 use crate::{
     history::{
@@ -34,7 +34,7 @@ impl Store {
     /// [`HOLD_MAX`]: few tags need the whole hour.
     pub(super) fn past(&self, at: Timestamp, now: Timestamp) -> Result<Past, HistoryError> {
         self.refuse_unknown(at, now)?;
-        let after = at.checked_add(jiff::SignedDuration::from_micros(1)).unwrap_or(at);
+        let after = at.checked_add(SignedDuration::from_micros(1)).unwrap_or(at);
         let mut found: Vec<Option<Sample>> = vec![None; self.def.tags.len()];
         let stored: Vec<TagId> = self.def.tags.iter().filter(|tag| tag.is_stored()).map(|tag| tag.id).collect();
         self.latest(&stored, at, (at, after), &mut found)?;
@@ -95,38 +95,47 @@ impl Store {
     /// The last values of the tags that are totals, of those that have one in the last [`TOTALS_DAYS`]. A good one has a row
     /// an hour; but it may have had none in the runs of the station that came last.
     pub(super) fn last_totals(&self) -> Result<Vec<(String, f64)>, HistoryError> {
+        let of_tag = |tag: &TagDef| Some((self.id(tag.id)?, tag.id));
+        let totals: Vec<(u16, TagId)> = self.def.tags.iter().filter(|tag| tag.is_total()).filter_map(of_tag).collect();
+        let Some((_, end)) = self.extent().filter(|_| !totals.is_empty()) else { return Ok(Vec::new()) };
+        let mut found = HashMap::new();
+        // Not from the whole: where a part of it cannot be read, the rest tells, in the order of the clock.
+        if let Err(error) = self.read_totals(&totals, &mut found) {
+            tracing::warn!(?error, "totals go on from what can be read");
+            let tags: Vec<TagId> = totals.iter().map(|(_, tag)| *tag).collect();
+            let begin = end.checked_sub(SignedDuration::from_hours(TOTALS_DAYS * 24)).unwrap_or(Timestamp::MIN);
+            let mut values = vec![None; tags.len()];
+            self.each_sample(&tags, begin, after(end).unwrap_or(end), |place, sample| {
+                values[place] = sample.value.or(values[place]);
+            })?;
+            let read = totals.iter().zip(values).filter_map(|((number, _), value)| Some((*number, value?)));
+            for (number, value) in read {
+                found.entry(number).or_insert(value);
+            }
+        }
+        let named = |(number, tag): &(u16, TagId)| Some((self.def.tag(*tag).name.clone(), *found.get(number)?));
+        Ok(totals.iter().filter_map(named).collect())
+    }
+
+    fn read_totals(&self, totals: &[(u16, TagId)], found: &mut HashMap<u16, f64>) -> Result<(), HistoryError> {
         let row = |row: &duckdb::Row| row.get::<_, Option<i64>>(0);
         let last = self.db.query_row(sql::LAST_OF_EPOCH, [self.epoch()], row).map_err(engine)?;
-        let last = last.or_else(|| Some(self.extent()?.1.as_microsecond()));
-        let mut totals: Vec<(u16, &str)> = self
-            .def
-            .tags
-            .iter()
-            .filter(|tag| tag.is_total())
-            .filter_map(|tag| Some((self.id(tag.id)?, &*tag.name)))
-            .collect();
-        let mut found = Vec::new();
-        let Some(last) = last else { return Ok(found) };
+        let Some(last) = last.or_else(|| Some(self.extent()?.1.as_microsecond())) else { return Ok(()) };
         for hours in [2, 48, TOTALS_DAYS * 24] {
-            if totals.is_empty() {
+            let missing: Vec<u16> = totals.iter().map(|(id, _)| *id).filter(|id| !found.contains_key(id)).collect();
+            if missing.is_empty() {
                 break;
             }
             // What lies ahead was stored before the clock was set back.
             let span = last.saturating_sub(hours * HOUR)..i64::MAX;
             let files = self.files(Some((Tier::Raw, span.clone())))?;
             let files = (!files.is_empty()).then(|| self.parquet(&files, false));
-            let sql = sql::last_written(files.as_deref(), totals.iter().map(|(id, _)| *id));
+            let sql = sql::last_written(files.as_deref(), missing.into_iter());
             let row = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?));
-            let values: HashMap<u16, f64> = self.list(&sql, params![span.start], row)?.into_iter().collect();
-            totals.retain(|(id, name)| match values.get(id) {
-                Some(value) => {
-                    found.push(((*name).to_owned(), *value));
-                    false
-                }
-                None => true,
-            });
+            let values: Vec<(u16, f64)> = self.list(&sql, params![span.start], row)?;
+            found.extend(values);
         }
-        Ok(found)
+        Ok(())
     }
 
     /// The latest sample of each tag until an instant, of those that matter in a span.

@@ -13,11 +13,14 @@ pub const UNHEARD: f64 = 1_000.0;
 /// Hours of history that matter: a week.
 pub const HOURS: i64 = 168;
 
+/// An hour since 1970, and what was read in it last.
+type Hour = (i64, f64);
+
 /// What a counter counted in the hours of a week in which it counted.
 #[derive(Debug, Clone, Default)]
 pub struct Pace {
     /// The hour under way, what was read in it last, and what was read last in the hour before.
-    hour: Option<(i64, f64, Option<(i64, f64)>)>,
+    hour: Option<(i64, f64, Option<Hour>)>,
     counted: VecDeque<(i64, f64)>,
     /// Of `counted`, the middle one.
     usual: Option<f64>,
