@@ -115,7 +115,7 @@ struct Left {
 #[derive(Debug, Clone)]
 pub struct Counter {
     rule: CounterRule,
-    /// The most that it has shown since it last began anew.
+    /// The most that it has shown since it last began again.
     last: Option<Reading>,
     held: Option<Held>,
     left: Option<Left>,

@@ -127,18 +127,15 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
     };
     let default = row.default.as_ref().and_then(|default| number_of(default, &tag, problems));
     let tag = TagDef { default, ..tag };
-    let address_at = point.and(row.address.map(|address| address.at));
-    let class = row.poll_class.map(|class| class.value);
-    let simulate = row.simulate.map(|simulate| simulate.value);
     Defined {
         tag,
-        class,
+        class: row.poll_class.map(|class| class.value),
         in_sets: row.in_sets,
-        address_at,
+        address_at: point.and(row.address.map(|address| address.at)),
         expr: row.expr,
         needs: links.needs,
         unlock: links.unlock,
-        simulate,
+        simulate: row.simulate.map(|simulate| simulate.value),
     }
 }
 

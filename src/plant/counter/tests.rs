@@ -41,7 +41,7 @@ fn run_at(rule: CounterRule, values: &[(i64, f64)]) -> (f64, Vec<CounterEvent>) 
 }
 
 #[test]
-fn each_kind_of_step_is_told_from_counting_by_what_comes_after_it() {
+fn each_kind_of_step_is_known_by_what_comes_after_it() {
     let long = whole(DataType::U32);
     let decimal = CounterRule { moduli: [Some(1e6), None], digit: 0.1, ..CounterRule::default() };
     let check = |what: &str, rule, values: &[f64], counted: f64, events: &[CounterEvent]| {
@@ -95,7 +95,7 @@ fn a_rate_that_is_given_decides() {
 }
 
 #[test]
-fn type_scale_and_decimals_tell_the_last_digit_and_when_it_rolls_over() {
+fn type_and_scale_give_the_last_digit_and_the_rollover() {
     let check = |tag: &TagDef, decimals, digit: f64, first: Option<f64>| {
         let rule = CounterRule::of(tag, decimals);
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs();

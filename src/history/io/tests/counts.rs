@@ -27,7 +27,7 @@ const DAY_S: i64 = 24 * HOUR_S;
 /// Five minutes in which the counter counts this.
 const STEP: f64 = 5.0;
 
-/// PV is a counter in kWh, MV of one that was told how fast it counts; SV is on or off.
+/// PV is a counter in kWh, MV of one whose greatest rate is known; SV is on or off.
 fn def() -> Arc<PlantDef> {
     let mut def = plant("Asia/Kathmandu", &THREE);
     for (place, max_rate) in [(0, None), (2, Some(60.0))] {
@@ -194,7 +194,7 @@ fn run(from: i64, until: i64, kwh: f64) -> ControlRun {
 }
 
 #[test]
-fn a_batch_and_a_run_over_a_change_of_shift_are_counted_once_in_parts() {
+fn batches_and_runs_over_a_change_of_shift_count_in_parts() {
     let (_folder, db) = folder();
     let store = Store::open(&db, &making(), sec(0)).unwrap().store;
     let (begin, change, end) = (DAY_S + 3_000, DAY_S + 7_200, DAY_S + 18_000);
