@@ -122,6 +122,8 @@ fn of_response(row: &pdu::Function, values: &Values) -> String {
             let place = values.blocks.first().map_or_else(String::new, |block| range(code, *block));
             t!("written: {place}", place)
         }
+        // A device may answer with none.
+        (0x11 | 0x14 | 0x2B, _) if values.parts.is_empty() => translate(row.name).to_owned(),
         (0x11, _) => t!("server id {parts}", parts = values.parts.join(", ")),
         (0x14, _) => t!("file records {parts}", parts = values.parts.join(", ")),
         (0x15 | 0x16, _) => t!("done: {request}", request = of_request(row, values)),

@@ -94,6 +94,12 @@ fn answers_are_reported_with_the_addresses_of_their_request() {
 }
 
 #[test]
+fn an_answer_without_any_object_is_named_all_the_same() {
+    let answer = dissect(&with_crc(&[1, 0x2B, 0x0E, 1, 1, 0, 0, 0]), None, Some(Direction::Answer), None);
+    assert_eq!(answer.summary, "encapsulated interface transport");
+}
+
+#[test]
 fn unit_0_is_a_broadcast_on_a_serial_line_only() {
     let message = [0, 6, 0, 1, 0, 3];
     let rtu = dissect(&with_crc(&message), None, None, None);
