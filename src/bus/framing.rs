@@ -377,4 +377,13 @@ mod tests {
         assert_eq!(left_over(Framing::Rtu, &REQUEST, &[]), Fault::Timeout);
         assert_eq!(left_over(Framing::Rtu, &REQUEST, &answer()[..4]), Fault::Truncated { got: 4, expected: 9 });
     }
+
+    #[test]
+    fn a_response_behind_one_of_another_transaction_is_found() {
+        let request = frame::with_mbap(7, &[1, 3, 0, 0, 0, 1]);
+        let (other, own) = (frame::with_mbap(6, &[1, 3, 2, 0, 9]), frame::with_mbap(7, &[1, 3, 2, 0, 5]));
+        let came = [other.clone(), own].concat();
+        let found = find_reply(Framing::Mbap, &request, &came, true).map(|reply| (reply.range, reply.message));
+        assert_eq!(found, Ok((other.len()..came.len(), vec![1, 3, 2, 0, 5])));
+    }
 }

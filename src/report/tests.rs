@@ -1,10 +1,11 @@
 //! Every format of the same report: the same file each time, in every language, with nothing that runs.
 
 use super::{
-    FORMATS, ReportFormat, Style,
+    FORMATS, ReportFormat, Style, TagFigures,
     content::document,
     document::{Cell, Content},
     testing::{THREE, plant, shift_report},
+    text::mean_or_difference,
 };
 use crate::{
     plant::{def::Section, report::REPORT_FORMATS},
@@ -24,6 +25,16 @@ fn text(name: &str, locale: Locale) -> String {
 #[test]
 fn the_plant_file_knows_every_format() {
     assert_eq!(FORMATS.map(ReportFormat::name), REPORT_FORMATS);
+}
+
+#[test]
+fn a_counter_has_its_difference_in_place_of_a_mean() {
+    let tags = shift_report().tags;
+    let (mean, neither) = (&tags[0], &tags[1]);
+    let counted = |difference: f64| TagFigures { difference: Some(difference.into()), ..neither.clone() };
+    let shown = [mean, neither, &counted(12.0), &counted(0.0)].map(mean_or_difference);
+    assert_eq!(shown, ["54.32", "—", "+12", "+0"], "a mean has one decimal more than its values");
+    assert!(!mean_or_difference(&counted(-3.0)).starts_with('+'));
 }
 
 #[test]

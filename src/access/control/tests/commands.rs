@@ -94,6 +94,19 @@ fn a_tag_with_second_user_is_written_only_with_one() {
 }
 
 #[test]
+fn a_trusted_account_is_refused_where_a_password_is_needed() {
+    let trusted = vec![("panel".to_owned(), Role::Technician)];
+    let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
+    let mut def = PlantDef::clone(&bench.access.def);
+    def.tags[fixture::RUN.index()].reauthenticate = Some(Reauthentication::Password);
+    bench.access.def = Arc::new(def);
+    bench.open(1, "10.0.0.1");
+    let (_, refused) = bench.send_command(1, RUN, Some(Credentials { user: None, password: TECH.into() })).unwrap();
+    let why = "this tag requires a password, and your account has none";
+    assert_eq!(refused, Some(Refusal::NotReauthenticated(why.into())));
+}
+
+#[test]
 fn the_station_refuses_a_setting_that_needs_a_supervisor() {
     let mut bench = Bench::new(AccessDef::default());
     let mut def = PlantDef::clone(&bench.access.def);
