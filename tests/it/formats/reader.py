@@ -19,13 +19,16 @@ for tag in ("TIC-1.PV", "PLC-1.HEATER.KWH"):
     own = [(float(r["second"]), float(r["value"]) if r["value"] else None) for r in rows if r["tag"] == tag]
     held, last, counted = [], None, 0.0
     for (at, value), (after, _) in zip(own, own[1:] + [(seconds, None)]):
-        begin, end = max(at, 0.0), min(after, at + HOLD, seconds)
-        if value is None or end <= begin:
+        if value is None or at >= seconds:
             continue
-        if last is not None:
+        # What is between two readings belongs to the later one, and one on an edge to the period that begins.
+        if last is not None and at >= 0:
             counted += value if 0 <= value < last / 2 else value - last
-        held.append((value, end - begin))
         last = value
+        begin, end = max(at, 0.0), min(after, at + HOLD, seconds)
+        if begin < end:
+            held.append((value, end - begin))
+    last = held[-1][0]
     time = sum(span for _, span in held)
     values = [value for value, _ in held]
     mean = sum(value * span for value, span in held) / time
