@@ -12,7 +12,7 @@ fn a_station_that_ends_anywhere_starts_with_all_it_confirmed() {
     }
     let program = Path::new(env!("CARGO_BIN_EXE_sightglass"));
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/crash.py");
-    let seeds = Command::new("python3").arg(script).arg(program.parent().unwrap()).args(["--seeds", "0-9"]).output();
+    let seeds = Command::new("python3").arg(script).arg(program.parent().unwrap()).args(["--seeds", "0-3"]).output();
     let seeds = seeds.unwrap();
     let said = [seeds.stdout, seeds.stderr].concat();
     assert!(seeds.status.success(), "{}", String::from_utf8_lossy(&said));
