@@ -133,7 +133,7 @@ pub fn start(path: &Path, def: Arc<PlantDef>, clock: Clock) -> Result<Handle, Hi
 }
 
 /// The same with another interval between commits and other answers.
-pub(super) fn start_with(
+pub fn start_with(
     path: &Path,
     def: Arc<PlantDef>,
     clock: Clock,
@@ -160,24 +160,6 @@ pub(super) fn start_with(
     };
     let join = spawn("history", BLOCKING_THREADS, writing).map_err(trouble)?;
     Ok(Handle { records, queries, jobs, status, restored: Some(restored), join: Some(join) })
-}
-
-/// Records until the last sender is dropped, on the runtime of the caller: for virtual time, where no other thread may
-/// take part. No query is answered. Errors as [`start`].
-pub async fn record_in_virtual_time(
-    path: &Path,
-    def: Arc<PlantDef>,
-    clock: Clock,
-    commit_every: Duration,
-    records: mpsc::Receiver<HistoryInput>,
-) -> Result<HistoryStatus, HistoryError> {
-    files::refuse_foreign(path)?;
-    let mut writer = Writer::new(path.to_owned(), def, clock.utc());
-    let ((_requests, requests), (_jobs, jobs)) = (mpsc::channel(1), mpsc::channel(1));
-    let mut outputs = Outputs { status: watch::Sender::default(), restored: None };
-    let opening = run(&mut writer, clock, commit_every, records, requests, jobs, &mut outputs).await;
-    finish(&mut writer, clock, opening, &mut outputs).await;
-    Ok(writer.status().clone())
 }
 
 /// Stores what waits.

@@ -12,16 +12,17 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::load::memory_kb;
 use duckdb::Connection;
 use jiff::Timestamp;
 use sightglass::{
-    bus::io::clock::Clock,
+    bus::io::{clock::Clock, worker},
     history::{
         ArchiveFile,
         io::{
             archive::sync_and_hash,
             store::Store,
-            thread::{RECORDS_MAX, offer, record_in_virtual_time},
+            thread::{offer, start_with},
         },
         tiers::{HOUR, Tier, in_milliseconds},
     },
@@ -33,9 +34,6 @@ use sightglass::{
     },
     station::io as station,
 };
-use tokio::{sync::mpsc, task::LocalSet};
-
-use super::load::memory_kb;
 
 /// 20 January 2026, midnight in UTC: some days before the end of a month.
 const BEGIN: i64 = 1_768_867_200;
@@ -101,15 +99,12 @@ fn run(
     sent: &Arc<Mutex<Sent>>,
 ) -> (u64, (u64, u64, Option<String>)) {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
-    let (runtime, local) = (runtime.expect("a runtime"), LocalSet::new());
-    local.block_on(&runtime, async {
+    runtime.expect("a runtime").block_on(async {
         let clock = Clock::starting_at(Timestamp::from_second(BEGIN).expect("in range"), 1.0);
         let simulator = SimulatorHandle::spawn_for(def, Simulator::new(def).expect("a simulation"), clock);
-        let (records, records_in) = mpsc::channel(RECORDS_MAX);
-        let (path, own) = (path.to_owned(), def.clone());
-        let history = tokio::task::spawn_local(async move {
-            record_in_virtual_time(&path, own, clock, commit, records_in).await.expect("a history")
-        });
+        worker::simulate();
+        let history = start_with(path, def.clone(), clock, commit, Arc::new(Store::answer)).expect("a history");
+        let (records, stored) = (history.records.clone(), history.status.clone());
         let sent = sent.clone();
         let observer = move |batch: &[Record]| {
             let mut sent = sent.lock().expect("not poisoned");
@@ -134,7 +129,8 @@ fn run(
             }
         }
         station.stop().await;
-        let status = history.await.expect("the history ended");
+        history.ended().await;
+        let status = stored.borrow().clone();
         (done, (status.rows, status.lost, status.trouble))
     })
 }
