@@ -3,12 +3,15 @@
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 mod alternatives;
+#[path = "support/dice.rs"]
+mod dice;
 
 use std::{
     hint::black_box,
     time::{Duration, Instant},
 };
 
+use dice::Dice;
 use sightglass::{
     bus::plan::{Block, UnreadableRanges, Wire, blocks, single},
     plant::{
@@ -17,16 +20,6 @@ use sightglass::{
         tag::{ByteOrder, DataType, Point, Table, TagDef},
     },
 };
-
-/// A linear congruential generator (Knuth's MMIX): the same map on every machine.
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % limit
-    }
-}
 
 fn device(id: u16) -> DeviceDef {
     let limits = Limits { gap_registers_max: 16, ..Limits::STANDARD };

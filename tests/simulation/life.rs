@@ -37,8 +37,9 @@ use sightglass::{
 use tokio::sync::oneshot;
 
 use crate::{
+    dice::Dice,
     facts::{Facts, say, wrong},
-    lines::{Dice, connectors},
+    lines::connectors,
 };
 
 /// So long after the start the alarms are restored, and the history completed from the log.
@@ -69,9 +70,9 @@ pub fn main(seed: u64) -> ExitCode {
     let said = |name: &str| env::var(name).unwrap_or_default();
     let folder = PathBuf::from(said("SIGHTGLASS_FOLDER"));
     let number: u64 = said("SIGHTGLASS_LIFE_NUMBER").parse().unwrap();
-    let mut of_seed = Dice::new(seed);
+    let mut of_seed = Dice(seed);
     let life = Life {
-        dice: Dice::new(seed << 8 | number),
+        dice: Dice(seed << 8 | number),
         is_last: said("SIGHTGLASS_LAST") == "1",
         clock_is_set: of_seed.chance(0.3),
         facts: Facts::read(&folder.join("facts")),
@@ -106,7 +107,7 @@ impl Life {
         };
         let session = station.session("anna");
         let operator = tokio::spawn(operate(session.clone(), def.clone(), self.name.clone(), self.dice, self.is_last));
-        let lasts = SETTLED + self.dice.millis(if self.is_last { 20_000 } else { 60_000 });
+        let lasts = SETTLED + Duration::from_millis(self.dice.below(if self.is_last { 20_000 } else { 60_000 }));
         let mut watch = Watch::new(&def, session.clone(), simulator.clone(), clock);
         watch.until(SETTLED).await;
         self.compare(&session, &def, base).await;
@@ -339,7 +340,7 @@ async fn operate(session: Session, def: Arc<PlantDef>, name: String, mut dice: D
     let setpoint = def.tag_named("TIC-1.SV").unwrap();
     tokio::time::sleep(SETTLED).await;
     for number in 1.. {
-        tokio::time::sleep(dice.millis(if is_last { 4_000 } else { 6_000 })).await;
+        tokio::time::sleep(Duration::from_millis(dice.below(if is_last { 4_000 } else { 6_000 }))).await;
         let snapshot = session.snapshots.borrow().clone();
         let some = |dice: &mut Dice| def.alarms[dice.place(def.alarms.len())].id;
         let alarm = match dice.below(if is_last { 4 } else { 16 }) {

@@ -13,43 +13,14 @@ use tokio::{
     time::sleep,
 };
 
+use crate::dice::Dice;
+
 /// More openings than a life has.
 const OPENINGS: usize = 256;
 /// More bytes than any frame.
 const BYTES: usize = 4096;
 /// No device waits so long.
 const FOR_EVER: Duration = Duration::from_secs(86_400);
-
-/// A linear congruential generator (Knuth's MMIX): the same run on every machine.
-#[derive(Clone, Copy)]
-pub struct Dice(u64);
-
-impl Dice {
-    pub fn new(seed: u64) -> Dice {
-        let mut dice = Dice(seed);
-        dice.below(1);
-        dice
-    }
-
-    pub fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % limit
-    }
-
-    /// A place in a list of so many.
-    pub fn place(&mut self, count: usize) -> usize {
-        usize::try_from(self.below(count as u64)).unwrap()
-    }
-
-    /// True so often: 0.01 is once in a hundred.
-    pub fn chance(&mut self, rate: f64) -> bool {
-        (self.below(1 << 30) as f64) < rate * (1u64 << 30) as f64
-    }
-
-    pub fn millis(&mut self, limit: u64) -> Duration {
-        Duration::from_millis(self.below(limit))
-    }
-}
 
 /// What a station opens the lines of a plant with; `trouble` is the share of answers that something happens to.
 pub fn connectors(def: &PlantDef, simulator: &SimulatorHandle, trouble: f64, dice: &mut Dice) -> Vec<Connector> {
@@ -62,7 +33,7 @@ pub fn connectors(def: &PlantDef, simulator: &SimulatorHandle, trouble: f64, dic
                 TcpFraming::Mbap => drop(tokio::spawn(serve_stream(slave, units, TcpFraming::Mbap))),
                 TcpFraming::Line(wire) => drop(tokio::spawn(serve_line(slave, units, wire, FOR_EVER))),
             }
-            tokio::spawn(misbehave(ours, theirs, trouble, Dice::new(dice.below(1 << 31))));
+            tokio::spawn(misbehave(ours, theirs, trouble, Dice(dice.below(1 << 31))));
             streams.try_send(master).unwrap();
         }
         Connector::Memory(opened)
@@ -85,14 +56,14 @@ async fn misbehave(mut master: DuplexStream, mut slave: DuplexStream, trouble: f
                 if dice.chance(trouble) {
                     match dice.below(6) {
                         0 => continue,
-                        1 => sleep(dice.millis(3_000)).await,
+                        1 => sleep(Duration::from_millis(dice.below(3_000))).await,
                         2 => answer[dice.place(count)] ^= 1 << dice.below(8),
                         3 => count = 1 + dice.place(count),
                         4 => {
                             // In pieces.
                             let cut = dice.place(count);
                             let first = master.write_all(&answer[..cut]).await;
-                            sleep(dice.millis(30)).await;
+                            sleep(Duration::from_millis(dice.below(30))).await;
                             if first.is_err() || master.write_all(&answer[cut..count]).await.is_err() { return }
                             continue;
                         }

@@ -12,6 +12,8 @@
 //! sockets, data out to a broker, and what a process of its own does (a file whose opening never ended is examined by one).
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
+#[path = "../bench/support/dice.rs"]
+mod dice;
 mod facts;
 mod life;
 mod lines;

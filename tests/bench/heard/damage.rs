@@ -2,7 +2,10 @@
 
 use sightglass::plant::line::Framing;
 
-use super::line::{Dice, Model, Sent};
+use super::{
+    dice::Dice,
+    line::{Model, Sent},
+};
 
 /// How often each thing happens: to a byte, or to a frame.
 #[derive(Debug, Clone, Copy, Default)]

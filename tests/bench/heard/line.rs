@@ -7,20 +7,7 @@ use sightglass::{
     plant::{event::Fault, line::Framing},
 };
 
-/// A linear congruential generator (Knuth's MMIX): the same line on every machine.
-pub struct Dice(pub u64);
-
-impl Dice {
-    pub fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % limit.max(1)
-    }
-
-    /// True so often: 0.01 is once in a hundred.
-    pub fn chance(&mut self, rate: f64) -> bool {
-        0.0 < rate && (self.below(1 << 30) as f64) < rate * (1u64 << 30) as f64
-    }
-}
+use super::dice::Dice;
 
 /// A read of the master's cycle, in every `every`th round.
 #[derive(Debug, Clone, Copy)]

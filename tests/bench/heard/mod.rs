@@ -3,6 +3,8 @@
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
 mod damage;
+#[path = "../support/dice.rs"]
+mod dice;
 mod line;
 
 use std::sync::Arc;
@@ -259,7 +261,7 @@ impl Judge {
 pub fn run(model: &Model, damage: &Damage, seed: u64, values: u64) -> Outcome {
     let def = Arc::new(plant(model));
     let (mut world, mut channel) = (World::new(model, (damage.late, damage.slow), seed), Channel::default());
-    let mut dice = line::Dice(seed ^ 0x5EED);
+    let mut dice = dice::Dice(seed ^ 0x5EED);
     let mut judge = Judge {
         listener: Listener::new(&def.lines[0]),
         losses: Losses::new(&def),
