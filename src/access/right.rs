@@ -238,7 +238,7 @@ mod tests {
                 alarm: AlarmId(0),
                 annunciated_at: jiff::Timestamp::UNIX_EPOCH,
             }),
-            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: jiff::Timestamp::UNIX_EPOCH }),
+            CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: 0 }),
             CommandKind::Alarm(AlarmCommand::Silence),
             CommandKind::Alarm(AlarmCommand::Reset(AlarmId(0))),
             CommandKind::Refresh(DeviceId(0)),

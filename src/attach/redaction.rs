@@ -34,6 +34,7 @@ pub fn redact(snapshot: &Snapshot) -> Snapshot {
         alarms: Arc::new(snapshot.alarms.iter().map(|alarm| ActiveAlarm { value: None, ..alarm.clone() }).collect()),
         suppressed: snapshot.suppressed.clone(),
         sound: snapshot.sound,
+        annunciations: snapshot.annunciations,
         alarm_metrics: snapshot.alarm_metrics.clone(),
         history: snapshot.history.clone(),
         station: snapshot.station.clone(),

@@ -122,7 +122,7 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
         if !waiting.is_empty() {
             // One command, however many there are: the station limits how many a terminal sends at once.
             let alarms = (!args.all).then(|| waiting.iter().map(|alarm| alarm.id).collect());
-            let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms, seen: snapshot.at });
+            let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms, seen: snapshot.annunciations });
             let status = actor.send_command(1, kind).await?;
             let after = actor.session.snapshots.borrow().clone();
             let still = |seen: &ActiveAlarm| {

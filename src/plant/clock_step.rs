@@ -70,10 +70,11 @@ impl CommandKind {
     pub fn move_from_utc(&mut self, by: SignedDuration) {
         let CommandKind::Alarm(command) = self else { return };
         match command {
-            AlarmCommand::Acknowledge { annunciated_at: at, .. }
-            | AlarmCommand::AcknowledgeAll { seen: at, .. }
-            | AlarmCommand::Tick { raised_at: at, .. } => move_by(at, -by),
-            AlarmCommand::Silence
+            AlarmCommand::Acknowledge { annunciated_at: at, .. } | AlarmCommand::Tick { raised_at: at, .. } => {
+                move_by(at, -by);
+            }
+            AlarmCommand::AcknowledgeAll { .. }
+            | AlarmCommand::Silence
             | AlarmCommand::Reset(_)
             | AlarmCommand::Shelve { .. }
             | AlarmCommand::Unshelve(_)

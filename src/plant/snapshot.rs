@@ -70,6 +70,8 @@ pub struct Snapshot {
     pub suppressed: Arc<Vec<SuppressedAlarm>>,
     /// An unacknowledged active alarm came after the last silence.
     pub sound: bool,
+    /// How many annunciations there have been: what an acknowledgement of all goes by.
+    pub annunciations: u64,
     /// How good the alarm system is: the rates of this moment, and the figures of the last 24 hours.
     pub alarm_metrics: AlarmMetrics,
     /// The latest commands, newest first, at most 32.
@@ -117,6 +119,7 @@ impl Snapshot {
             alarms: Arc::default(),
             suppressed: Arc::default(),
             sound: false,
+            annunciations: 0,
             alarm_metrics: AlarmMetrics::default(),
             commands: Vec::new(),
             actuators: ActuatorTracker::default(),
@@ -221,7 +224,7 @@ impl Snapshot {
     /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
     pub fn acknowledge_all(&self) -> Option<CommandKind> {
         let waits = self.alarms.iter().any(|alarm| alarm.state.needs_acknowledgement());
-        waits.then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: self.at }))
+        waits.then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: self.annunciations }))
     }
     /// The details of a fault of the station, as of the last time it was active.
     pub fn fault_details(&self, alarm: AlarmId) -> &str {

@@ -200,6 +200,7 @@ impl Fixture {
             alarms: Arc::new(self.alarms.clone()),
             suppressed: Arc::new(self.suppressed.clone()),
             sound: self.alarms.iter().any(|alarm| alarm.state == AlarmState::Unacknowledged),
+            annunciations: self.alarms.len() as u64,
             alarm_metrics: self.alarm_metrics.clone(),
             commands: Vec::new(),
             sets: Arc::new(self.sets.clone()),

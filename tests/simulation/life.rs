@@ -349,7 +349,7 @@ async fn operate(session: Session, def: Arc<PlantDef>, name: String, mut dice: D
                 send(&session, number, &name, CommandKind::Write { tag: setpoint, value: value.into() });
                 continue;
             }
-            4..6 => AlarmCommand::AcknowledgeAll { alarms: None, seen: snapshot.at },
+            4..6 => AlarmCommand::AcknowledgeAll { alarms: None, seen: snapshot.annunciations },
             6 => AlarmCommand::Silence,
             7 => AlarmCommand::Shelve { alarms: [some(&mut dice)].into(), lasts: Duration::from_secs(600) },
             8 => AlarmCommand::Unshelve(some(&mut dice)),

@@ -117,8 +117,8 @@ fn requests_and_news_survive_the_way() {
 #[test]
 fn a_flood_of_alarms_is_handled_by_one_message() {
     let ids: Arc<[AlarmId]> = (0..10_000).map(AlarmId).collect();
-    let all = AlarmCommand::AcknowledgeAll { alarms: None, seen: now() };
-    let many = AlarmCommand::AcknowledgeAll { alarms: Some(ids.clone()), seen: now() };
+    let all = AlarmCommand::AcknowledgeAll { alarms: None, seen: u64::MAX };
+    let many = AlarmCommand::AcknowledgeAll { alarms: Some(ids.clone()), seen: u64::MAX };
     let shelve = AlarmCommand::Shelve { alarms: ids, lasts: Duration::from_secs(600) };
     let bytes = |command: AlarmCommand| {
         let command = Command::new(1, CommandId { terminal: 1, number: 1 }, CommandKind::Alarm(command));

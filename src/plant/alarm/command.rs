@@ -35,8 +35,9 @@ pub enum AlarmCommand {
     AcknowledgeAll {
         /// Which; `None` for all.
         alarms: Option<Arc<[AlarmId]>>,
-        /// What the operator saw was of this instant: an alarm annunciated later stays unacknowledged.
-        seen: Timestamp,
+        /// How many annunciations the operator had seen: an alarm annunciated later stays unacknowledged. No instant, because
+        /// an alarm may come after a snapshot and be of its very instant.
+        seen: u64,
     },
     /// End the sound of what sounds now.
     Silence,
@@ -129,33 +130,33 @@ impl AlarmManager {
         annunciated_at: Timestamp,
         note: &OperatorNote,
     ) -> Result<AlarmRecord, AlarmRefusal> {
-        self.acknowledge_unless(id, |latest| latest != annunciated_at, note)
+        let is_later = self.machine(id).annunciated_at.is_some_and(|latest| latest != annunciated_at);
+        self.acknowledge_unless(is_later, id, note)
     }
 
-    /// The same for one of several that were seen at an instant.
+    /// The same for one of several, unless it was annunciated after those that were seen.
     pub fn acknowledge_seen(
         &mut self,
         id: AlarmId,
-        seen: Timestamp,
+        seen: u64,
         note: &OperatorNote,
     ) -> Result<AlarmRecord, AlarmRefusal> {
-        self.acknowledge_unless(id, |latest| is_later(latest, seen, note.at), note)
+        self.acknowledge_unless(seen < self.machine(id).edge, id, note)
     }
 
-    /// All that wait, of those that were seen at an instant.
-    pub fn waiting(&self, seen: Timestamp, now: Timestamp) -> Vec<AlarmId> {
+    /// All that wait, of those that were seen.
+    pub fn waiting(&self, seen: u64) -> Vec<AlarmId> {
         let waits = |id: &AlarmId| {
             let machine = self.machine(*id);
-            let since = machine.annunciated_at.is_some_and(|latest| is_later(latest, seen, now));
-            machine.state().needs_acknowledgement() && !since
+            machine.edge <= seen && machine.state().needs_acknowledgement()
         };
         self.def.alarms.iter().map(|alarm| alarm.id).filter(waits).collect()
     }
 
     fn acknowledge_unless(
         &mut self,
+        raised_since: bool,
         id: AlarmId,
-        raised_since: impl Fn(Timestamp) -> bool,
         note: &OperatorNote,
     ) -> Result<AlarmRecord, AlarmRefusal> {
         let alarm = self.alarm(id)?;
@@ -163,7 +164,7 @@ impl AlarmManager {
         if !machine.state().needs_acknowledgement() {
             return Err(AlarmRefusal::NothingToAcknowledge);
         }
-        if machine.annunciated_at.is_some_and(raised_since) {
+        if raised_since {
             return Err(AlarmRefusal::RaisedSince);
         }
         let reason = note.reason.clone().filter(|reason| !reason.trim().is_empty());
@@ -285,9 +286,4 @@ pub fn check_note(words: Option<&Arc<str>>) -> Result<(), AlarmRefusal> {
         true => Err(AlarmRefusal::TooLong),
         false => Ok(()),
     }
-}
-
-/// Was it annunciated after what was seen? An instant that lies ahead is one of before the clock was set back.
-fn is_later(annunciated_at: Timestamp, seen: Timestamp, now: Timestamp) -> bool {
-    seen < annunciated_at && annunciated_at <= now
 }

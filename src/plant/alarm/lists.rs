@@ -35,6 +35,11 @@ impl AlarmManager {
         &self.lists().active
     }
 
+    /// How many annunciations there have been.
+    pub fn annunciations(&self) -> u64 {
+        self.edges
+    }
+
     /// What sounds now is silenced; what comes later sounds again. `false` if nothing sounded.
     pub fn silence(&mut self) -> bool {
         let sounded = self.lists().sound;

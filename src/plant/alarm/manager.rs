@@ -39,7 +39,7 @@ pub struct AlarmManager {
     /// The latest first-out group of each line, and of the station itself: its last alarm, and when its first was raised on the
     /// manager's own clock.
     first_out: HashMap<Option<LineId>, (FirstOut, Duration)>,
-    /// Counts what sounds, so that silence ends what was before it and nothing else.
+    /// Counts annunciations, so that silence and an acknowledgement of all end what was before them and nothing else.
     pub(super) edges: u64,
     pub(super) silenced: u64,
     /// Built on demand, dropped when something changes.
@@ -257,8 +257,11 @@ impl AlarmManager {
     fn apply(&mut self, id: AlarmId, record: &AlarmRecord) {
         let latch = self.def.alarm(id).latch;
         let machine = &mut self.machines[id.index()];
+        let waited = machine.state().needs_acknowledgement();
         machine.apply(record, latch);
-        if matches!(record.event, AlarmEvent::Raised | AlarmEvent::ReAlarmed) {
+        // One that latches comes back from the shelf as it was.
+        let comes = !waited && machine.state().needs_acknowledgement();
+        if comes || matches!(record.event, AlarmEvent::Raised | AlarmEvent::ReAlarmed) {
             self.edges += 1;
             machine.edge = self.edges;
         }

@@ -93,18 +93,32 @@ fn an_alarm_raised_since_the_display_stays_unacknowledged() {
 fn all_that_was_seen_is_acknowledged_and_what_came_since_is_not() {
     let def = with(|alarm| alarm.on_delay = Duration::ZERO);
     let mut manager = AlarmManager::new(def);
-    manager.evaluate(at(0), facts(80.0, true));
-    let seen = at(1);
-    assert_eq!(manager.waiting(seen, at(9)), [HIGH]);
+    let unseen = manager.annunciations();
+    manager.evaluate(at(1), facts(80.0, true));
+    let seen = manager.annunciations();
+    // It may be of the very instant of the snapshot before it.
+    assert_eq!((manager.waiting(unseen), manager.waiting(seen)), (vec![], vec![HIGH]));
+    assert_eq!(manager.acknowledge_seen(HIGH, unseen, &note(at(1), None)), Err(AlarmRefusal::RaisedSince));
     manager.evaluate(at(2), facts(70.0, true));
     manager.evaluate(at(3), facts(80.0, true));
-    assert!(manager.waiting(seen, at(9)).is_empty());
-    assert_eq!(manager.acknowledge_seen(HIGH, seen, &note(at(9), None)), Err(AlarmRefusal::RaisedSince));
-    // The clock was an hour ahead when it was raised, and is set right: no one has seen it later.
-    assert_eq!(manager.waiting(seen, at(2)), [HIGH]);
-    assert_eq!(manager.waiting(at(3), at(9)), [HIGH]);
-    assert!(manager.acknowledge_seen(HIGH, at(3), &note(at(9), None)).is_ok());
-    assert!(manager.waiting(at(3), at(9)).is_empty());
+    assert_eq!(manager.acknowledge_seen(HIGH, seen, &note(at(3), None)), Err(AlarmRefusal::RaisedSince));
+    let seen = manager.annunciations();
+    assert!(manager.acknowledge_seen(HIGH, seen, &note(at(3), None)).is_ok());
+    assert!(manager.waiting(seen).is_empty());
+}
+
+#[test]
+fn what_latches_and_comes_back_from_the_shelf_was_not_seen() {
+    let def = with(|alarm| (alarm.on_delay, alarm.latch) = (Duration::ZERO, true));
+    let mut manager = AlarmManager::new(def);
+    manager.evaluate(at(0), facts(80.0, true));
+    manager.shelve(HIGH, Duration::from_secs(60), &note(at(1), Some(&why()))).expect("it is active");
+    manager.evaluate(at(2), facts(70.0, true));
+    let seen = manager.annunciations();
+    manager.reinstate(HIGH, AlarmEvent::Unshelved, None, &note(at(3), None)).expect("it is shelved");
+    assert_eq!(state(&manager), AlarmState::LatchedUnacknowledged);
+    assert!(manager.waiting(seen).is_empty());
+    assert_eq!(manager.waiting(manager.annunciations()), [HIGH]);
 }
 
 #[test]

@@ -44,7 +44,7 @@ impl Plant {
                 one(manager.acknowledge(alarm, annunciated_at, &note))
             }
             AlarmCommand::AcknowledgeAll { alarms, seen } => {
-                let alarms = alarms.unwrap_or_else(|| manager.waiting(seen, note.at).into());
+                let alarms = alarms.unwrap_or_else(|| manager.waiting(seen).into());
                 let each = alarms.iter().map(|alarm| manager.acknowledge_seen(*alarm, seen, &note));
                 return together(each, AlarmRefusal::NothingToAcknowledge, effects);
             }

@@ -40,6 +40,7 @@ impl Plant {
             alarms: lists.active.clone(),
             suppressed: lists.suppressed.clone(),
             sound: lists.sound,
+            annunciations: self.alarm_manager.annunciations(),
             alarm_metrics: self.alarm_metrics.clone(),
             commands: self.commands.shown(),
             actuators: self.actuators.clone(),

@@ -90,7 +90,7 @@ pub fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
     commands.extend(operated.chain(settings));
     commands.extend([
         CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, annunciated_at: at }),
-        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: Some([alarm].into()), seen: at }),
+        CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: Some([alarm].into()), seen: u64::MAX }),
         CommandKind::Alarm(AlarmCommand::Silence),
         CommandKind::Alarm(AlarmCommand::Reset(alarm)),
         CommandKind::Alarm(AlarmCommand::Shelve { alarms: [alarm].into(), lasts: Duration::from_secs(60) }),

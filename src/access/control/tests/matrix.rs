@@ -43,7 +43,7 @@ const UNIT: u8 = 1;
 
 every!(alarm_commands: AlarmCommand {
     AlarmCommand::Acknowledge { .. } => [AlarmCommand::Acknowledge { alarm: ALARM, annunciated_at: AT }],
-    AlarmCommand::AcknowledgeAll { .. } => [AlarmCommand::AcknowledgeAll { alarms: None, seen: AT }],
+    AlarmCommand::AcknowledgeAll { .. } => [AlarmCommand::AcknowledgeAll { alarms: None, seen: 0 }],
     AlarmCommand::Silence => [AlarmCommand::Silence],
     AlarmCommand::Reset(_) => [AlarmCommand::Reset(ALARM)],
     AlarmCommand::Shelve { .. } => [AlarmCommand::Shelve { alarms: Arc::from([ALARM]), lasts: Duration::from_secs(60) }],

@@ -67,7 +67,7 @@ pub fn acknowledge_all<'a>(
     let mut notes = names(cx, waiting.iter().map(|alarm| alarm.id));
     let all = cx.snapshot.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement()).count();
     let alarms = (waiting.len() < all).then(|| waiting.iter().map(|alarm| alarm.id).collect());
-    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms, seen: cx.snapshot.at });
+    let kind = CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms, seen: cx.snapshot.annunciations });
     if !needed && !with_note {
         return open(Modal::Confirm(Confirm::command(t!("acknowledge all"), asked, kind).with_notes(notes)));
     }
