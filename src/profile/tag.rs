@@ -312,7 +312,6 @@ fn poll(row: &TagTable, context: &DeviceContext) -> Poll {
     }
 }
 
-/// What is read regularly is stored, unless the row says otherwise.
 /// Is it on or off, so that its hours can be given? A condition of an expression is.
 fn is_on_or_off(kind: Option<(DataType, Option<u8>)>, at: Span, problems: &mut Problems) -> bool {
     let is = kind.is_none_or(|(kind, bits)| kind == DataType::Bool || bits == Some(1));
@@ -336,6 +335,7 @@ fn positive(number: At<f64>, key: &str, problems: &mut Problems) -> Option<f64> 
     is_right.then_some(number.value)
 }
 
+/// What is read regularly is stored, unless the row says otherwise.
 fn store_policy(row: &TagTable, is_text: bool, access: Access, poll: Poll) -> StorePolicy {
     let stored = !is_text && access != Access::Write && (matches!(poll, Poll::Every(_)) || row.expr.is_some());
     row.store.map_or(if stored { StorePolicy::Change } else { StorePolicy::Never }, |store| store.value)
