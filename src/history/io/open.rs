@@ -29,6 +29,9 @@ use crate::{
     profile::io::atomic::with_suffix,
 };
 
+/// What the name of a history that is being built ends in.
+const NEW: &str = ".new";
+
 /// A store as it was opened, and what the operator should know about that.
 pub struct Opened<T = ()> {
     /// The store.
@@ -182,16 +185,21 @@ impl Store {
     /// [`HistoryError::Missing`] if there is none, [`HistoryError::Locked`] if a station has it.
     pub fn open_read_only(path: &Path, def: &Arc<PlantDef>) -> Result<Store, HistoryError> {
         restore::refuse_unfinished(path)?;
+        let read = |file: &Path| {
+            connect(file, AccessMode::ReadOnly).map_err(|error| match files::diagnose(path, &error.to_string()) {
+                Failure::Obstacle(error) => error,
+                Failure::Damaged(why) => HistoryError::Engine(why),
+            })
+        };
         if !path.is_file() {
-            return Err(HistoryError::Missing { path: path.display().to_string() });
+            // A station may be building it.
+            let built = Some(with_suffix(path, NEW)).filter(|new| new.is_file()).and_then(|new| read(&new).err());
+            let locked = built.filter(|error| matches!(error, HistoryError::Locked { .. }));
+            return Err(locked.unwrap_or_else(|| HistoryError::Missing { path: path.display().to_string() }));
         }
         files::refuse_foreign(path)?;
         files::refuse_special(path)?;
-        let failed = |message: String| match files::diagnose(path, &message) {
-            Failure::Obstacle(error) => error,
-            Failure::Damaged(why) => HistoryError::Engine(why),
-        };
-        let db = connect(path, AccessMode::ReadOnly).map_err(|error| failed(error.to_string()))?;
+        let db = read(path)?;
         let mut store = Store::around(db, path, def);
         let version = store.version().map_err(|_| HistoryError::Engine("the file is not a history".into()))?;
         if version as usize != sql::MIGRATIONS.len() {
@@ -218,7 +226,7 @@ impl Store {
 
     /// Creates an empty store, complete under its name or not there at all.
     fn create(path: &Path) -> Result<(), HistoryError> {
-        let new = with_suffix(path, ".new");
+        let new = with_suffix(path, NEW);
         let created = || {
             files::remove(&new);
             let store = Store::around(connect(&new, AccessMode::ReadWrite).map_err(engine)?, &new, &Arc::default());

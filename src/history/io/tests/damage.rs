@@ -40,6 +40,23 @@ fn a_report_without_the_station_reads_but_never_creates() {
 }
 
 #[test]
+fn a_history_that_is_being_built_is_no_missing_one() {
+    let (_folder, db) = folder();
+    let built = with_suffix(&db, ".new");
+    die_after_writing(&built);
+    let left = Store::open_read_only(&db, &def()).err();
+    assert_eq!(left, Some(HistoryError::Missing { path: db.display().to_string() }), "left by a station that died");
+    let mut holder = holder(&built);
+    let error = Store::open_read_only(&db, &def()).err();
+    drop(holder.stdin.take());
+    holder.wait().unwrap();
+    assert!(
+        matches!(&error, Some(HistoryError::Locked { path, .. }) if *path == db.display().to_string()),
+        "{error:?}"
+    );
+}
+
+#[test]
 fn a_file_that_is_no_database_is_set_aside() {
     for damage in [b"not a database".to_vec(), vec![0; 20_000], vec![0xA5; 20_000]] {
         let (_folder, db) = folder();
@@ -179,16 +196,22 @@ fn a_sound_history_survives_any_number_of_kills() {
     assert_eq!(means(&open(&db, 0), PV, 0, 1, 1), [Some(27.0)]);
 }
 
-#[test]
-fn a_second_process_learns_who_has_the_file() {
-    let (_folder, db) = folder();
-    let mut holder = child("hold", &db);
+/// A process that has the file open.
+fn holder(db: &Path) -> Child {
+    let mut holder = child("hold", db);
     let mut ready = String::new();
     let mut lines = BufReader::new(holder.stdout.take().unwrap());
     while !ready.contains("ready") {
         ready.clear();
         assert_ne!(lines.read_line(&mut ready).unwrap(), 0, "the child ended");
     }
+    holder
+}
+
+#[test]
+fn a_second_process_learns_who_has_the_file() {
+    let (_folder, db) = folder();
+    let mut holder = holder(&db);
     let expect = format!("process {} (", holder.id());
     let refused = [Store::open(&db, &def(), sec(0)).err(), Store::open_read_only(&db, &def()).err()];
     drop(holder.stdin.take());
