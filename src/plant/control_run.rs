@@ -34,6 +34,8 @@ pub(super) use tracker::View;
 
 /// A run that the next one follows sooner is not kept: the setpoint was still being set.
 pub const LEAST: Duration = Duration::from_secs(10);
+/// A run that goes on is stored at most so often, and at least so often.
+pub const STORED: (Duration, Duration) = (Duration::from_secs(60), Duration::from_secs(300));
 /// How long PV stays in the band before it is called steady, unless the plant file says otherwise.
 pub const STEADY_FOR: Duration = Duration::from_secs(300);
 /// A run ends after this time, unless the plant file says otherwise.
@@ -187,6 +189,10 @@ impl ControlRun {
     /// A part of its time had no good value: sums and extremes are at least so much.
     pub fn is_partial(&self) -> bool {
         self.good < WHOLE
+    }
+    /// As it is called once its station has ended without a word of it.
+    pub fn interrupted(&self) -> ControlRun {
+        ControlRun { state: RunState::Interrupted, place: self.place + 1, ..self.clone() }
     }
     /// It goes on.
     pub fn is_running(&self) -> bool {

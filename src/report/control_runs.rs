@@ -53,7 +53,7 @@ const HEADER: [&str; 26] = [
     "partial",
 ];
 
-/// What lies of a run in the period of a report that it crosses an edge of.
+/// What lies of a run in the period of a report that it began before.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RunPart {
     /// Controller and number: `TIC-1-17`.

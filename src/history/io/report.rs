@@ -164,7 +164,7 @@ impl Store {
         let (counters, runs) = (gathered.counters(def), gathered.runs(def));
         let charts = self.charts((from, until), &gathered.latest)?;
         let (control_runs, left_out) = self.control_runs_of(from, until)?;
-        let run_parts = self.run_parts(&control_runs, (from, until))?;
+        let run_parts = self.run_parts(&control_runs, from)?;
         let mut unreadable = gathered.unreadable;
         unreadable.extend(left_out);
         let compared = self.compared(&reported, period, until)?;

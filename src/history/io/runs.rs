@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use duckdb::{Appender, Row, params};
-use jiff::Timestamp;
+use jiff::{SignedDuration, Timestamp};
 
 use super::{
     read::{check_span, maybe_time, shared, time},
@@ -12,7 +12,7 @@ use super::{
 use crate::{
     history::HistoryError,
     plant::{
-        control_run::{ControlRun, Figure, RunCause, RunState},
+        control_run::{ControlRun, Figure, RunCause, RunState, STORED},
         keyword::Keyword,
         time::elapsed,
     },
@@ -45,41 +45,61 @@ impl Store {
         self.list(&sql, params![utc(to), utc(from), controller, limit], run)
     }
 
-    /// The runs of a period for its report, newest first; of too many the span of those that are left out.
+    /// The runs of a period for its report as they stood at its end, whenever it is made: newest first; of too many the span
+    /// of those that are left out.
     pub(super) fn control_runs_of(
         &self,
         from: Timestamp,
         until: Timestamp,
     ) -> Result<(Vec<ControlRun>, Option<Gap>), HistoryError> {
-        let mut runs = self.control_runs(None, (from, until, RUNS_MAX as u64 + 1))?;
+        check_span(from, until)?;
+        let sql = format!(
+            "SELECT {COLUMNS} FROM control_run
+             WHERE rowid IN (SELECT max(rowid) FROM control_run WHERE until_utc <= ?1 GROUP BY controller, number)
+             AND utc < ?1 AND (until_utc >= ?2 OR state = ?3 AND until_utc >= ?4)
+             ORDER BY utc DESC, controller, number DESC LIMIT ?5"
+        );
+        let at_work = from.saturating_sub(SignedDuration::try_from(STORED.1).unwrap_or_default()).unwrap_or(from);
+        let values = params![utc(until), utc(from), RunState::Running.word(), utc(at_work), RUNS_MAX as u64 + 1];
+        let mut runs = self.list(&sql, values, run)?;
         let left_out = runs.drain(RUNS_MAX.min(runs.len())..).next().map(|first| {
             let why = format!("only the latest {RUNS_MAX} control runs are listed");
             Gap { from: from.min(first.from), to: first.until, why }
         });
+        for run in runs.iter_mut().filter(|run| run.is_running()) {
+            match self.ended {
+                // The next station will say so, too.
+                Some(ended) if ended <= until => *run = run.interrupted(),
+                // It was stored some minutes before.
+                Some(_) | None => {
+                    run.until = until;
+                    run.energy = self.run_energy(run, (run.from, until))?.or(run.energy);
+                }
+            }
+        }
         Ok((runs, left_out))
     }
 
-    /// What lies in a period of the runs that cross an edge of it.
-    pub(super) fn run_parts(
+    /// What lies in a period of the runs that began before it.
+    pub(super) fn run_parts(&self, runs: &[ControlRun], from: Timestamp) -> Result<Vec<RunPart>, HistoryError> {
+        let part = |run: &ControlRun| {
+            let energy = self.run_energy(run, (from, run.until))?;
+            Ok(RunPart { run: run.label(), lasted: elapsed(from, run.until), energy })
+        };
+        runs.iter().filter(|run| run.from < from).map(part).collect()
+    }
+
+    /// The energy of a run in a span, and the share of it in which it is known.
+    fn run_energy(
         &self,
-        runs: &[ControlRun],
+        run: &ControlRun,
         (from, until): (Timestamp, Timestamp),
-    ) -> Result<Vec<RunPart>, HistoryError> {
-        let mut parts = Vec::new();
-        for run in runs.iter().filter(|run| run.from < from || until < run.until) {
-            let span = (run.from.max(from), run.until.min(until));
-            let rule = self.def.runs.iter().find(|rule| *self.def.device(rule.controller).name == *run.controller);
-            let energy = match rule.and_then(|rule| rule.energy).filter(|_| span.0 < span.1) {
-                Some((tag, _)) => {
-                    let gathered = self.gather(&[tag], std::iter::empty(), span)?;
-                    let figures = gathered.rows(&self.def, &[tag], std::iter::empty());
-                    figures.first().and_then(|figures| batch::energy(figures, elapsed(span.0, span.1)))
-                }
-                None => None,
-            };
-            parts.push(RunPart { run: run.label(), lasted: elapsed(span.0, span.1), energy });
-        }
-        Ok(parts)
+    ) -> Result<Option<(f64, f64)>, HistoryError> {
+        let rule = self.def.runs.iter().find(|rule| *self.def.device(rule.controller).name == *run.controller);
+        let Some((tag, _)) = rule.and_then(|rule| rule.energy).filter(|_| from < until) else { return Ok(None) };
+        let gathered = self.gather(&[tag], std::iter::empty(), (from, until))?;
+        let figures = gathered.rows(&self.def, &[tag], std::iter::empty());
+        Ok(figures.first().and_then(|figures| batch::energy(figures, elapsed(from, until))))
     }
 
     /// The latest run of each controller.

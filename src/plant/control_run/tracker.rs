@@ -1,10 +1,10 @@
 //! Follows the runs of one controller, and says what must be stored of them.
 
-use std::{sync::Arc, time::Duration};
+use std::sync::Arc;
 
 use jiff::Timestamp;
 
-use super::{ControlRun, Figure, LEAST, RunCause, RunDef, RunState, figures::Figures};
+use super::{ControlRun, Figure, LEAST, RunCause, RunDef, RunState, STORED, figures::Figures};
 use crate::plant::{
     def::{DeviceDef, PlantDef, ProgramDef},
     id::TagId,
@@ -13,9 +13,6 @@ use crate::plant::{
     sample::Sample,
     time::elapsed,
 };
-
-/// A run that goes on is stored at most so often, and at least so often.
-const STORED: (Duration, Duration) = (Duration::from_secs(60), Duration::from_secs(300));
 
 /// What a tracker looks at.
 pub(in crate::plant) struct View<'a> {
@@ -80,10 +77,7 @@ impl RunTracker {
         }
         self.last_number = Some(latest.as_ref().map_or(0, |latest| latest.number));
         let latest = latest?;
-        let interrupted = latest.is_running().then(|| {
-            let place = latest.place + 1;
-            ControlRun { state: RunState::Interrupted, place, ..latest.clone() }
-        });
+        let interrupted = latest.is_running().then(|| latest.interrupted());
         self.ended = Some(Arc::new(interrupted.clone().unwrap_or(latest)));
         interrupted
     }

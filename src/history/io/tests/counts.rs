@@ -204,7 +204,10 @@ fn batches_and_runs_over_a_change_of_shift_count_in_parts() {
     let mut records = samples(|at| Some(plain(at)), 2 * DAY_S);
     records.extend([batch(begin, 0, BatchEvent::Started), batch(end, 1, BatchEvent::Ended)]);
     let kwh = STEP * ((end - begin) / 300) as f64;
-    records.push(Record::Run(Box::new(run(begin, end, kwh))));
+    // As stations do: stored while it is at work, and at its end.
+    let at_work = ControlRun { state: RunState::Running, ..run(begin, begin + 300, STEP) };
+    let ended = ControlRun { place: 1, ..run(begin, end, kwh) };
+    records.extend([at_work, ended].map(|run| Record::Run(Box::new(run))));
     store.append(&records).unwrap();
     let [day, first, second] =
         [(DAY_S, 2 * DAY_S), (DAY_S, change), (change, 2 * DAY_S)].map(|(from, to)| report(&store, from, to));
@@ -217,8 +220,12 @@ fn batches_and_runs_over_a_change_of_shift_count_in_parts() {
     assert_eq!((energy(&first).1, energy(&second).1), (4_200, 10_800));
     assert_eq!(energy(&first).0 + energy(&second).0, kwh);
     assert!(day.batches[0].part.is_none() && second.batches[0].energy.unwrap().0 == kwh, "the whole stands beside it");
-    let of_run = |report: &ShiftReport| report.run_parts[0].energy.unwrap().0;
-    assert_eq!(of_run(&first) + of_run(&second), kwh);
+    let (of_first, of_second) = (&first.control_runs[0], &second.run_parts[0]);
+    assert_eq!(of_first.energy.unwrap().0 + of_second.energy.unwrap().0, kwh);
+    assert_eq!(
+        (of_first.state, of_first.lasted() + of_second.lasted),
+        (RunState::Running, Duration::from_secs(15_000))
+    );
     assert!(day.run_parts.is_empty());
     // As it is printed: the part is marked, and a run that was interrupted says so.
     let text = crate::report::render(

@@ -11,6 +11,7 @@ use crate::{
         event::{Event, Fault},
         fixture::{self, DP, FAULT, PV, SV, TIC},
     },
+    report::control_runs::RunPart,
     sim::{rig::Rig, slave::Unit},
 };
 
@@ -122,6 +123,34 @@ fn sql_has_the_runs_and_a_report_those_of_its_period() {
     let row = |row: &Vec<Option<String>>| row.iter().map(|cell| cell.clone().unwrap_or("-".into())).collect::<Vec<_>>();
     assert_eq!(row(&rows[0]), ["TIC-1", "1", "ended", "20.0", "20.0"]);
     assert_eq!(row(&rows[2]), ["TIC-1", "3", RunState::Running.word(), "20.0", "-"]);
+}
+
+#[test]
+fn runs_of_a_closed_period_are_the_same_whenever_it_is_reported() {
+    let dir = tempfile::tempdir().unwrap();
+    let db = dir.path().join("h.duckdb");
+    let def = controlled();
+    let report = |from, to, now| {
+        let store = Store::open_read_only(&db, &def).unwrap();
+        let report = store.report(&crate::report::Period::free(sec(from), sec(to)), sec(now)).unwrap();
+        (report.control_runs, report.run_parts)
+    };
+    let words = |(runs, parts): &(Vec<ControlRun>, Vec<RunPart>)| {
+        let run = |run: &ControlRun| format!("{} {} ..{}", run.label(), run.state.word(), run.until.as_second());
+        let part = |part: &RunPart| format!("{} part {}", part.run, part.lasted.as_secs());
+        runs.iter().map(run).chain(parts.iter().map(part)).collect::<Vec<_>>()
+    };
+    // A run begins at 2000 and is at work at the end of one period, 2400. The station is killed in the next one, and a third
+    // has none.
+    station(&db, &def, 0..2_750, false);
+    let periods = [(1_100, 2_400), (2_400, 2_900), (3_200, 3_500)];
+    let at_once = periods[..2].iter().map(|(from, to)| report(*from, *to, 2_950)).collect::<Vec<_>>();
+    assert_eq!(words(&at_once[0]), ["TIC-1-2 running ..2400", "TIC-1-1 ended ..2000", "TIC-1-1 part 900"]);
+    assert_eq!(words(&at_once[1]), ["TIC-1-2 interrupted ..2620", "TIC-1-2 part 220"]);
+    station(&db, &def, 3_600..5_300, true);
+    let later = periods.map(|(from, to)| report(from, to, 5_300));
+    assert_eq!(later[..2], at_once);
+    assert_eq!(words(&later[2]), Vec::<String>::new());
 }
 
 /// A day of the simulated tank: the setpoint changes every 80 minutes, requests fail for some seconds or minutes, and the station
