@@ -21,7 +21,7 @@ use super::{
 use crate::{
     history::{
         ArchiveFile, HistoryError,
-        tiers::{Aggregate, CurvePart, Piece, Tier, pieces},
+        tiers::{Aggregate, CurvePart, HOUR, Piece, Tier, pieces},
     },
     plant::{def::TagId, exact::Exact},
     report::{
@@ -60,7 +60,22 @@ impl Store {
     pub(super) fn pieces(&self, span: Range<i64>, widest: Tier) -> Result<Vec<Piece>, HistoryError> {
         let avoided = self.avoided.borrow().clone();
         let files = self.files(None)?;
-        Ok(pieces(span.start, span.end, widest, &|tier| kept(&files, tier, &avoided)))
+        let end = files.iter().map(|file| file.to).max().unwrap_or(span.start);
+        let late = self.late(&(span.start..span.end.min(end)))?;
+        Ok(pieces(span.start, span.end, widest, &|tier| kept(&files, tier, &avoided, &late)))
+    }
+
+    /// The hours before the end of a span that came late, by an import or after a clock that was set back, and what was
+    /// formed of them still lacks, and the hour after each, which begins with its values. Of what was deleted that is all.
+    fn late(&self, span: &Range<i64>) -> Result<Vec<i64>, HistoryError> {
+        let since = self.deleted_until(Tier::Raw)?.map_or(i64::MIN, Timestamp::as_microsecond).max(span.start - HOUR);
+        let hours: Vec<i64> = match (instant(since), instant(span.end)) {
+            (Some(since), Some(end)) => {
+                self.list(sql::HOURS_IN_TABLE, params![utc(since), utc(end)], |row| row.get(0))?
+            }
+            _ => Vec::new(),
+        };
+        Ok(hours.into_iter().flat_map(|hour| [hour * HOUR, (hour + 1) * HOUR]).collect())
     }
 
     /// The same as [`Store::each_part`], all of one tier.
@@ -153,8 +168,8 @@ impl Store {
     }
 }
 
-/// The spans that the files of a tier cover, sorted; without those that could not be read.
-fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>) -> Vec<Range<i64>> {
+/// The spans that the files of a tier cover, sorted; without those that could not be read, and without some hours, sorted.
+fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>, without: &[i64]) -> Vec<Range<i64>> {
     let files = files.iter().filter(|file| file.tier == tier && !avoided.contains(&file.path));
     let mut spans: Vec<Range<i64>> = Vec::new();
     for file in files {
@@ -163,7 +178,17 @@ fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>) -> Vec<Ra
             None => spans.push(file.from..file.to),
         }
     }
-    spans
+    let cut = |span: Range<i64>| {
+        let ends = without.iter().filter(|hour| (span.start - HOUR..span.end).contains(*hour));
+        let (mut parts, mut next) = (Vec::new(), span.start);
+        for hour in ends {
+            parts.push(next..*hour);
+            next = next.max(hour + HOUR);
+        }
+        parts.push(next..span.end);
+        parts.into_iter().filter(|part| part.start < part.end)
+    };
+    spans.into_iter().flat_map(cut).collect()
 }
 
 /// Hands over the rows of a batch; `None` if its columns are not those of aggregates.

@@ -33,6 +33,8 @@ pub struct Compacted {
 /// The only connection to it is closed.
 pub fn compact(store: Store, now: Timestamp, steps: Steps) -> Result<Compacted, HistoryError> {
     let path = store.path.clone();
+    // Of a station that was killed: an hour without the ends would be archived as if it had run on.
+    store.end_curves_left_behind(now)?;
     let (before, mut jobs) = (store.file_bytes(), 0);
     while let Some(job) = store.archive_due(now, &LeftOut::default())? {
         store.archive(&job)?;

@@ -106,6 +106,9 @@ pub const UNARCHIVED: &str = "SELECT epoch_us(utc), tag, value, quality, rest FR
     ORDER BY utc, rowid LIMIT $3";
 /// When the oldest sample of the table was stored.
 pub const OLDEST_IN_TABLE: &str = "SELECT min(utc) FROM sample";
+/// The hours of a span that have samples that are not archived, counted from 1970.
+pub const HOURS_IN_TABLE: &str =
+    "SELECT DISTINCT epoch_us(utc) // 3_600_000_000 FROM sample WHERE utc >= ? AND utc < ? ORDER BY 1";
 /// When the first sample in the file was stored.
 pub const FIRST_STORED: &str = "SELECT epoch_us(utc) FROM sample LIMIT 1";
 /// The first and the last instant of the journal.

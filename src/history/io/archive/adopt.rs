@@ -127,7 +127,9 @@ impl Store {
             tracing::error!(path, "a file of the archive cannot be read and is not taken up");
             return Ok(());
         };
-        let hot = count(&sql::count_samples(&span))?;
+        // What was formed begins with values of the hour before.
+        let since = if tier == Tier::Raw { span.start } else { span.start - HOUR };
+        let hot = count(&sql::count_samples(&(since..span.end)))?;
         let others = self.files(Some((tier, span.clone())))?;
         let superfluous = match (tier, others.as_slice()) {
             (Tier::Raw, []) => hot >= rows,

@@ -31,14 +31,15 @@ impl Store {
         let span = hour..hour + HOUR;
         let deleted = self.deleted_until(Tier::Raw)?.is_some_and(|until| hour < until.as_microsecond());
         let replace = if deleted { sql::added } else { sql::others };
-        let late = !deleted && !self.files(Some((Tier::Raw, span.clone())))?.is_empty();
         let rests = self.any_rests(Tier::Raw, &span)?;
         let samples = sql::samples_of(&span, rests);
         let raw = self.write_file((Tier::Raw, rests), span.clone(), &samples, "ORDER BY tag, utc, rowid")?;
         let rows = raw.as_ref().map_or(0, |raw| raw.file.rows);
-        // The first minutes of the next hour begin with values of this one: where it is archived already, they change.
-        let is_before = !deleted && !self.files(Some((Tier::Raw, span.end..span.end + HOUR)))?.is_empty();
-        let formed = if late || is_before { hour..hour + 2 * HOUR } else { span.clone() };
+        // The first minutes of the next hour begin with values of this one: unless it is formed with its own samples later,
+        // they are formed now.
+        let next = span.end..span.end + HOUR;
+        let later: u64 = self.db.query_row(&sql::count_samples(&next), [], |row| row.get(0)).map_err(engine)?;
+        let formed = if deleted || 0 < later { span.clone() } else { hour..next.end };
         self.form(formed.clone())?;
         let (mut new, mut old) = (Vec::from_iter(raw), Vec::new());
         for tier in [Tier::Minute, Tier::Hour] {
@@ -105,7 +106,7 @@ impl Store {
         }
     }
 
-    /// What was formed of an hour, and perhaps of the next one, as files: one of its own, or those that have it already
+    /// What was formed of an hour, and perhaps of the next one, as files: one of its own each, or those that have it already
     /// written again.
     fn write_aggregates(
         &self,
@@ -122,11 +123,12 @@ impl Store {
             let others = self.sorted((tier, rests), &others)?;
             written.extend(self.write_file((tier, rests), file.from..file.to, &others, "")?);
         }
-        let hour = formed.start..formed.start + HOUR;
-        if overlapping(replaced, &hour).is_empty() {
-            let rests = self.any_rests(tier, &hour)?;
-            let rows = sql::formed(tier, &hour, rests);
-            written.extend(self.write_file((tier, rests), hour, &rows, "ORDER BY tag, utc")?);
+        for hour in (formed.start..formed.end).step_by(HOUR as usize).map(|hour| hour..hour + HOUR) {
+            if overlapping(replaced, &hour).is_empty() {
+                let rests = self.any_rests(tier, &hour)?;
+                let rows = sql::formed(tier, &hour, rests);
+                written.extend(self.write_file((tier, rests), hour, &rows, "ORDER BY tag, utc")?);
+            }
         }
         Ok(written)
     }

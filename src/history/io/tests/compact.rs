@@ -11,6 +11,7 @@ fn a_compacted_history_is_smaller_and_the_same() {
     let (_folder, db) = folder();
     let store = filled(&db, &rows(26));
     store.append(&[Record::Alarm(step(50, "high", AlarmEvent::Raised)), Record::Action(action(60))]).unwrap();
+    store.end_curves_left_behind(sec(27 * HOUR_S)).unwrap();
     let (expect, last_commit) = (content(&store), store.last_commit());
     let expect_log = store.answer(&Query::Journal { from: sec(0), to: sec(100), limit: 9 }, sec(100)).unwrap();
     let mut steps = 0;
@@ -45,6 +46,23 @@ fn a_compacted_history_is_smaller_and_the_same() {
     store.checkpoint().unwrap();
     let done = compact(store, sec(20 * HOUR_S), &mut |_| Ok(())).unwrap();
     assert!(done.jobs >= 9 && done.after < done.before / 2, "{done:?}");
+}
+
+#[test]
+fn a_compacted_history_ends_where_its_station_was_killed() {
+    let (_folder, db) = folder();
+    drop(filled(&db, &[good(PV, 10, 27.0), good(PV, 1_000, 28.0)]));
+    let figures = |store: &Store| {
+        let hour = store.report(&crate::report::Period::free(sec(0), sec(HOUR_S)), sec(9 * HOUR_S)).unwrap();
+        (hour.tags, means(store, PV, 0, HOUR_S, 6))
+    };
+    let read = || Store::open_read_only(&db, &def()).unwrap();
+    let before = figures(&read());
+    assert_eq!(before.1[1..], [Some(28.0), None, None, None, None]);
+    let store = Store::open(&db, &def(), sec(9 * HOUR_S)).unwrap().store;
+    assert!(0 < compact(store, sec(9 * HOUR_S), &mut |_| Ok(())).unwrap().jobs);
+    assert_eq!(figures(&read()), before);
+    assert_eq!(figures(&open(&db, 9 * HOUR_S)), before);
 }
 
 #[test]

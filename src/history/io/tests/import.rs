@@ -12,7 +12,7 @@ use crate::history::{
 };
 
 /// The samples of records, by tag.
-fn by_tag(records: &[Record]) -> Rows {
+pub(super) fn by_tag(records: &[Record]) -> Rows {
     let mut rows: Rows = BTreeMap::new();
     for record in records {
         if let Record::Sample(tag, sample) = record {
@@ -25,7 +25,7 @@ fn by_tag(records: &[Record]) -> Rows {
 }
 
 /// All pieces of an import.
-fn import_all(store: &Store, rows: Rows, file: &str, now: Timestamp) -> Option<Import> {
+pub(super) fn import_all(store: &Store, rows: Rows, file: &str, now: Timestamp) -> Option<Import> {
     let mut importing = store.importing(rows, file, now).unwrap()?;
     while store.import_piece(&mut importing).unwrap() {}
     assert_eq!(importing.done(), importing.import.rows);

@@ -5,6 +5,7 @@ mod absent;
 mod archive;
 mod backup;
 mod batches;
+mod closed;
 mod compact;
 mod counts;
 pub(super) mod damage;
