@@ -10,8 +10,8 @@
 //!                        └ not verified ──> again once its device answers, until it is, or a person writes or starts
 //! ```
 //!
-//! A station that is stopped aborts its procedure first. One that is killed goes on with nothing: its successor shows the
-//! procedure as interrupted.
+//! A station that is stopped aborts its procedure first. One that is killed goes on with nothing but a safe state that was to
+//! be written: its successor shows the procedure as interrupted.
 
 mod run;
 
@@ -37,6 +37,8 @@ pub const START: &str = "start procedure";
 pub const ABORT: &str = "abort procedure";
 /// The recorded word for its end, however it ended.
 pub const END: &str = "end procedure";
+/// The recorded word for what is written before its end: a station that is killed meanwhile leaves that to its successor.
+pub const WRITE_SAFE_STATE: &str = "write safe state";
 /// In the outcome of that, before the writes that are missing.
 const NOT_SAFE: &str = "safe state NOT complete";
 /// How the outcome of that begins where the station stopped meanwhile.
@@ -288,21 +290,26 @@ impl ProcedureRun {
         [&mut self.started, &mut self.since].into_iter().chain(tried)
     }
 
-    /// The outcome on record: `failed at step 3 of 9: …; safe state written`. What is missing has its name and value.
+    /// The outcome on record: `failed at step 3 of 9: …; safe state written`.
     pub(super) fn recorded(&self, def: &PlantDef, steps: usize) -> String {
         let end = self.end().map_or(String::new(), ToString::to_string);
         let place = match (self.end(), self.step) {
             (Some(ProcedureEnd::Done) | None, _) | (_, None) => String::new(),
             (Some(_), Some(step)) => format!(", step {} of {steps}", (step + 1).min(steps)),
         };
-        let missing: Vec<String> = self.missing().map(|write| write.words(def)).collect();
-        let safe = match self.is_safe() {
+        format!("{end}{place}{}", self.safe_state(def))
+    }
+
+    /// `; safe state written`. What is missing has its name and value.
+    pub(super) fn safe_state(&self, def: &PlantDef) -> String {
+        let missing: Vec<String> =
+            self.safe.iter().filter(|write| write.is_missing()).map(|write| write.words(def)).collect();
+        match self.is_safe() {
             Some(true) => "; safe state written".to_owned(),
             None | Some(false) if !missing.is_empty() => format!("; {NOT_SAFE}: {}", missing.join(", ")),
             None => String::new(),
             Some(false) => format!("; {NOT_SAFE}, left as it is by an operator"),
-        };
-        format!("{end}{place}{safe}")
+        }
     }
 }
 

@@ -203,13 +203,14 @@ pub fn unchained(limit: usize) -> String {
     format!("SELECT {ACTION} FROM operator_action WHERE number IS NULL ORDER BY rowid DESC LIMIT {limit}")
 }
 
-/// The last start or end of a procedure; a refused start is none.
+/// The last record of a procedure: its start, what is written before its end, or its end; a refused start is none.
 pub fn latest_procedure() -> String {
     format!(
-        "SELECT {ACTION} FROM operator_action WHERE (action = '{}' AND outcome = '{}') OR action = '{}'
+        "SELECT {ACTION} FROM operator_action WHERE (action = '{}' AND outcome = '{}') OR action IN ('{}', '{}')
          ORDER BY rowid DESC LIMIT 1",
         procedure::START,
         Outcome::Verified.label(),
+        procedure::WRITE_SAFE_STATE,
         procedure::END
     )
 }

@@ -46,7 +46,7 @@ pub(in crate::plant) enum Instruction {
     End(DeviceId),
     /// Interrupt it.
     Interrupt(DeviceId),
-    /// It has ended: put that on record.
+    /// It has ended, or writes its safe state now: put that on record.
     Record,
 }
 
@@ -136,7 +136,9 @@ impl ProcedureRun {
     pub(in crate::plant) fn stop(&mut self, def: &ProcedureDef, end: ProcedureEnd, at: Timestamp) -> Vec<Instruction> {
         self.safe = def.safe.iter().map(|write| SafeWrite::new(*write, None)).collect();
         (self.state, self.since) = (ProcedureState::WritingSafeState(end), at);
-        self.interrupt()
+        let mut todo = self.interrupt();
+        todo.extend((!self.safe.is_empty()).then_some(Instruction::Record));
+        todo
     }
 
     /// The station stops: ends it where it is.

@@ -153,23 +153,25 @@ impl Plant {
         self.procedures.iter().position(|run| run.as_ref().is_some_and(|run| run.at_work()))
     }
 
-    /// Shows the procedure that the station before this one left at work: `latest` is the last record of a start or an end.
+    /// Shows the procedure that the station before this one left at work: `latest` is the last record of one.
     /// It does not go on. Where its end is not on record, that is returned.
     pub fn restore_procedures(&mut self, latest: Option<&ActionRecord>) -> Vec<Record> {
         let Some(latest) = latest else { return Vec::new() };
-        let is_started = &*latest.action == procedure::START;
-        let is_interrupted = is_started || latest.outcome.starts_with(procedure::INTERRUPTED);
+        let has_ended = &*latest.action == procedure::END;
+        let is_interrupted = !has_ended || latest.outcome.starts_with(procedure::INTERRUPTED);
         let place = self.def.procedures.iter().position(|def| *def.name == *latest.target);
+        let mut missing = String::new();
         if let Some(place) = place.filter(|place| self.procedures[*place].is_none()) {
             let run = ProcedureRun::interrupted(latest.by.clone(), latest.from.clone(), latest.at, self.at);
             let run = run.with_missing(&self.def, &self.def.procedures[place], &latest.outcome);
+            missing = run.safe_state(&self.def);
             let is_shown = is_interrupted || run.missing().next().is_some();
             self.procedures[place] = is_shown.then(|| Arc::new(run));
         }
-        if !is_started {
+        if has_ended {
             return Vec::new();
         }
-        let outcome = format!("{}: the station stopped", procedure::INTERRUPTED);
+        let outcome = format!("{}: the station stopped{missing}", procedure::INTERRUPTED);
         self.faults.set(StationFault::Procedure, occurred(&latest.target, &outcome));
         let (at, action, outcome) = (self.at, procedure::END.into(), outcome.into());
         vec![Record::Action(ActionRecord { at, action, outcome, chain_hash: None, ..latest.clone() })]
@@ -209,10 +211,11 @@ impl Plant {
                 Instruction::Record => {
                     let def = self.def.procedure(id);
                     let outcome = run.recorded(&self.def, def.steps.len());
-                    if run.is_fault() {
+                    if run.is_fault() && !run.at_work() {
                         self.faults.set(StationFault::Procedure, occurred(&def.name, &outcome));
                     }
-                    let action = ActionRecord::new(at, run.actor().clone(), procedure::END, def.name.clone(), outcome);
+                    let action = if run.at_work() { procedure::WRITE_SAFE_STATE } else { procedure::END };
+                    let action = ActionRecord::new(at, run.actor().clone(), action, def.name.clone(), outcome);
                     effects.records.push(Record::Action(action));
                 }
             }

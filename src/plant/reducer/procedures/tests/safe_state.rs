@@ -1,7 +1,10 @@
 //! A safe state that was not reached: it is written once the device is back, and the alarm says what is missing until then.
 
 use super::*;
-use crate::plant::tag::{Bound, Decimals};
+use crate::plant::{
+    reducer::tests::recorded,
+    tag::{Bound, Decimals},
+};
 
 const NOT_SENT: fn(Exact) -> WriteResult = |_| WriteResult::NotSent(Fault::NotConnected);
 
@@ -151,6 +154,30 @@ fn a_restarted_station_writes_what_was_on_record() {
         ["failed, step 1 of 6; safe state written", "failed; safe state NOT complete, left as it is by an operator"]
     {
         assert_eq!(restored(over), (Vec::new(), None), "{over}");
+    }
+}
+
+#[test]
+fn a_station_killed_while_it_is_written_leaves_it_to_the_next() {
+    let mut plant = plant_of(with_alarm());
+    let started = start(&mut plant);
+    // It fails, or a person aborts it; the write of its safe state has no outcome yet.
+    let failed = end(&mut plant, &started, 2, |_| WriteResult::NoValidResponse(Fault::Timeout));
+    let mut plant = plant_of(with_alarm());
+    let started = start(&mut plant);
+    end(&mut plant, &started, 2, WriteResult::ReadBack);
+    let aborted = command(&mut plant, 2, CommandKind::AbortProcedure(HEAT), 3);
+    for (last_words, why) in [(failed, "failed"), (aborted, "aborted by anna")] {
+        assert!(written(&last_words).contains(&(SV, 0.0)), "{why}");
+        let latest = recorded(&last_words).find(|action| &*action.action == procedure::WRITE_SAFE_STATE).expect(why);
+        assert!(latest.outcome.starts_with(why), "{latest:?}");
+        let mut next = plant_of(with_alarm());
+        let records = next.restore_procedures(Some(latest));
+        let recorded = actions(&Effects { records, ..Effects::default() });
+        let missing = "; safe state NOT complete: PLC-1.RUN = STOP, TIC-1.SV = 0";
+        assert_eq!(recorded, [format!("anna end procedure heat interrupted: the station stopped{missing}")]);
+        assert!(written(&next.on_tick(at(1))).contains(&(SV, 0.0)), "{why}");
+        assert!(alarm(&mut next, 2).expect("it lasts").ends_with("TIC-1.SV = 0"));
     }
 }
 
