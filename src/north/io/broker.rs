@@ -12,6 +12,10 @@ use std::{
 use rumqttc::{
     AsyncClient, ConnectionError, Event, EventLoop, LastWill, MqttOptions, Packet, PubAckReason, Publish,
     PublishNoticeError, PublishOptions, PublishProperties, QoS, SubscribeFilterInput, TlsConfiguration, Transport,
+    tokio_rustls::rustls::{
+        RootCertStore,
+        pki_types::{CertificateDer, pem::PemObject},
+    },
 };
 use tokio::{
     sync::{mpsc, oneshot},
@@ -241,10 +245,43 @@ fn password(source: &PasswordSource) -> Result<String, String> {
 fn tls(roots: &TlsRoots) -> Result<TlsConfiguration, String> {
     match roots {
         TlsRoots::File(path) => {
-            let ca = regular::read(path, ROOTS_BYTES_MAX)
-                .map_err(|error| format!("the certificates in {}: {error}", path.display()))?;
+            let ca = regular::read(path, ROOTS_BYTES_MAX).map_err(|error| error.to_string());
+            let ca = ca.and_then(|ca| check_roots(&ca).map(|()| ca));
+            let ca = ca.map_err(|error| format!("the certificates in {}: {error}", path.display()))?;
             Ok(TlsConfiguration::Simple { ca, alpn: None, client_auth: None })
         }
         TlsRoots::System => TlsConfiguration::try_default_rustls().map_err(|error| error.to_string()),
+    }
+}
+
+/// Whether there are certificates, all of them sound: what the connection says of others does not name their file.
+fn check_roots(pem: &[u8]) -> Result<(), String> {
+    let mut roots = RootCertStore::empty();
+    for (place, found) in CertificateDer::pem_slice_iter(pem).enumerate() {
+        let sound = found.ok().and_then(|found| roots.add(found).ok());
+        sound.ok_or_else(|| format!("expected PEM, found number {} damaged", place + 1))?;
+    }
+    if roots.is_empty() { Err("expected PEM, found none".to_owned()) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn certificates_that_are_none_are_named_with_their_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ca.pem");
+        let begin = "-----BEGIN CERTIFICATE-----\nAAAA\n";
+        for (content, expect) in [
+            ("", "expected PEM, found none"),
+            ("no certificate", "expected PEM, found none"),
+            (begin, "expected PEM, found number 1 damaged"),
+            (&format!("{begin}-----END CERTIFICATE-----\n"), "expected PEM, found number 1 damaged"),
+        ] {
+            std::fs::write(&path, content).unwrap();
+            let refused = tls(&TlsRoots::File(path.clone())).err();
+            assert_eq!(refused, Some(format!("the certificates in {}: {expect}", path.display())), "{content}");
+        }
     }
 }
