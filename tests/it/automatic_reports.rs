@@ -1,6 +1,11 @@
 //! A station that is killed while it makes reports in every format: each is there once, whole, and agrees with what is on record.
 
-use std::{collections::BTreeSet, fs, path::Path, process::Command};
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use jiff::{SignedDuration, Timestamp};
 use sightglass::{
@@ -10,7 +15,7 @@ use sightglass::{
     profile::{self, Search},
 };
 
-use crate::support::{Process, folder, sightglass, sockets};
+use crate::support::{Process, SmallDisk, folder, sightglass, sockets};
 
 /// Formats without a record of a controller, and the endings of their files.
 const FORMATS: [(&str, &str); 8] = [
@@ -34,6 +39,8 @@ const VERIFIED_MAX: usize = 100;
 /// A plant whose station makes a report of each day in every format.
 struct Place {
     folder: tempfile::TempDir,
+    /// Where the reports go.
+    reports: PathBuf,
     sockets: std::path::PathBuf,
     /// The first day of the history.
     first: jiff::civil::Date,
@@ -42,9 +49,14 @@ struct Place {
 impl Place {
     fn new() -> Place {
         let place = folder();
+        let reports = place.path().join("reports");
+        Place::with(place, reports)
+    }
+
+    /// The same, with its reports elsewhere.
+    fn with(place: tempfile::TempDir, reports: PathBuf) -> Place {
         let text = profile::text_of("tank", &Search::shipped()).expect("a shipped plant");
         let formats = FORMATS.map(|(format, _)| format!("\"{format}\"")).join(", ");
-        let reports = place.path().join("reports");
         let rules = format!(
             "\n[[report.automatic]]\nperiod = \"day\"\nformats = [{formats}]\nfolder = {reports:?}\n
              [[access.trusted]]\nuser = \"{}\"\nrole = \"supervisor\"\n",
@@ -62,7 +74,7 @@ impl Place {
         let store = Store::open(&place.path().join("tank.duckdb"), &def, begin).expect("a new file").store;
         store.append(&(0..DAYS * 1_440).map(minute).collect::<Vec<_>>()).expect("stored");
         store.checkpoint().expect("written");
-        Place { folder: place, sockets: sockets(), first: begin.to_zoned(def.time_zone.clone()).date() }
+        Place { folder: place, reports, sockets: sockets(), first: begin.to_zoned(def.time_zone.clone()).date() }
     }
 
     fn command(&self, args: &[&str]) -> Command {
@@ -79,19 +91,19 @@ impl Place {
 
     /// Whether a report is verified, and what is said of it.
     fn verified(&self, name: &str, args: &[&str]) -> (bool, String) {
-        let file = self.folder.path().join("reports").join(name).display().to_string();
+        let file = self.reports.join(name).display().to_string();
         let verified = self.command(&[&["report", "verify", &file, "tank.toml"], args].concat()).output();
         let verified = verified.expect("it runs");
         (verified.status.success(), String::from_utf8_lossy(&[verified.stdout, verified.stderr].concat()).into_owned())
     }
 
     fn names(&self) -> BTreeSet<String> {
-        let entries = fs::read_dir(self.folder.path().join("reports")).into_iter().flatten().flatten();
+        let entries = fs::read_dir(&self.reports).into_iter().flatten().flatten();
         entries.map(|entry| entry.file_name().into_string().expect("a plain name")).collect()
     }
 
     /// The files that there must be, in the order in which they are made.
-    fn reports(&self) -> Vec<String> {
+    fn expected(&self) -> Vec<String> {
         let days = (0..DAYS).map(|day| self.first + SignedDuration::from_hours(24 * day));
         days.flat_map(|day| FORMATS.map(|(_, ending)| format!("{day}-day.{ending}"))).collect()
     }
@@ -108,7 +120,6 @@ fn check_whole(folder: &Path, names: &BTreeSet<String>) {
 #[test]
 fn a_station_killed_while_it_writes_makes_each_report_once() {
     let place = Place::new();
-    let reports = place.folder.path().join("reports");
     for kill in 0..KILLS {
         let mut station = place.station();
         // Alternately after a report, and while the next is on its way to the disk.
@@ -118,12 +129,15 @@ fn a_station_killed_while_it_writes_makes_each_report_once() {
         assert!(kill % 2 == 0 || next(), "no further report");
         station.signal("KILL");
         assert_eq!(station.end(), None);
-        check_whole(&reports, &place.names());
+        check_whole(&place.reports, &place.names());
     }
-    let expected = place.reports();
+    let expected = place.expected();
     assert!(place.names().len() < 2 * expected.len(), "it was killed before it had made all");
     let mut station = place.station();
-    station.wait_for(&format!("report written file=\"{}\"", reports.join(expected.last().expect("reports")).display()));
+    station.wait_for(&format!(
+        "report written file=\"{}\"",
+        place.reports.join(expected.last().expect("reports")).display()
+    ));
     // What is written is on record a moment later: the station says so itself.
     let last = expected.last().expect("reports");
     let is_on_record = || place.verified(last, &[]).1.contains("automatic report day");
@@ -133,7 +147,7 @@ fn a_station_killed_while_it_writes_makes_each_report_once() {
 
     let all = expected.iter().flat_map(|name| [name.clone(), format!("{name}.sha256")]);
     assert_eq!(place.names(), all.collect());
-    check_whole(&reports, &place.names());
+    check_whole(&place.reports, &place.names());
     for name in &expected {
         let (is_verified, said) = place.verified(name, &["--history", "tank.duckdb"]);
         assert!(is_verified, "{said}");
@@ -149,4 +163,30 @@ fn a_station_killed_while_it_writes_makes_each_report_once() {
     let exports = "SELECT count(*) FROM operator_action WHERE action = 'export' AND outcome = 'done'";
     let files = "SELECT count(DISTINCT target) FROM operator_action WHERE action = 'export' AND outcome = 'done'";
     assert_eq!(count(exports), count(files), "what was found after a kill is no second export");
+}
+
+#[test]
+fn reports_that_find_no_room_are_made_once_there_is_some() {
+    type Change = fn(&SmallDisk);
+    let outages: [(Change, Change); 2] =
+        [(SmallDisk::fill, SmallDisk::free), (SmallDisk::protect, SmallDisk::unprotect)];
+    for (begin, end) in outages {
+        let Some(disk) = SmallDisk::mount() else { return };
+        let reports = disk.path().join("reports");
+        fs::create_dir(&reports).expect("a folder");
+        let place = Place::with(folder(), reports);
+        begin(&disk);
+        let mut station = place.station();
+        station.wait_for("a report is not made yet");
+        assert_eq!(place.names(), BTreeSet::new(), "nothing is left of what was not written");
+        end(&disk);
+        let expected = place.expected();
+        let last = place.reports.join(expected.last().expect("reports"));
+        station.wait_for(&format!("report written file=\"{}\"", last.display()));
+        station.signal("TERM");
+        assert_eq!(station.end(), Some(0), "{:?}", station.said);
+        let all = expected.iter().flat_map(|name| [name.clone(), format!("{name}.sha256")]);
+        assert_eq!(place.names(), all.collect());
+        check_whole(&place.reports, &place.names());
+    }
 }
