@@ -1,8 +1,10 @@
 //! Samples from a CSV file of another program: what is accepted, line by line, and which of them fill a gap.
 //!
 //! A row is one sample: `tag`, `time` (with offset, or a local time of the plant), `value`, and if there is such a column
-//! `quality`, in any order. A time whose column has `utc` in its name is UTC. Where there is a column `exact`, as SQL gives it,
-//! what it holds is the value. Cells stand between commas, semicolons or tabs; the decimal mark is the [first](DecimalMark).
+//! `quality`, in any order. Where there is a column `exact`, as SQL gives it, what it holds is the value. Or a row is one
+//! instant, as `export` writes it: a time, then of each tag a column of values and perhaps one of qualities, by its name. A
+//! time whose column has `utc` in its name is UTC. Cells stand between commas, semicolons or tabs; the decimal mark is the
+//! [first](DecimalMark).
 
 use std::collections::BTreeMap;
 
@@ -22,6 +24,7 @@ use crate::{
     },
     report::{
         decimal_mark::{DecimalMark, NumberError},
+        export::QUALITY,
         step_series::HOLD_MAX,
     },
 };
@@ -67,14 +70,17 @@ impl Import {
 /// Where the cells of a row stand.
 struct Columns {
     count: usize,
-    tag: usize,
     time: usize,
     is_utc: bool,
-    value: usize,
-    exact: Option<usize>,
-    quality: Option<usize>,
-    unit: Option<usize>,
+    layout: Layout,
     mark: DecimalMark,
+}
+
+enum Layout {
+    /// A row a sample.
+    Sample { tag: usize, value: usize, exact: Option<usize>, quality: Option<usize>, unit: Option<usize> },
+    /// A row an instant, by tags: where their values stand, and their qualities.
+    Instant(BTreeMap<TagId, (usize, Option<usize>)>),
 }
 
 /// A row of a file with the line on which it begins; or why it is none.
@@ -89,19 +95,20 @@ pub fn parse(
     records: impl Iterator<Item = Record>,
     [oldest, now]: [Timestamp; 2],
 ) -> Result<Rows, Vec<String>> {
-    let mut columns = columns(header, separator).map_err(|why| vec![format!("line 1: {why}")])?;
+    let mut columns = columns(def, header, separator).map_err(|why| vec![format!("line 1: {why}")])?;
     let (mut rows, mut problems, mut wrong, mut count) = (Rows::new(), Vec::new(), 0, 0);
     for (line, record) in records {
-        match record.and_then(|record| columns.row(def, line, &record, [oldest, now])) {
-            Ok((tag, sample)) => rows.entry(tag).or_default().push(sample),
-            Err(why) => {
-                wrong += 1;
-                problems.extend((problems.len() < PROBLEMS_MAX).then(|| format!("line {line}: {why}")));
-            }
+        let mut add = |tag, sample| {
+            rows.entry(tag).or_default().push(sample);
+            count += 1;
+        };
+        let read = record.and_then(|record| columns.row(def, line, &record, [oldest, now], &mut add));
+        if let Err(why) = read {
+            wrong += 1;
+            problems.extend((problems.len() < PROBLEMS_MAX).then(|| format!("line {line}: {why}")));
         }
-        count += 1;
         if ROWS_MAX < count {
-            return Err(vec![format!("found more than {ROWS_MAX} rows: split the file")]);
+            return Err(vec![format!("found more than {ROWS_MAX} samples: split the file")]);
         }
     }
     rows.values_mut().for_each(|rows| rows.sort_by_key(|sample| sample.at));
@@ -115,74 +122,142 @@ pub fn parse(
     }
 }
 
-fn columns(header: &csv::StringRecord, separator: u8) -> Result<Columns, String> {
+fn columns(def: &PlantDef, header: &csv::StringRecord, separator: u8) -> Result<Columns, String> {
     let named = |name: &str| header.iter().position(|column| column.eq_ignore_ascii_case(name));
     let known = || TIMES.into_iter().chain(OTHERS);
-    let is_utc = |column: &str| column.to_ascii_lowercase().contains("utc");
-    let is_known = |column: &str| is_utc(column) || known().any(|known| column.eq_ignore_ascii_case(known));
-    if let Some(other) = header.iter().position(|column| !is_known(column)) {
-        let known: Vec<&str> = known().collect();
-        // Not in its own words: until its columns are known, a file may be any file, even one of passwords.
-        return Err(format!("column {} is none of samples, expected {}", other + 1, known.join(", ")));
-    }
-    let needed = |what: &str| named(what).ok_or_else(|| format!("found no column `{what}`"));
+    let is_utc = |column: &str| column.to_ascii_lowercase().contains("utc") && of_tag(def, column).is_none();
     let utc = header.iter().position(is_utc);
     let time = utc.or_else(|| TIMES.into_iter().find_map(named));
-    Ok(Columns {
-        count: header.len(),
-        tag: needed("tag")?,
-        time: time.ok_or_else(|| format!("found no column {}", TIMES.join(" or ")))?,
-        is_utc: utc.is_some(),
-        value: needed("value")?,
-        exact: named("exact"),
-        quality: named("quality"),
-        unit: named("unit"),
-        mark: DecimalMark::of(separator),
-    })
+    let layout = match named("tag") {
+        None if header.iter().any(|column| of_tag(def, column).is_some()) => instant(def, header, is_utc)?,
+        tag => {
+            let is_known = |column: &str| is_utc(column) || known().any(|known| column.eq_ignore_ascii_case(known));
+            if let Some(other) = header.iter().position(|column| !is_known(column)) {
+                let known: Vec<&str> = known().collect();
+                // Not in its own words: until its columns are known, a file may be any file, even one of passwords.
+                let expected = format!("expected {}, or a time and names of tags", known.join(", "));
+                return Err(format!("column {} is none of samples, {expected}", other + 1));
+            }
+            let needed = |column: Option<usize>, what: &str| column.ok_or_else(|| format!("found no column `{what}`"));
+            let [value, exact, quality, unit] = ["value", "exact", "quality", "unit"].map(named);
+            Layout::Sample { tag: needed(tag, "tag")?, value: needed(value, "value")?, exact, quality, unit }
+        }
+    };
+    let time = time.ok_or_else(|| format!("found no column {}", TIMES.join(" or ")))?;
+    Ok(Columns { count: header.len(), time, is_utc: utc.is_some(), layout, mark: DecimalMark::of(separator) })
+}
+
+/// The tag of a column, and the rest of its heading: its unit, or that it is of qualities.
+fn of_tag<'a>(def: &PlantDef, column: &'a str) -> Option<(TagId, &'a str)> {
+    // As a formula is kept from being one.
+    let column = column.strip_prefix('\'').unwrap_or(column);
+    let (name, rest) = column.split_once(' ').unwrap_or((column, ""));
+    Some((def.tag_named(name)?, rest))
+}
+
+/// The columns of a row that is an instant.
+fn instant(def: &PlantDef, header: &csv::StringRecord, is_utc: impl Fn(&str) -> bool) -> Result<Layout, String> {
+    let mut tags: BTreeMap<TagId, (Option<usize>, Option<usize>)> = BTreeMap::new();
+    for (place, column) in header.iter().enumerate() {
+        let Some((tag, rest)) = of_tag(def, column) else {
+            let is_time = is_utc(column) || TIMES.iter().any(|time| column.eq_ignore_ascii_case(time));
+            is_time
+                .then_some(())
+                .ok_or_else(|| format!("column {}: expected a time or the name of a tag", place + 1))?;
+            continue;
+        };
+        let (tag_def, columns) = (def.tag(tag), tags.entry(tag).or_default());
+        let is_quality = rest == QUALITY.trim_start();
+        if !is_quality && !rest.is_empty() && tag_def.unit_from.is_none() && rest != tag_def.unit {
+            return Err(format!("{}: found the unit `{rest}`, expected `{}`", tag_def.name, tag_def.unit));
+        }
+        let taken = if is_quality { columns.1.replace(place) } else { columns.0.replace(place) };
+        if taken.is_some() {
+            return Err(format!("column {}: found {} twice", place + 1, tag_def.name));
+        }
+    }
+    let whole = |(tag, (value, quality)): (TagId, (Option<usize>, _))| {
+        let value = value.ok_or_else(|| format!("found no column of values of {}", def.tag(tag).name))?;
+        Ok((tag, (value, quality)))
+    };
+    tags.into_iter().map(whole).collect::<Result<_, String>>().map(Layout::Instant)
 }
 
 impl Columns {
+    /// Reads the samples of a row.
     fn row(
         &mut self,
         def: &PlantDef,
         line: u64,
         record: &csv::StringRecord,
         [oldest, now]: [Timestamp; 2],
-    ) -> Result<(TagId, Sample), String> {
+        add: &mut impl FnMut(TagId, Sample),
+    ) -> Result<(), String> {
         if record.len() != self.count {
             return Err(format!("found {} cells, expected {}", record.len(), self.count));
         }
         let cell = |column: usize| record.get(column).unwrap_or_default();
-        let name = cell(self.tag);
-        let tag = def.tag_named(name).ok_or_else(|| format!("found the tag `{name}`, which {} has not", def.name))?;
-        let tag_def = def.tag(tag);
-        if tag_def.is_text() || !tag_def.is_stored() {
-            return Err(format!("{name}: this tag is not stored"));
-        }
-        let unit =
-            self.unit.map(cell).filter(|unit| tag_def.unit_from.is_none() && !["", &tag_def.unit].contains(unit));
-        if let Some(unit) = unit {
-            return Err(format!("{name}: found the unit `{unit}`, expected `{}`", tag_def.unit));
-        }
         let at = in_milliseconds(time(def, cell(self.time), self.is_utc)?);
         if at < oldest || now < at {
             return Err(format!("found the time {at}, expected one from {oldest:.0} to {now:.0}"));
         }
-        let quality = self.quality.map(cell).unwrap_or_default();
-        let quality = quality_of(quality).ok_or_else(|| {
-            format!("found the quality `{quality}`, expected good, or uncertain or bad with its cause: `bad: stale`")
-        })?;
-        // What SQL has left out of a value that is a DOUBLE.
-        let exact = self.exact.map(cell).filter(|exact| !exact.is_empty());
-        let value = match (quality, exact.unwrap_or(cell(self.value))) {
-            (Quality::Bad(_), "") => None,
-            (Quality::Bad(_), found) => {
-                return Err(format!("{name}: found the value `{found}`, which is bad: expected none"));
+        match &self.layout {
+            Layout::Sample { tag, value, exact, quality, unit } => {
+                let name = cell(*tag);
+                let tag = def.tag_named(name.strip_prefix('\'').unwrap_or(name));
+                let tag = tag.ok_or_else(|| format!("found the tag `{name}`, which {} has not", def.name))?;
+                let tag_def = def.tag(tag);
+                let unit =
+                    unit.map(cell).filter(|unit| tag_def.unit_from.is_none() && !["", &tag_def.unit].contains(unit));
+                if let Some(unit) = unit {
+                    return Err(format!("{name}: found the unit `{unit}`, expected `{}`", tag_def.unit));
+                }
+                // What SQL has left out of a value that is a DOUBLE.
+                let exact = exact.map(cell).filter(|exact| !exact.is_empty());
+                let quality = quality_of(quality.map(cell).unwrap_or_default())?;
+                let value = exact.unwrap_or(cell(*value));
+                add(tag, sample(tag_def, (quality, value), (line, &mut self.mark), at)?);
             }
-            (Quality::Good | Quality::Uncertain(_), found) => Some(value(tag_def, found, line, &mut self.mark)?),
-        };
-        Ok((tag, Sample::new(value, quality, at)))
+            Layout::Instant(tags) => {
+                for (tag, (value, quality)) in tags {
+                    let (value, quality) = (cell(*value), quality.map(cell).unwrap_or_default());
+                    let quality = match (quality, value) {
+                        // Nothing was stored, or known of what was.
+                        ("none" | "", "") => continue,
+                        (word, "") if Quality::from_word(word).is_some_and(|quality| !is_stored(quality)) => continue,
+                        // Exports leave out what is not good.
+                        (quality, "") => match quality_of(quality)? {
+                            Quality::Uncertain(cause) => Quality::Bad(cause),
+                            quality => quality,
+                        },
+                        (quality, _) => quality_of(quality)?,
+                    };
+                    add(*tag, sample(def.tag(*tag), (quality, value), (line, &mut self.mark), at)?);
+                }
+            }
+        }
+        Ok(())
     }
+}
+
+/// A sample of a tag that is stored, with a value unless it is bad.
+fn sample(
+    tag: &TagDef,
+    (quality, found): (Quality, &str),
+    (line, mark): (u64, &mut DecimalMark),
+    at: Timestamp,
+) -> Result<Sample, String> {
+    if tag.is_text() || !tag.is_stored() {
+        return Err(format!("{}: this tag is not stored", tag.name));
+    }
+    let value = match (quality, found) {
+        (Quality::Bad(_), "") => None,
+        (Quality::Bad(_), found) => {
+            return Err(format!("{}: found the value `{found}`, which is bad: expected none", tag.name));
+        }
+        (Quality::Good | Quality::Uncertain(_), found) => Some(value(tag, found, line, mark)?),
+    };
+    Ok(Sample::new(value, quality, at))
 }
 
 fn value(tag: &TagDef, found: &str, line: u64, mark: &mut DecimalMark) -> Result<Exact, String> {
@@ -223,13 +298,20 @@ fn time(def: &PlantDef, found: &str, is_utc: bool) -> Result<Timestamp, String> 
 }
 
 /// What the program writes; nothing is good, and no cause is that the value is old.
-fn quality_of(found: &str) -> Option<Quality> {
-    match found {
+fn quality_of(found: &str) -> Result<Quality, String> {
+    let quality = match found {
         "" => Some(Quality::Good),
         "uncertain" => Some(Quality::Uncertain(Cause::Stale)),
         "bad" => Some(Quality::Bad(Cause::Stale)),
-        word => Quality::from_word(word).filter(|quality| quality.cause().is_none_or(Cause::is_stored)),
-    }
+        word => Quality::from_word(word).filter(|quality| is_stored(*quality)),
+    };
+    quality.ok_or_else(|| {
+        format!("found the quality `{found}`, expected good, or uncertain or bad with its cause: `bad: stale`")
+    })
+}
+
+fn is_stored(quality: Quality) -> bool {
+    quality.cause().is_none_or(Cause::is_stored)
 }
 
 /// Decides which rows of a tag fill a gap: those at which no stored value is in force. What a station recorded itself is

@@ -57,7 +57,7 @@ pub(super) fn heading(tag: &str, unit: &str) -> [String; 2] {
 }
 
 /// What makes a heading that of a quality.
-pub(super) const QUALITY: &str = " quality";
+pub const QUALITY: &str = " quality";
 
 #[cfg(test)]
 mod tests {

@@ -1,9 +1,15 @@
 //! Files of other programs: what is read of them, what is refused, and what is left out.
 
+use std::time::Duration;
+
 use super::*;
 use crate::{
-    plant::data_type::DataType,
-    report::testing::{THREE, at, plant, sec},
+    plant::{data_type::DataType, def::CsvDialect},
+    report::{
+        export::{Column, export_csv},
+        step_series::HeldValue,
+        testing::{THREE, at, plant, sec},
+    },
 };
 
 const NOW: &str = "2026-11-23T12:00:00Z";
@@ -70,6 +76,11 @@ fn what_is_wrong_is_said_with_line_and_expectation() {
         ("tag,time,value,price", "line 1: column 4 is none of samples, expected time_utc"),
         ("argon2id$secret", "line 1: column 1 is none of samples, expected time_utc"),
         ("time,value", "found no column `tag`"),
+        ("time,TIC-1.PV,price", "column 3: expected a time or the name of a tag"),
+        ("time,TIC-1.PV °F", "TIC-1.PV: found the unit `°F`, expected `°C`"),
+        ("time,TIC-1.PV °C,TIC-1.PV", "column 3: found TIC-1.PV twice"),
+        ("time,TIC-1.PV quality", "found no column of values of TIC-1.PV"),
+        ("TIC-1.PV", "found no column time_utc or utc"),
         ("tag,time,value", "found no row behind the header"),
     ] {
         let problems = read(header).unwrap_err();
@@ -88,6 +99,75 @@ fn what_is_wrong_is_said_with_line_and_expectation() {
     let many = format!("tag,time,value\n{}", "X,soon,1\n".repeat(25));
     let problems = read(&many).unwrap_err();
     assert_eq!((problems.len(), problems[10].as_str()), (11, "and 15 more"));
+}
+
+#[test]
+fn a_row_of_an_instant_has_a_sample_of_each_tag() {
+    let [pv, sv, _] = names();
+    let unreadable = Quality::Bad(Cause::Unreadable).word();
+    let text = format!(
+        "time,{pv} °C,{pv} quality,{sv}\n2026-11-21T06:00:00,1.5,good,on\n2026-11-21T06:00:10,,bad: response timeout,\n\
+         2026-11-21T06:00:20,,none,OFF\n2026-11-21T06:00:30,,{unreadable},\n2026-11-21T06:00:40,2,uncertain: stale,\n\
+         2026-11-21T06:00:50,,uncertain: stale,\n"
+    );
+    let at = |second: &str| at(&format!("2026-11-21T05:00:{second}Z"));
+    let expect = [
+        Sample::good(1.5, at("00")),
+        Sample::bad(Cause::Timeout, at("10")),
+        Sample::good(2.0, at("40")).uncertain(Cause::Stale),
+        Sample::bad(Cause::Stale, at("50")),
+    ];
+    let other = vec![Sample::good(1.0, at("00")), Sample::good(0.0, at("20"))];
+    assert_eq!(read(&text), Ok(Rows::from([(TagId(0), expect.to_vec()), (TagId(1), other)])));
+    for (cells, expect) in [
+        ("x,good,", "line 2: TIC-1.PV: found `x`, expected a number"),
+        (",good,", "line 2: TIC-1.PV: found ``, expected a number"),
+        ("1,worse,", "line 2: found the quality `worse`"),
+        ("1,bad: stale,", "line 2: TIC-1.PV: found the value `1`, which is bad"),
+        ("1,good,7", "found `7`, expected OFF, ON"),
+    ] {
+        let problems = read(&format!("time,{pv},{pv} quality,{sv}\n2026-11-21T06:00:00,{cells}\n")).unwrap_err();
+        assert!(problems[0].contains(expect), "{problems:?}, expected {expect}");
+    }
+}
+
+#[test]
+fn an_export_at_intervals_is_read_as_it_was_written() {
+    let def = plant("Europe/Berlin", &THREE);
+    let of = |cause| [Quality::Good, Quality::Bad(cause), Quality::Uncertain(cause)];
+    let qualities: Vec<Quality> = Cause::ALL.into_iter().flat_map(of).collect();
+    let column = |tag: &TagDef| Column {
+        tag: tag.name.clone(),
+        unit: tag.unit.clone(),
+        decimals: 1,
+        values: (0..60)
+            .map(|n| {
+                let quality = qualities[n * 7 % qualities.len()];
+                let value = (!quality.is_bad()).then(|| (n as f64 / 10.0).into());
+                (n % 5 > 0).then_some(HeldValue { value, quality })
+            })
+            .collect(),
+    };
+    let columns: Vec<Column> = def.tags[..2].iter().map(column).collect();
+    // Over the night in which the clocks are set back.
+    let (from, every) = (at("2026-10-25T00:30:00Z"), Duration::from_secs(60));
+    for (separator, decimal) in [(',', '.'), (';', ','), ('\t', ',')] {
+        let dialect = CsvDialect { separator, decimal, bom: separator == ';' };
+        let bytes = export_csv(&def, from, every, &columns, dialect);
+        let rows = crate::history::io::import::parse(&def, &*bytes, Timestamp::UNIX_EPOCH, at(NOW)).unwrap();
+        for (tag, column) in def.tags.iter().zip(&columns) {
+            let stored = (1u32..).zip(&column.values).filter_map(|(row, stood)| {
+                let (HeldValue { value, quality }, at) = ((*stood)?, from + every * row);
+                // Of what is not good an export has no value.
+                let sample = match quality.cause() {
+                    None => Sample::new(value, quality, at),
+                    Some(cause) => Sample::bad(cause, at),
+                };
+                is_stored(quality).then_some(sample)
+            });
+            assert_eq!(rows[&tag.id], stored.collect::<Vec<_>>(), "{dialect:?}");
+        }
+    }
 }
 
 #[test]
