@@ -79,8 +79,16 @@ struct Columns {
 enum Layout {
     /// A row a sample.
     Sample { tag: usize, value: usize, exact: Option<usize>, quality: Option<usize>, unit: Option<usize> },
-    /// A row an instant, by tags: where their values stand, and their qualities.
-    Instant(BTreeMap<TagId, (usize, Option<usize>)>),
+    /// A row an instant.
+    Instant(BTreeMap<TagId, Series>),
+}
+
+/// The columns of a tag.
+struct Series {
+    value: usize,
+    quality: Option<usize>,
+    /// When it had a value last.
+    held: Option<Timestamp>,
 }
 
 /// A row of a file with the line on which it begins; or why it is none.
@@ -178,7 +186,7 @@ fn instant(def: &PlantDef, header: &csv::StringRecord, is_utc: impl Fn(&str) -> 
     }
     let whole = |(tag, (value, quality)): (TagId, (Option<usize>, _))| {
         let value = value.ok_or_else(|| format!("found no column of values of {}", def.tag(tag).name))?;
-        Ok((tag, (value, quality)))
+        Ok((tag, Series { value, quality, held: None }))
     };
     tags.into_iter().map(whole).collect::<Result<_, String>>().map(Layout::Instant)
 }
@@ -201,7 +209,7 @@ impl Columns {
         if at < oldest || now < at {
             return Err(format!("found the time {at}, expected one from {oldest:.0} to {now:.0}"));
         }
-        match &self.layout {
+        match &mut self.layout {
             Layout::Sample { tag, value, exact, quality, unit } => {
                 let name = cell(*tag);
                 let tag = def.tag_named(name.strip_prefix('\'').unwrap_or(name));
@@ -219,20 +227,27 @@ impl Columns {
                 add(tag, sample(tag_def, (quality, value), (line, &mut self.mark), at)?);
             }
             Layout::Instant(tags) => {
-                for (tag, (value, quality)) in tags {
-                    let (value, quality) = (cell(*value), quality.map(cell).unwrap_or_default());
-                    let quality = match (quality, value) {
-                        // Nothing was stored, or known of what was.
-                        ("none" | "", "") => continue,
-                        (word, "") if Quality::from_word(word).is_some_and(|quality| !is_stored(quality)) => continue,
+                for (tag, series) in tags {
+                    let (value, word) = (cell(series.value), series.quality.map(cell).unwrap_or_default());
+                    let quality = match (word, value) {
+                        ("", "") => continue,
+                        // Nothing was stored, or known of what was: there the last value is held no longer.
+                        (_, "") if is_none(word) => {
+                            match series.held.take().filter(|held| elapsed(*held, at) < HOLD_MAX) {
+                                Some(_) => Quality::Bad(Cause::StationOff),
+                                None => continue,
+                            }
+                        }
                         // Exports leave out what is not good.
-                        (quality, "") => match quality_of(quality)? {
+                        (_, "") => match quality_of(word)? {
                             Quality::Uncertain(cause) => Quality::Bad(cause),
                             quality => quality,
                         },
-                        (quality, _) => quality_of(quality)?,
+                        _ => quality_of(word)?,
                     };
-                    add(*tag, sample(def.tag(*tag), (quality, value), (line, &mut self.mark), at)?);
+                    let sample = sample(def.tag(*tag), (quality, value), (line, &mut self.mark), at)?;
+                    series.held = sample.value.map(|_| at);
+                    add(*tag, sample);
                 }
             }
         }
@@ -308,6 +323,11 @@ fn quality_of(found: &str) -> Result<Quality, String> {
     quality.ok_or_else(|| {
         format!("found the quality `{found}`, expected good, or uncertain or bad with its cause: `bad: stale`")
     })
+}
+
+/// Is it what an export says of an instant at which nothing is known?
+fn is_none(word: &str) -> bool {
+    word == "none" || Quality::from_word(word).is_some_and(|quality| !is_stored(quality))
 }
 
 fn is_stored(quality: Quality) -> bool {

@@ -108,6 +108,7 @@ fn a_row_of_an_instant_has_a_sample_of_each_tag() {
     let text = format!(
         "time,{pv} °C,{pv} quality,{sv}\n2026-11-21T06:00:00,1.5,good,on\n2026-11-21T06:00:10,,bad: response timeout,\n\
          2026-11-21T06:00:20,,none,OFF\n2026-11-21T06:00:30,,{unreadable},\n2026-11-21T06:00:40,2,uncertain: stale,\n\
+         2026-11-21T06:00:45,,none,\n2026-11-21T06:00:46,,none,\n\
          2026-11-21T06:00:50,,uncertain: stale,\n"
     );
     let at = |second: &str| at(&format!("2026-11-21T05:00:{second}Z"));
@@ -115,6 +116,8 @@ fn a_row_of_an_instant_has_a_sample_of_each_tag() {
         Sample::good(1.5, at("00")),
         Sample::bad(Cause::Timeout, at("10")),
         Sample::good(2.0, at("40")).uncertain(Cause::Stale),
+        // Where nothing was stored the value is held no longer.
+        Sample::bad(Cause::StationOff, at("45")),
         Sample::bad(Cause::Stale, at("50")),
     ];
     let other = vec![Sample::good(1.0, at("00")), Sample::good(0.0, at("20"))];
@@ -156,14 +159,18 @@ fn an_export_at_intervals_is_read_as_it_was_written() {
         let bytes = export_csv(&def, from, every, &columns, dialect);
         let rows = crate::history::io::import::parse(&def, &*bytes, Timestamp::UNIX_EPOCH, at(NOW)).unwrap();
         for (tag, column) in def.tags.iter().zip(&columns) {
+            let mut held = false;
             let stored = (1u32..).zip(&column.values).filter_map(|(row, stood)| {
-                let (HeldValue { value, quality }, at) = ((*stood)?, from + every * row);
-                // Of what is not good an export has no value.
-                let sample = match quality.cause() {
-                    None => Sample::new(value, quality, at),
-                    Some(cause) => Sample::bad(cause, at),
-                };
-                is_stored(quality).then_some(sample)
+                let at = from + every * row;
+                let was_held = std::mem::replace(&mut held, stood.is_some_and(|stood| stood.quality.is_good()));
+                match stood.filter(|stood| is_stored(stood.quality)) {
+                    None => was_held.then(|| Sample::bad(Cause::StationOff, at)),
+                    // Of what is not good an export has no value.
+                    Some(HeldValue { value, quality }) => Some(match quality.cause() {
+                        None => Sample::new(value, quality, at),
+                        Some(cause) => Sample::bad(cause, at),
+                    }),
+                }
             });
             assert_eq!(rows[&tag.id], stored.collect::<Vec<_>>(), "{dialect:?}");
         }
