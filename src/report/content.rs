@@ -49,6 +49,7 @@ pub fn document(report: &ShiftReport, def: &PlantDef, locale: Locale) -> Documen
             locale,
             zone,
             times,
+            from: report.period.from,
             until: report.until,
             sections: def.report.sections.iter().filter_map(section).collect(),
         }
