@@ -21,7 +21,7 @@ use super::{
 use crate::{
     history::{
         ArchiveFile, HistoryError,
-        tiers::{Aggregate, CurvePart, Piece, Tier, pieces},
+        tiers::{Aggregate, CurvePart, HOUR, Piece, Tier, floor, pieces},
     },
     plant::{def::TagId, exact::Exact},
     report::{
@@ -56,11 +56,16 @@ impl Store {
         Ok(gaps)
     }
 
-    /// What answers for a span, in pieces in order of time.
+    /// What answers for a span, in pieces in order of time. A row of aggregates has no order in it: where the clock was set back
+    /// the samples answer, for as long as they are kept.
     pub(super) fn pieces(&self, span: Range<i64>, widest: Tier) -> Result<Vec<Piece>, HistoryError> {
         let avoided = self.avoided.borrow().clone();
         let files = self.files(None)?;
-        Ok(pieces(span.start, span.end, widest, &|tier| kept(&files, tier, &avoided)))
+        let deleted = self.deleted_until(Tier::Raw)?.map_or(i64::MIN, Timestamp::as_microsecond);
+        let doubled = self.doubled()?.into_iter().map(|doubled| doubled.span).filter(|span| deleted <= span.start);
+        let apart: Vec<Range<i64>> =
+            doubled.map(|span| floor(span.start, HOUR)..floor(span.end + HOUR - 1, HOUR)).collect();
+        Ok(pieces(span.start, span.end, widest, &|tier| without(kept(&files, tier, &avoided), &apart)))
     }
 
     /// The same as [`Store::each_part`], all of one tier.
@@ -73,6 +78,19 @@ impl Store {
     ) -> Result<Vec<Gap>, HistoryError> {
         if tier != Tier::Raw {
             self.each_aggregate(tags, tier, (from, to), &mut each)?;
+            return Ok(Vec::new());
+        }
+        let finest = self.finest(from)?;
+        if let Some(step) = finest.step() {
+            // An edge within a minute or an hour of which no samples are kept has its share of it.
+            let (begin, end) = (from.as_microsecond(), to.as_microsecond());
+            let whole = (instant(floor(begin, step)), instant(floor(end + step - 1, step)));
+            let (Some(whole_from), Some(whole_to)) = whole else { return Ok(Vec::new()) };
+            self.each_aggregate(tags, finest, (whole_from, whole_to), &mut |place, part| {
+                if let CurvePart::Aggregate(row) = part {
+                    each(place, CurvePart::Aggregate(row.share(begin..end, step)));
+                }
+            })?;
             return Ok(Vec::new());
         }
         let mut steps = vec![StepSeries::new(from, to); tags.len()];
@@ -162,6 +180,18 @@ fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>) -> Vec<Ra
             Some(last) => last.end = last.end.max(file.to),
             None => spans.push(file.from..file.to),
         }
+    }
+    spans
+}
+
+/// Spans without what lies in others; all of them sorted.
+fn without(mut spans: Vec<Range<i64>>, apart: &[Range<i64>]) -> Vec<Range<i64>> {
+    for apart in apart {
+        let cut = |span: Range<i64>| {
+            let parts = [span.start..span.end.min(apart.start), span.start.max(apart.end)..span.end];
+            parts.into_iter().filter(|part| part.start < part.end)
+        };
+        spans = spans.into_iter().flat_map(cut).collect();
     }
     spans
 }

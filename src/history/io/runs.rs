@@ -72,7 +72,7 @@ impl Store {
             let energy = match rule.and_then(|rule| rule.energy).filter(|_| span.0 < span.1) {
                 Some((tag, _)) => {
                     let gathered = self.gather(&[tag], std::iter::empty(), span)?;
-                    let figures = gathered.rows(&self.def, &[tag], std::iter::empty());
+                    let figures = gathered.rows(&self.def, &[tag], &[]);
                     figures.first().and_then(|figures| batch::energy(figures, elapsed(span.0, span.1)))
                 }
                 None => None,
