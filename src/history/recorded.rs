@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_time_is_doubled_from_where_the_clock_came_back_to_until_it_is_caught_up() {
+    fn a_time_is_doubled_until_the_clock_has_caught_up() {
         assert_eq!(spans(&[of(0, 0, 5), of(0, 6, 9)]), []);
         assert_eq!(spans(&[of(0, 0, 5), of(1, 6, 9)]), [], "set forward");
         assert_eq!(spans(&[of(0, 0, 5), of(1, 4, 9)]), [(4, 5, vec![0, 1])]);

@@ -159,7 +159,7 @@ fn a_period_names_every_offset_that_its_clocks_have_had() {
 }
 
 #[test]
-fn what_began_before_the_period_has_its_date_and_another_offset_if_it_has_that() {
+fn what_lies_outside_of_the_period_has_its_date_and_offset() {
     use super::{document::ColumnKind, testing::at};
     let made = document(&shift_report(), &plant("Asia/Bangkok", &THREE), Locale::ENGLISH);
     let words = |made: &Document, time: &str| made.words(&Cell::Time(at(time)), ColumnKind::Time);
@@ -181,7 +181,7 @@ fn column(sheet: &str, letter: char) -> Vec<f64> {
 }
 
 #[test]
-fn a_chart_of_a_night_with_a_change_of_the_clocks_runs_forward_and_has_its_spikes() {
+fn a_chart_over_a_change_of_the_clocks_runs_forward() {
     use std::io::Read;
 
     use super::{

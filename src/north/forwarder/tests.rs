@@ -123,7 +123,7 @@ fn an_epoch_goes_out_whole_before_the_next_one_and_once() {
             forwarder.on_delivered(&batch);
         };
         step(&mut forwarder, 0, until);
-        // The history has not told it yet.
+        // The history does not know it yet.
         step(&mut forwarder, 0, 31_000);
         if stopped {
             let known: Vec<_> = forwarder.sent().collect();

@@ -169,7 +169,7 @@ fn an_alarm_lasts_as_long_as_it_did_whatever_the_clock_showed() {
 }
 
 #[test]
-fn a_dead_station_ends_where_it_wrote_last_also_after_its_clock_was_ahead() {
+fn a_dead_station_ends_where_it_wrote_last_by_any_clock() {
     let day = 24 * HOUR_S;
     let (_folder, db) = folder();
     let store = open(&db, 400 * day);
@@ -194,7 +194,7 @@ fn a_dead_station_ends_where_it_wrote_last_also_after_its_clock_was_ahead() {
 }
 
 #[test]
-fn samples_of_an_epoch_are_told_apart_and_say_what_follows() {
+fn samples_of_one_epoch_come_alone_and_say_what_follows() {
     use crate::history::recorded::{Over, StoredSamples};
     let (_folder, db) = folder();
     let store = open(&db, 0);

@@ -61,7 +61,7 @@ fn an_overview_lists_when_no_station_recorded() {
 }
 
 #[test]
-fn a_device_that_does_not_answer_is_listed_with_its_cause_to_the_second() {
+fn a_silent_device_is_listed_with_its_cause_to_the_second() {
     use AlarmEvent::{Raised, ReturnedToNormal};
     let mut def = fixture::plant();
     let device = &def.devices[0];
@@ -106,7 +106,7 @@ fn minute_of(at: i64) -> LineMinute {
 }
 
 #[test]
-fn beyond_retention_a_report_says_what_it_is_made_of_and_edges_keep_their_share() {
+fn beyond_retention_a_report_says_so_and_edges_keep_their_share() {
     let (_folder, db) = folder();
     let def = |rule| {
         let mut def = PlantDef::clone(&counts::def());
