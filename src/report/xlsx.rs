@@ -44,7 +44,10 @@ impl ReportFormat for Xlsx {
 const NAME_MAX: usize = 31;
 const NAME_WITHOUT: [char; 7] = ['[', ']', ':', '*', '?', '/', '\\'];
 
-/// Of a curve, its least and its greatest values.
+/// The least, or the greatest, value of a column of a curve.
+type Edge = fn(&Bucket) -> f64;
+
+/// Of curves, each with its two edges.
 const COLOURS: [&str; 6] = ["1F77B4", "D62728", "2CA02C", "9467BD", "FF7F0E", "17BECF"];
 
 fn workbook(document: &Document, style: &Style) -> Result<Vec<u8>, XlsxError> {
@@ -218,7 +221,7 @@ fn curves(book: &mut Workbook, document: &Document, title: &str, charts: &[chart
         drawn.x_axis().set_num_format(if is_long { "mm-dd" } else { "hh:mm" });
         drawn.show_empty_cells_as(ChartEmptyCells::Gaps).set_width(900).set_height(360);
         for (number, curve) in (0..).zip(&chart.curves) {
-            let edges: [(&str, fn(&Bucket) -> f64); 2] = [(t!("min"), |of| of.min), (t!("max"), |of| of.max)];
+            let edges: [(&str, Edge); 2] = [(t!("min"), |of| of.min), (t!("max"), |of| of.max)];
             for (place, (word, edge)) in (first + 1 + 2 * number..).zip(edges) {
                 let heading = [curve.name.as_str(), &curve.unit, &plain(word)].join(" ").replace("  ", " ");
                 sheet.write_string_with_format(0, place, heading, &head())?;
