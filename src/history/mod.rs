@@ -1,6 +1,7 @@
 //! What the plant remembers: one thread writes it with DuckDB, another answers queries about it.
 
 pub mod tiers;
+pub mod recorded;
 pub mod retention;
 pub mod series;
 pub mod alarm_state;
@@ -16,6 +17,7 @@ use std::{path::PathBuf, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
+pub use self::recorded::{StoredSamples, Unarchived};
 use self::{
     import::Import,
     retention::{Deletion, Disk},
@@ -32,7 +34,6 @@ use crate::{
         past::Past,
         record::{ActionRecord, AlarmRecord},
         report::ReportRecord,
-        sample::Sample,
     },
     report::{Period, ShiftReport, batch::BatchReport, step_series::HeldValue},
 };
@@ -169,6 +170,8 @@ pub enum Query {
     Overview,
     /// Every stored sample of a span, archived or not, in order of time.
     Samples {
+        /// Of this epoch of the clock; `None`: of all, in the order in which they were stored.
+        epoch: Option<u16>,
         /// From.
         from: Timestamp,
         /// To.
@@ -212,23 +215,14 @@ pub enum Answer {
     Reports(MadeReports),
     /// What is known of the instant.
     Past(Box<Past>),
-    /// Samples in order of time.
-    Samples(Vec<(TagId, Sample)>),
+    /// Samples of an epoch.
+    Samples(StoredSamples),
     /// The same of those that are not archived.
     Unarchived(Unarchived),
     /// What is stored.
     Overview(Box<Overview>),
     /// What the unit holds.
     Registers(LiveReading),
-}
-
-/// Samples that are not archived, of every tag that was ever stored.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Unarchived {
-    /// Name and unit of their tags, as they were stored.
-    pub tags: Vec<(String, String)>,
-    /// The place of its tag in `tags`, and the sample; in order of time, and of storing.
-    pub samples: Vec<(u16, Sample)>,
 }
 
 /// The automatic reports on record.
@@ -255,6 +249,8 @@ pub struct Overview {
     pub oldest: Option<Timestamp>,
     /// The first and last instant stored, in the database or in the archive.
     pub extent: Option<(Timestamp, Timestamp)>,
+    /// When no station recorded between the first and the last record, the latest [`PAUSES_MAX`](recorded::PAUSES_MAX) of these times.
+    pub pauses: Vec<(Timestamp, Timestamp)>,
     /// The folder of the archive.
     pub folder: PathBuf,
     /// The disk that it lies on; `None` where it is unknown.

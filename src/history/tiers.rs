@@ -105,6 +105,13 @@ impl Aggregate {
         step <= to_i64((self.stats.seconds * 1e6).round())
     }
 
+    /// The share of it that lies in a span, as if it had been the same all the time; `step` is how long it is.
+    pub fn share(self, span: Range<i64>, step: i64) -> Aggregate {
+        let (from, to) = (self.at.max(span.start), (self.at + step).min(span.end));
+        let seconds = self.stats.seconds * (to - from).max(0) as f64 / step as f64;
+        Aggregate { at: from, stats: IntervalStats { seconds, ..self.stats }, ..self }
+    }
+
     /// What it says of a counter.
     pub fn summary(&self) -> ReadingSummary {
         let Aggregate { at, stats, first, gain, .. } = *self;
@@ -130,8 +137,9 @@ pub enum CurvePart {
     Aggregate(Aggregate),
 }
 
-/// Forms the minutes of one tag from its samples, which come in order of time and begin
-/// [`HOLD_MAX`](crate::report::step_series::HOLD_MAX) before the span. Times count in whole milliseconds.
+/// Forms the minutes of one tag from its samples, which come in the order in which they were stored and begin
+/// [`HOLD_MAX`](crate::report::step_series::HOLD_MAX) before the span; where the clock was set back, a minute comes once for each
+/// epoch. Times count in whole milliseconds.
 #[derive(Debug, Clone)]
 pub struct Minutes {
     steps: StepSeries,
@@ -154,7 +162,8 @@ impl Minutes {
         }
         let minute = floor(sample.at.as_microsecond(), MINUTE);
         if minute != self.counted.0 {
-            if self.current.is_some_and(|current| current.at < minute) {
+            // A clock that was set back goes to an earlier one.
+            if self.current.is_some_and(|current| current.at != minute) {
                 self.close(&mut each);
             }
             self.counted = (minute, 0);

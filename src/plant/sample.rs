@@ -69,6 +69,14 @@ keyword_enum! {
 }
 
 impl Cause {
+    /// Is it that the device did not answer, or could not be asked?
+    pub fn is_of_connection(self) -> bool {
+        matches!(
+            self,
+            Cause::Timeout | Cause::Corrupt | Cause::Stale | Cause::DeviceDown | Cause::NotConnected | Cause::NotHeard
+        )
+    }
+
     /// Can a stored sample have it?
     pub fn is_stored(self) -> bool {
         match self {

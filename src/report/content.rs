@@ -11,10 +11,12 @@ use std::{sync::Arc, time::Duration};
 use jiff::{Timestamp, civil, tz::TimeZone};
 
 use super::{
-    Compared, Gap, Outage, Period, PeriodName, ShiftReport, TagFigures, alarm_metrics, control_runs,
+    Compared, Gap, Outage, Period, PeriodName, ShiftReport, TagFigures, alarm_metrics,
+    coarse::{Coarse, Kept},
+    control_runs,
     csv::floor_percent,
     document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table, Times, plain},
-    raised,
+    figures, raised,
     record_csv::record_decimals,
 };
 use crate::{
@@ -49,6 +51,7 @@ pub fn document(report: &ShiftReport, def: &PlantDef, locale: Locale) -> Documen
             locale,
             zone,
             times,
+            from: report.period.from,
             until: report.until,
             sections: def.report.sections.iter().filter_map(section).collect(),
         }
@@ -240,11 +243,23 @@ fn gaps(report: &ShiftReport) -> Table {
     };
     let unreadable =
         report.unreadable.iter().map(|Gap { from, to, why }| row(*from, *to, t!("not readable, not counted"), why));
-    let outages = report.outages.iter().map(|Outage { from, to, what, why }| match what {
-        Some(what) => row(*from, *to, what, why),
-        None => row(*from, *to, t!("station"), t!("not running")),
+    let outages = report.outages.iter().map(|Outage { from, to, what, why }| {
+        let why = match why.as_str() {
+            figures::NOT_RUNNING => t!("not running"),
+            figures::CLOCK_SET_FORWARD => t!("clock set forward"),
+            why => translate(why),
+        };
+        row(*from, *to, what.as_deref().unwrap_or(t!("station")), why)
     });
-    Table::new(columns).with(unreadable.chain(outages))
+    let coarse = report.coarse.iter().map(|Coarse { from, to, kept }| {
+        let why = match kept {
+            Kept::Minutes => t!("deleted by age or for room: figures are those of minutes"),
+            Kept::Hours => t!("deleted by age or for room: figures are those of hours"),
+            Kept::Nothing => t!("deleted by age or for room: there are no figures"),
+        };
+        row(*from, *to, t!("samples"), why)
+    });
+    Table::new(columns).with(unreadable.chain(coarse).chain(outages))
 }
 
 fn actions(actions: &[ActionRecord]) -> Table {

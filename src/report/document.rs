@@ -7,6 +7,7 @@ use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 use super::chart::Chart;
 use crate::{
     plant::{def::Section as Kind, exact::Exact, number::digits},
+    t,
     text::{Locale, translate},
 };
 
@@ -23,6 +24,8 @@ pub struct Document {
     pub locale: Locale,
     /// The zone of its local times.
     pub zone: TimeZone,
+    /// When its period begins.
+    pub from: Timestamp,
     /// Up to when it has data. Formats that have a time of their own take this one, so that the same report gives the same bytes.
     pub until: Timestamp,
     /// How its times are written.
@@ -45,7 +48,7 @@ pub enum Times {
 impl Times {
     /// As a period needs them.
     pub fn of(zone: &TimeZone, from: Timestamp, until: Timestamp) -> Times {
-        if zone.to_offset(from) != zone.to_offset(until) {
+        if 1 < offsets(zone, from, until).len() {
             Times::Offset
         } else if until.duration_since(from) < SignedDuration::from_hours(24) {
             Times::Clock
@@ -64,19 +67,30 @@ impl Document {
             Cell::Number(value, decimals) => digits(*value, *decimals),
             Cell::Time(at) => {
                 let local = local(&self.zone, *at, kind);
+                let is_inside = self.from <= *at && *at <= self.until;
                 match self.times {
-                    Times::Clock => local.split_once(' ').map_or(local.clone(), |(_, clock)| clock.to_owned()),
-                    Times::Date => local,
-                    Times::Offset => format!("{local} {}", offset(&self.zone, *at)),
+                    Times::Clock if is_inside => {
+                        local.split_once(' ').map_or(local.clone(), |(_, clock)| clock.to_owned())
+                    }
+                    Times::Clock | Times::Date if self.zone.to_offset(*at) == self.zone.to_offset(self.until) => local,
+                    Times::Clock | Times::Date | Times::Offset => format!("{local} {}", offset(&self.zone, *at)),
                 }
             }
         }
     }
 
+    /// Which time is meant: all offsets of its period.
+    pub fn times_line(&self) -> String {
+        let offset = offsets(&self.zone, self.from, self.until).join(", ");
+        plain(&t!("times are local, {offset}", offset))
+    }
+
     /// The value of a fact as people read it: a time has its date.
     pub fn fact(&self, cell: &Cell) -> String {
         match (cell, self.times) {
-            (Cell::Time(at), Times::Clock) => local(&self.zone, *at, ColumnKind::Time),
+            (Cell::Time(at), Times::Clock) if self.from <= *at && *at <= self.until => {
+                local(&self.zone, *at, ColumnKind::Time)
+            }
             _ => self.words(cell, cell.kind()),
         }
     }
@@ -218,6 +232,18 @@ pub fn local(zone: &TimeZone, at: Timestamp, kind: ColumnKind) -> String {
 /// `UTC+07:00`: a spreadsheet would take `+07:00` for a formula.
 pub fn offset(zone: &TimeZone, at: Timestamp) -> String {
     at.to_zoned(zone.clone()).strftime("UTC%:z").to_string()
+}
+
+/// The offsets of a period, each once, in the order in which they begin.
+fn offsets(zone: &TimeZone, from: Timestamp, until: Timestamp) -> Vec<String> {
+    let changes = zone.following(from).map(|change| change.timestamp()).take_while(|at| *at < until);
+    let mut offsets: Vec<String> = Vec::new();
+    for offset in std::iter::once(from).chain(changes).map(|at| offset(zone, at)) {
+        if !offsets.contains(&offset) {
+            offsets.push(offset);
+        }
+    }
+    offsets
 }
 
 impl Column {

@@ -12,10 +12,10 @@ use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
 use super::{
     ReportFormat, Style,
-    document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
+    document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table},
     drawing::{Drawing, escaped},
 };
-use crate::{plant::def::Paper, t};
+use crate::plant::def::Paper;
 
 /// The format `docx`.
 #[derive(Debug)]
@@ -64,7 +64,7 @@ impl Body {
         }
         body.paragraph("Title", &document.title);
         body.paragraph("", &document.heading);
-        body.paragraph("", &plain(&t!("times are local, {offset}", offset = offset(&document.zone, document.until))));
+        body.paragraph("", &document.times_line());
         document.sections.iter().for_each(|section| body.section(document, section));
         body
     }

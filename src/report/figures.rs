@@ -1,7 +1,7 @@
 //! The figures of a period: from stored samples and alarm events to the rows of a report.
 
 use std::{
-    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
+    collections::{BTreeMap, HashMap, HashSet},
     time::Duration,
 };
 
@@ -17,7 +17,7 @@ use crate::plant::{
     def::{Condition, PlantDef, TagId},
     exact::Exact,
     record::{AlarmEvent, AlarmRecord},
-    sample::Sample,
+    sample::{Cause, Quality, Sample},
     tag::{Decimals, TagDef},
     time::elapsed,
 };
@@ -65,9 +65,9 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Over `from..until`; nothing has come yet.
-    pub fn new(from: Timestamp, until: Timestamp) -> Figures {
-        Figures { seconds: until.duration_since(from).as_secs_f64(), first: None, stats: None }
+    /// Over so many seconds; nothing has come yet.
+    pub fn new(seconds: f64) -> Figures {
+        Figures { seconds, first: None, stats: None }
     }
 
     /// The next stretch, by its first value and its figures.
@@ -110,6 +110,91 @@ impl Figures {
     }
 }
 
+/// The events of alarms in a part of a period in which no clock was set back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EventLeg {
+    /// From, inclusive.
+    pub from: Timestamp,
+    /// To, exclusive.
+    pub until: Timestamp,
+    /// The raising events of the alarms that were active at its begin.
+    pub active: Vec<AlarmRecord>,
+    /// Of those, which were annunciated then.
+    pub standing: Vec<AlarmRecord>,
+    /// The events in it, in order.
+    pub events: Vec<AlarmRecord>,
+}
+
+impl EventLeg {
+    /// The raising events, and those in it.
+    pub fn all(&self) -> impl Iterator<Item = &AlarmRecord> {
+        self.active.iter().chain(&self.events)
+    }
+}
+
+/// How long an alarm of each subject was active.
+pub fn times_in_alarm(legs: &[EventLeg]) -> HashMap<&str, Duration> {
+    let mut times: HashMap<&str, Duration> = HashMap::new();
+    for leg in legs {
+        let mut by_subject: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
+        leg.all().for_each(|event| by_subject.entry(&event.subject).or_default().push(event));
+        for (subject, events) in by_subject {
+            *times.entry(subject).or_default() += time_in_alarm(events.into_iter(), leg.from, leg.until);
+        }
+    }
+    times
+}
+
+/// The alarms that were active while they were not annunciated, of all parts of a period.
+pub fn suppressed_in(legs: &[EventLeg]) -> Vec<SuppressedSummary> {
+    let mut all: Vec<SuppressedSummary> = Vec::new();
+    for EventLeg { from, until, active, standing, events } in legs {
+        for found in suppressed(active, standing, events, *from, *until) {
+            let is_same =
+                |other: &&mut SuppressedSummary| (&other.subject, &other.message) == (&found.subject, &found.message);
+            match all.iter_mut().find(is_same) {
+                Some(same) => (same.raised, same.active) = (same.raised + found.raised, same.active + found.active),
+                None => all.push(found),
+            }
+        }
+    }
+    all.sort_by(|one, other| (&one.subject, &one.message).cmp(&(&other.subject, &other.message)));
+    all
+}
+
+/// Since when a tag has had no value because its device did not answer, by its samples in order; and why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Trace(Option<(Timestamp, Cause)>);
+
+impl Trace {
+    /// The next sample.
+    pub fn next(&mut self, sample: Sample) {
+        self.0 = match (sample.quality, self.0) {
+            // Requests fail before a device counts as silent.
+            (Quality::Bad(cause), since) if cause.is_of_connection() => {
+                let telling = since.map(|(_, cause)| cause).filter(|cause| *cause == Cause::NotConnected);
+                Some((since.map_or(sample.at, |(since, _)| since), telling.unwrap_or(cause)))
+            }
+            (Quality::Good | Quality::Uncertain(_) | Quality::Bad(_), _) => None,
+        };
+    }
+}
+
+impl Outage {
+    /// As its tags show it: from when on none of them has had a value, not before an instant; and whether the line was lost.
+    pub fn traced(self, traces: &[Trace], not_before: Timestamp) -> Outage {
+        let known: Option<Vec<(Timestamp, Cause)>> = traces.iter().map(|trace| trace.0).collect();
+        let Some((since, cause)) = known.into_iter().flatten().max_by_key(|(since, _)| *since) else { return self };
+        let why = if cause == Cause::NotConnected { cause.word().to_owned() } else { self.why };
+        Outage { from: since.max(not_before).min(self.from), why, ..self }
+    }
+}
+
+/// Why there are no values of a station.
+pub const NOT_RUNNING: &str = "not running";
+/// The same, where it ran, but its clock was set over a time.
+pub const CLOCK_SET_FORWARD: &str = "clock set forward";
+
 /// The times in which alarms say that a device does not answer, in order of their begins. `events` begin with those of the alarms that
 /// were active at `from`; what has not ended lasts until `until`.
 pub fn not_responding<'a>(
@@ -119,8 +204,8 @@ pub fn not_responding<'a>(
     until: Timestamp,
 ) -> Vec<Outage> {
     let of_devices = def.alarms.iter().filter(|alarm| alarm.condition == Condition::NotResponding);
-    let known: HashSet<(&str, &str)> =
-        of_devices.map(|alarm| (subject_name(def, alarm.subject), alarm.message.as_str())).collect();
+    let known: HashMap<(&str, &str), Duration> =
+        of_devices.map(|alarm| ((subject_name(def, alarm.subject), alarm.message.as_str()), alarm.on_delay)).collect();
     let mut open: BTreeMap<(&str, &str), Timestamp> = BTreeMap::new();
     let mut outages = Vec::new();
     let outage = |(what, why): (&str, &str), begun: Timestamp, ended: Timestamp| Outage {
@@ -130,10 +215,11 @@ pub fn not_responding<'a>(
         why: why.to_owned(),
     };
     for event in events {
-        let Some(name) = known.get(&(&*event.subject, &*event.message)).copied() else { continue };
+        let Some((&name, _)) = known.get_key_value(&(&*event.subject, &*event.message)) else { continue };
         match event.event {
             AlarmEvent::Raised | AlarmEvent::RaisedSuppressed => {
-                open.entry(name).or_insert(event.at.max(from));
+                let begun = event.at.checked_sub(known[&name]).unwrap_or(event.at);
+                open.entry(name).or_insert(begun.max(from));
             }
             AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
                 outages.extend(open.remove(&name).map(|begun| outage(name, begun, event.at)));
@@ -153,22 +239,6 @@ pub fn not_responding<'a>(
     }
     outages.extend(open.into_iter().map(|(name, begun)| outage(name, begun, until)));
     outages.retain(|outage| outage.from < outage.to);
-    outages
-}
-
-/// The times in which no station ran: 10-minute windows, counted from 1970, in which nothing is stored.
-pub fn not_running(watched: &BTreeSet<i64>, from: Timestamp, until: Timestamp) -> Vec<Outage> {
-    const WINDOW: i64 = 600_000_000;
-    let (first, last) = (from.as_microsecond().div_euclid(WINDOW), (until.as_microsecond() - 1).div_euclid(WINDOW));
-    let mut outages: Vec<Outage> = Vec::new();
-    for window in (first..=last).filter(|window| !watched.contains(window)) {
-        let instant = |window: i64| Timestamp::from_microsecond(window * WINDOW).unwrap_or(from).clamp(from, until);
-        let (begun, ended) = (instant(window), instant(window + 1));
-        match outages.last_mut().filter(|outage| outage.to == begun) {
-            Some(outage) => outage.to = ended,
-            None => outages.push(Outage { from: begun, to: ended, what: None, why: String::new() }),
-        }
-    }
     outages
 }
 

@@ -4,10 +4,9 @@ use std::fmt::Write;
 
 use super::{
     ReportFormat, Style,
-    document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table, offset},
+    document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table},
     drawing::escaped,
 };
-use crate::t;
 
 /// Width of a chart in pixels; a narrow window shrinks it.
 const CHART: u16 = 720;
@@ -47,7 +46,7 @@ impl ReportFormat for Html {
 fn page(document: &Document) -> String {
     let (title, heading) = (escaped(&document.title), escaped(&document.heading));
     let language = document.locale.language.code();
-    let times = t!("times are local, {offset}", offset = offset(&document.zone, document.until));
+    let times = document.times_line();
     let mut page = format!(
         "<!DOCTYPE html>\n<html lang=\"{language}\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\

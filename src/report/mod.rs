@@ -7,6 +7,7 @@ pub mod step_series;
 pub(crate) mod figures;
 pub mod batch;
 pub mod counters;
+pub mod coarse;
 pub mod control_runs;
 pub mod procedures;
 pub(crate) mod alarm_metrics;
@@ -280,6 +281,8 @@ pub struct ShiftReport {
     pub runs: Vec<RunFigures>,
     /// When devices did not answer, and when no station ran.
     pub outages: Vec<Outage>,
+    /// Where samples are not kept any more.
+    pub coarse: Vec<coarse::Coarse>,
     /// The curves of trend groups.
     pub charts: Vec<Chart>,
     /// The batches that ran in the period, newest first.

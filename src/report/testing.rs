@@ -131,7 +131,8 @@ pub fn tag(id: u16, short: &str) -> TagDef {
 
 /// The figures of samples, which come in order of time.
 pub fn figures_of(samples: impl Iterator<Item = Sample>, from: Timestamp, until: Timestamp) -> Figures {
-    let (mut figures, mut steps) = (Figures::new(from, until), StepSeries::new(from, until));
+    let (mut figures, mut steps) =
+        (Figures::new(until.duration_since(from).as_secs_f64()), StepSeries::new(from, until));
     let held: Vec<_> = samples.filter_map(|sample| steps.next(sample)).collect();
     held.into_iter().chain(steps.end()).for_each(|held| figures.add(held.value, held.into()));
     figures
@@ -216,6 +217,7 @@ pub fn shift_report() -> ShiftReport {
             what: Some("PLC-1".into()),
             why: "not responding".into(),
         }],
+        coarse: Vec::new(),
         charts: vec![Chart {
             title: "TIC-1".into(),
             from,

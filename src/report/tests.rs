@@ -3,7 +3,7 @@
 use super::{
     FORMATS, ReportFormat, Style, TagFigures,
     content::document,
-    document::{Cell, Content},
+    document::{Cell, Content, Document},
     testing::{THREE, plant, shift_report},
     text::mean_or_difference,
 };
@@ -138,4 +138,85 @@ fn a_record_that_no_plant_file_asks_for_is_refused() {
     let made = document(&shift_report(), &def, Locale::ENGLISH);
     let refused = super::format("record").and_then(|format| format.render(&made, &Style::of(&def)));
     assert!(refused.as_ref().is_err_and(|why| why.contains("[report] record")), "{refused:?}");
+}
+
+#[test]
+fn a_period_names_every_offset_that_its_clocks_have_had() {
+    use super::{
+        document::Times,
+        testing::{at, zone},
+    };
+    let berlin = zone("Europe/Berlin");
+    let times = |from: &str, until: &str| Times::of(&berlin, at(from), at(until));
+    assert_eq!(times("2026-01-01T00:00Z", "2026-07-01T00:00Z"), Times::Offset);
+    // Over two changes it ends with the offset that it began with.
+    assert_eq!(times("2026-01-01T00:00Z", "2027-01-01T00:00Z"), Times::Offset);
+    assert_eq!(times("2026-10-25T01:00Z", "2026-10-25T09:00Z"), Times::Clock, "from the change on");
+    assert_eq!(times("2026-11-01T00:00Z", "2026-11-20T00:00Z"), Times::Date);
+    let made = document(&shift_report(), &plant("Asia/Bangkok", &THREE), Locale::ENGLISH);
+    let spring = Document { from: at("2026-03-01T00:00Z"), until: at("2026-04-01T00:00Z"), zone: berlin, ..made };
+    assert_eq!(spring.times_line(), "times are local, UTC+01:00, UTC+02:00");
+}
+
+#[test]
+fn what_lies_outside_of_the_period_has_its_date_and_offset() {
+    use super::{document::ColumnKind, testing::at};
+    let made = document(&shift_report(), &plant("Asia/Bangkok", &THREE), Locale::ENGLISH);
+    let words = |made: &Document, time: &str| made.words(&Cell::Time(at(time)), ColumnKind::Time);
+    assert_eq!(words(&made, "2026-11-20T00:12:45+07"), "2026-11-20 00:12:45");
+    assert_eq!(words(&made, "2026-11-21T06:12:45+07"), "06:12:45");
+    assert_eq!(words(&made, "2026-11-22T06:12:45+07"), "2026-11-22 06:12:45");
+    let berlin = Document { zone: super::testing::zone("Europe/Berlin"), ..made };
+    assert_eq!(words(&berlin, "2026-07-01T00:00Z"), "2026-07-01 02:00:00 UTC+02:00");
+    assert_eq!(berlin.fact(&Cell::Time(at("2026-07-01T00:00Z"))), "2026-07-01 02:00:00 UTC+02:00");
+}
+
+/// The numbers of a column of a sheet, from the second row on.
+fn column(sheet: &str, letter: char) -> Vec<f64> {
+    let cells = (2..).map_while(|row| sheet.split_once(&format!("<c r=\"{letter}{row}\"")));
+    cells
+        .map(|(_, rest)| rest.split_once("<v>").and_then(|(_, value)| value.split_once("</v>")?.0.parse().ok()))
+        .map(|value| value.expect("a number"))
+        .collect()
+}
+
+#[test]
+fn a_chart_over_a_change_of_the_clocks_runs_forward() {
+    use std::io::Read;
+
+    use super::{
+        chart::{Chart, ChartCurve},
+        curve::Bucket,
+        document::{Section as Titled, Times},
+        testing::{at, zone},
+    };
+    let made = document(&shift_report(), &plant("Asia/Bangkok", &THREE), Locale::ENGLISH);
+    let (from, to) = (at("2026-10-24T22:00Z"), at("2026-10-25T04:00Z"));
+    let bucket = |min: f64, max: f64| Some(Bucket { min, max, mean: 20.0, last: 20.0.into() });
+    let columns = (0..12).map(|n| bucket(f64::from(n), if n == 5 { 99.0 } else { 30.0 })).collect();
+    let (name, unit) = ("TIC-1.PV".to_owned(), "°C".to_owned());
+    let curve = ChartCurve { name, unit, decimals: 1, from, step: 1_800.0, columns };
+    let chart = Chart { title: "TIC-1".into(), from, to, curves: vec![curve] };
+    let section = Titled { kind: Section::Curves, title: "Curves".into(), content: Content::Charts(vec![chart]) };
+    let berlin = zone("Europe/Berlin");
+    let times = Times::of(&berlin, from, to);
+    let night = Document { from, until: to, times, zone: berlin, sections: vec![section], ..made };
+    let def = plant("Europe/Berlin", &THREE);
+    let bytes = super::format("xlsx").expect("a format").render(&night, &Style::of(&def)).expect("it can be made");
+    let mut book = zip::ZipArchive::new(std::io::Cursor::new(bytes)).expect("a workbook");
+    let mut part = |name: &str| {
+        let mut text = String::new();
+        book.by_name(name).expect("a part").read_to_string(&mut text).expect("text");
+        text
+    };
+    let sheet = part("xl/worksheets/sheet2.xml");
+    let instants = column(&sheet, 'A');
+    assert!(instants.len() == 12 && instants.is_sorted_by(|one, other| one < other), "{instants:?}");
+    assert_eq!(column(&sheet, 'B'), (0..12).map(f64::from).collect::<Vec<_>>());
+    assert_eq!((column(&sheet, 'C')[5], column(&sheet, 'C')[6]), (99.0, 30.0));
+    let words = part("xl/sharedStrings.xml");
+    for heading in ["time UTC+02:00", "TIC-1.PV °C min", "TIC-1.PV °C max"] {
+        assert!(words.contains(heading), "{heading}: {words}");
+    }
+    assert_eq!(part("xl/charts/chart1.xml").matches("<c:ser>").count(), 2);
 }

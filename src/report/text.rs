@@ -4,12 +4,9 @@ use unicode_width::UnicodeWidthStr;
 
 use super::{
     ReportFormat, Style, TagFigures,
-    document::{Cell, ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
+    document::{Cell, ColumnKind, Content, Document, Fact, Section, Table},
 };
-use crate::{
-    plant::{exact::Exact, number::digits},
-    t,
-};
+use crate::plant::{exact::Exact, number::digits};
 
 /// Columns of a page.
 const WIDTH: usize = 80;
@@ -44,8 +41,7 @@ pub fn lines(document: &Document, width: usize) -> Vec<String> {
         lines.extend((!document.logo.is_empty()).then(|| document.logo.clone()));
         lines.push(document.title.clone());
         lines.push(document.heading.clone());
-        let words = t!("times are local, {offset}", offset = offset(&document.zone, document.until));
-        lines.push(plain(&words));
+        lines.push(document.times_line());
         for section in &document.sections {
             section_lines(document, section, width, &mut lines);
         }

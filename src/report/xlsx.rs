@@ -2,13 +2,14 @@
 
 use jiff::{Timestamp, tz::TimeZone};
 use rust_xlsxwriter::{
-    Chart, ChartEmptyCells, ChartType, DocProperties, ExcelDateTime, Format, FormatAlign, FormatBorder, Workbook,
-    Worksheet, XlsxError,
+    Chart, ChartEmptyCells, ChartLine, ChartType, DocProperties, ExcelDateTime, Format, FormatAlign, FormatBorder,
+    Workbook, Worksheet, XlsxError,
 };
 
 use super::{
     ReportFormat, Style, chart,
-    document::{Cell, ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
+    curve::Bucket,
+    document::{Cell, ColumnKind, Content, Document, Fact, Section, Table, Times, offset, plain},
 };
 use crate::{
     plant::{
@@ -42,6 +43,12 @@ impl ReportFormat for Xlsx {
 /// Letters of the name of a sheet at most, and what it may not contain.
 const NAME_MAX: usize = 31;
 const NAME_WITHOUT: [char; 7] = ['[', ']', ':', '*', '?', '/', '\\'];
+
+/// The least, or the greatest, value of a column of a curve.
+type Edge = fn(&Bucket) -> f64;
+
+/// Of curves, each with its two edges.
+const COLOURS: [&str; 6] = ["1F77B4", "D62728", "2CA02C", "9467BD", "FF7F0E", "17BECF"];
 
 fn workbook(document: &Document, style: &Style) -> Result<Vec<u8>, XlsxError> {
     let mut book = Workbook::new();
@@ -80,8 +87,8 @@ fn facts(book: &mut Workbook, document: &Document) -> Result<(), XlsxError> {
     named(sheet, title)?.set_column_width(0, 30)?.set_column_width(1, 40)?;
     let title = Format::new().set_bold().set_font_size(14);
     let mut row = 0;
-    let times = t!("times are local, {offset}", offset = offset(&document.zone, document.until));
-    let lines = [document.logo.as_str(), &document.title, &document.heading, &plain(&times)];
+    let times = document.times_line();
+    let lines = [document.logo.as_str(), &document.title, &document.heading, &times];
     for line in lines.into_iter().filter(|line| !line.is_empty()) {
         let format = if line == document.title { title.clone() } else { Format::new() };
         sheet.write_string_with_format(row, 0, line, &format)?;
@@ -187,48 +194,54 @@ fn date_time(zone: &TimeZone, at: Timestamp) -> Result<ExcelDateTime, XlsxError>
     )
 }
 
-/// The values of all charts, side by side, and the charts over them.
+/// The least and the greatest values of all charts, side by side, and the charts over them. A sheet has no zones: the times of a
+/// chart have the offset of its begin, so that they run forward over a change of the clocks.
 fn curves(book: &mut Workbook, document: &Document, title: &str, charts: &[chart::Chart]) -> Result<(), XlsxError> {
     let sheet = named(book.add_worksheet(), title)?;
     let name = sheet.name();
-    let mut first = 0;
-    let mut top = 1;
-    let beside: u16 = charts.iter().map(|chart| to_u16(chart.curves.len()) + 2).sum();
+    let width = |chart: &chart::Chart| 2 * to_u16(chart.curves.len()) + 2;
+    let (mut first, mut top, beside) = (0, 1, charts.iter().map(width).sum());
     for chart in charts {
-        let rows = chart.curves.iter().map(|curve| curve.columns.len()).max().unwrap_or(0);
-        sheet.write_string_with_format(0, first, plain(t!("time")), &head())?;
-        sheet.set_column_width(first, 20)?;
         let Some(begin) = chart.curves.first() else { continue };
+        let zone = document.zone.to_offset(begin.from).to_time_zone();
+        let mut heading = plain(t!("time"));
+        if document.times == Times::Offset {
+            heading = format!("{heading} {}", offset(&zone, begin.from));
+        }
+        sheet.write_string_with_format(0, first, heading, &head())?.set_column_width(first, 20)?;
+        let rows = chart.curves.iter().map(|curve| curve.columns.len()).max().unwrap_or(0);
         for row in 0..rows {
             let after = jiff::SignedDuration::from_secs_f64(begin.step * row as f64);
             let at = begin.from.checked_add(after).unwrap_or(begin.from);
-            write(sheet, (to_u32(row + 1), first), &Cell::Time(at), ColumnKind::Time, &document.zone)?;
+            write(sheet, (to_u32(row + 1), first), &Cell::Time(at), ColumnKind::Time, &zone)?;
         }
         let mut drawn = Chart::new(ChartType::ScatterStraight);
         drawn.title().set_name(&chart.title);
-        drawn.x_axis().set_num_format(if chart.to.duration_since(chart.from).as_hours() > 36 {
-            "mm-dd"
-        } else {
-            "hh:mm"
-        });
+        let is_long = chart.to.duration_since(chart.from).as_hours() > 36;
+        drawn.x_axis().set_num_format(if is_long { "mm-dd" } else { "hh:mm" });
         drawn.show_empty_cells_as(ChartEmptyCells::Gaps).set_width(900).set_height(360);
-        for (place, curve) in (first + 1..).zip(&chart.curves) {
-            let heading = format!("{} {}", curve.name, curve.unit);
-            sheet.write_string_with_format(0, place, heading.trim(), &head())?;
-            for (row, bucket) in (1..).zip(&curve.columns) {
-                let mean = Cell::number(bucket.map(|bucket| bucket.mean), curve.decimals.saturating_add(1));
-                write(sheet, (row, place), &mean, ColumnKind::Number, &document.zone)?;
+        for (number, curve) in (0..).zip(&chart.curves) {
+            let edges: [(&str, Edge); 2] = [(t!("min"), |of| of.min), (t!("max"), |of| of.max)];
+            for (place, (word, edge)) in (first + 1 + 2 * number..).zip(edges) {
+                let heading = [curve.name.as_str(), &curve.unit, &plain(word)].join(" ").replace("  ", " ");
+                sheet.write_string_with_format(0, place, heading, &head())?;
+                for (row, bucket) in (1..).zip(&curve.columns) {
+                    let value = Cell::number(bucket.as_ref().map(edge), curve.decimals);
+                    write(sheet, (row, place), &value, ColumnKind::Number, &zone)?;
+                }
+                drawn
+                    .add_series()
+                    .set_name((name.as_str(), 0, place))
+                    .set_categories((name.as_str(), 1, first, to_u32(rows), first))
+                    .set_values((name.as_str(), 1, place, to_u32(rows), place))
+                    .set_format(
+                        ChartLine::new().set_color(COLOURS[usize::from(number) % COLOURS.len()]).set_width(1.0),
+                    );
             }
-            let last = to_u32(rows);
-            drawn
-                .add_series()
-                .set_name((name.as_str(), 0, place))
-                .set_categories((name.as_str(), 1, first, last, first))
-                .set_values((name.as_str(), 1, place, last, place));
         }
         sheet.insert_chart(top, beside, &drawn)?;
         top += 20;
-        first += to_u16(chart.curves.len()) + 2;
+        first += width(chart);
     }
     sheet.set_freeze_panes(1, 0)?;
     Ok(())

@@ -158,12 +158,12 @@ impl Place {
     fn stored(&self) -> BTreeSet<Row> {
         let def = Arc::new(profile::load(&self.path("tank.toml"), &Search::shipped()).unwrap());
         let store = Store::open_read_only(&self.path("tank.duckdb"), &def).unwrap();
-        let query = Query::Samples { from: Timestamp::UNIX_EPOCH, to: Timestamp::now() };
+        let query = Query::Samples { epoch: None, from: Timestamp::UNIX_EPOCH, to: Timestamp::now() };
         let Answer::Samples(samples) = store.answer(&query, Timestamp::now()).unwrap() else { panic!("other answer") };
         let row = |(tag, sample): (_, sightglass::plant::sample::Sample)| {
             (def.tag(tag).name.clone(), sample.at, sample.value.map(|value| value.to_string()))
         };
-        samples.into_iter().map(row).collect()
+        samples.samples.into_iter().map(row).collect()
     }
 }
 

@@ -180,7 +180,7 @@ fn a_history_of_an_older_version_is_read_after_one_start() {
     // The last migrations only add tables, and columns.
     let old = duckdb::Connection::open(&path).unwrap();
     old.execute_batch(
-        "DROP TABLE archive; DROP TABLE watched; DROP TABLE deleted; DROP TABLE import; DROP TABLE batch; DROP TABLE report;
+        "DROP TABLE archive; DROP TABLE recorded; DROP TABLE deleted; DROP TABLE import; DROP TABLE batch; DROP TABLE report;
          DROP TABLE control_run; ALTER TABLE sample DROP COLUMN rest; ALTER TABLE alarm_journal DROP COLUMN value_rest;
          DELETE FROM schema_version WHERE version > 8; CHECKPOINT",
     )
@@ -192,7 +192,7 @@ fn a_history_of_an_older_version_is_read_after_one_start() {
     for (command, args) in commands {
         let (code, out, err) = run(command, &path, &[&period[..], args].concat());
         assert_eq!((code, &*out), (Some(1), ""), "{command}: {err}");
-        assert!(err.contains("older version of sightglass (schema 8, this one reads 15)"), "{command}: {err}");
+        assert!(err.contains("older version of sightglass (schema 8, this one reads 16)"), "{command}: {err}");
         assert!(err.contains(&start), "{command}: {err}");
     }
     let started = ["--for", "1s", "--port", "L1=/dev/none"];

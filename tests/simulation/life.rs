@@ -212,12 +212,12 @@ impl Life {
             wrong(format!("history: actions differ from the log: too often {more:?}, missing {less:?}"));
         }
         for (until, count) in self.facts.stored.iter().filter(|_| !is_damaged) {
-            let query = Query::Samples { from: Timestamp::UNIX_EPOCH, to: *until };
+            let query = Query::Samples { epoch: None, from: Timestamp::UNIX_EPOCH, to: *until };
             let Ok(Answer::Samples(samples)) = store.answer(&query, Timestamp::now()) else {
                 return wrong("history: no samples");
             };
-            if samples.len() < *count {
-                wrong(format!("samples: {} before {until}, there were {count}", samples.len()));
+            if samples.samples.len() < *count {
+                wrong(format!("samples: {} before {until}, there were {count}", samples.samples.len()));
             }
         }
     }
@@ -247,8 +247,8 @@ async fn ask(session: &Session, query: Query) -> Option<Answer> {
 }
 
 async fn samples(session: &Session, until: Timestamp) -> Option<usize> {
-    match ask(session, Query::Samples { from: Timestamp::UNIX_EPOCH, to: until }).await? {
-        Answer::Samples(samples) => Some(samples.len()),
+    match ask(session, Query::Samples { epoch: None, from: Timestamp::UNIX_EPOCH, to: until }).await? {
+        Answer::Samples(samples) => Some(samples.samples.len()),
         _ => None,
     }
 }

@@ -37,7 +37,7 @@ pub async fn ask(stored: &StoredPlant, def: &Arc<PlantDef>) -> Result<Overview, 
 
 /// One fact a line.
 fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
-    let Overview { database, database_bytes, samples, extent, folder, files, imports, .. } = overview;
+    let Overview { database, database_bytes, samples, extent, pauses, folder, files, imports, .. } = overview;
     let time = |at: Timestamp| local(at, def);
     let stored =
         extent.map_or_else(|| "nothing yet".to_owned(), |(from, to)| format!("{} to {}", time(from), time(to)));
@@ -69,14 +69,9 @@ fn in_words(overview: &Overview, def: &PlantDef) -> Vec<String> {
         format!("imported  {from} to {to}: {} rows of {}, on {at}", import.rows, import.file)
     }));
     lines.extend(of_room(overview, &time));
-    for pair in files.iter().filter(|file| file.tier == Tier::Raw).collect::<Vec<_>>().windows(2) {
-        if pair[0].to < pair[1].from
-            && let (Ok(from), Ok(to)) =
-                (Timestamp::from_microsecond(pair[0].to), Timestamp::from_microsecond(pair[1].from))
-        {
-            lines.push(format!("gap       {} to {}: nothing was stored", time(from), time(to)));
-        }
-    }
+    lines.extend(
+        pauses.iter().map(|(from, to)| format!("off       {} to {}: no station recorded", time(*from), time(*to))),
+    );
     lines
 }
 

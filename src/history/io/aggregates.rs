@@ -21,7 +21,7 @@ use super::{
 use crate::{
     history::{
         ArchiveFile, HistoryError,
-        tiers::{Aggregate, CurvePart, HOUR, Piece, Tier, pieces},
+        tiers::{Aggregate, CurvePart, HOUR, Piece, Tier, floor, pieces},
     },
     plant::{def::TagId, exact::Exact},
     report::{
@@ -56,26 +56,25 @@ impl Store {
         Ok(gaps)
     }
 
-    /// What answers for a span, in pieces in order of time.
+    /// What answers for a span, in pieces in order of time. A row of aggregates has no order in it: where the clock was set back
+    /// the samples answer, for as long as they are kept.
     pub(super) fn pieces(&self, span: Range<i64>, widest: Tier) -> Result<Vec<Piece>, HistoryError> {
         let avoided = self.avoided.borrow().clone();
         let files = self.files(None)?;
-        let end = files.iter().map(|file| file.to).max().unwrap_or(span.start);
-        let late = self.late(&(span.start..span.end.min(end)))?;
-        Ok(pieces(span.start, span.end, widest, &|tier| kept(&files, tier, &avoided, &late)))
+        let end = files.iter().map(|file| file.to).max().unwrap_or(span.start).min(span.end);
+        let deleted = self.deleted_until(Tier::Raw)?.map_or(i64::MIN, Timestamp::as_microsecond);
+        let doubled = self.doubled()?.into_iter().map(|doubled| doubled.span).filter(|span| deleted <= span.start);
+        let apart = doubled.map(|span| floor(span.start, HOUR)..floor(span.end + HOUR - 1, HOUR));
+        let apart: Vec<Range<i64>> = apart.chain(self.late(deleted.max(span.start - HOUR)..end)?).collect();
+        Ok(pieces(span.start, span.end, widest, &|tier| without(kept(&files, tier, &avoided), &apart)))
     }
 
-    /// The hours before the end of a span that came late, by an import or after a clock that was set back, and what was
-    /// formed of them still lacks, and the hour after each, which begins with its values. Of what was deleted that is all.
-    fn late(&self, span: &Range<i64>) -> Result<Vec<i64>, HistoryError> {
-        let since = self.deleted_until(Tier::Raw)?.map_or(i64::MIN, Timestamp::as_microsecond).max(span.start - HOUR);
-        let hours: Vec<i64> = match (instant(since), instant(span.end)) {
-            (Some(since), Some(end)) => {
-                self.list(sql::HOURS_IN_TABLE, params![utc(since), utc(end)], |row| row.get(0))?
-            }
-            _ => Vec::new(),
-        };
-        Ok(hours.into_iter().flat_map(|hour| [hour * HOUR, (hour + 1) * HOUR]).collect())
+    /// The hours of a span that came late, by an import or after a clock that was set back, and what was formed of them still
+    /// lacks, each with the next one, which begins with its values.
+    fn late(&self, span: Range<i64>) -> Result<Vec<Range<i64>>, HistoryError> {
+        let (Some(since), Some(end)) = (instant(span.start), instant(span.end)) else { return Ok(Vec::new()) };
+        let hours: Vec<i64> = self.list(sql::HOURS_IN_TABLE, params![utc(since), utc(end)], |row| row.get(0))?;
+        Ok(hours.into_iter().map(|hour| hour * HOUR..(hour + 2) * HOUR).collect())
     }
 
     /// The same as [`Store::each_part`], all of one tier.
@@ -88,6 +87,19 @@ impl Store {
     ) -> Result<Vec<Gap>, HistoryError> {
         if tier != Tier::Raw {
             self.each_aggregate(tags, tier, (from, to), &mut each)?;
+            return Ok(Vec::new());
+        }
+        let finest = self.finest(from)?;
+        if let Some(step) = finest.step() {
+            // An edge within a minute or an hour of which no samples are kept has its share of it.
+            let (begin, end) = (from.as_microsecond(), to.as_microsecond());
+            let whole = (instant(floor(begin, step)), instant(floor(end + step - 1, step)));
+            let (Some(whole_from), Some(whole_to)) = whole else { return Ok(Vec::new()) };
+            self.each_aggregate(tags, finest, (whole_from, whole_to), &mut |place, part| {
+                if let CurvePart::Aggregate(row) = part {
+                    each(place, CurvePart::Aggregate(row.share(begin..end, step)));
+                }
+            })?;
             return Ok(Vec::new());
         }
         let mut steps = vec![StepSeries::new(from, to); tags.len()];
@@ -168,8 +180,8 @@ impl Store {
     }
 }
 
-/// The spans that the files of a tier cover, sorted; without those that could not be read, and without some hours, sorted.
-fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>, without: &[i64]) -> Vec<Range<i64>> {
+/// The spans that the files of a tier cover, sorted; without those that could not be read.
+fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>) -> Vec<Range<i64>> {
     let files = files.iter().filter(|file| file.tier == tier && !avoided.contains(&file.path));
     let mut spans: Vec<Range<i64>> = Vec::new();
     for file in files {
@@ -178,17 +190,19 @@ fn kept(files: &[ArchiveFile], tier: Tier, avoided: &BTreeSet<String>, without: 
             None => spans.push(file.from..file.to),
         }
     }
-    let cut = |span: Range<i64>| {
-        let ends = without.iter().filter(|hour| (span.start - HOUR..span.end).contains(*hour));
-        let (mut parts, mut next) = (Vec::new(), span.start);
-        for hour in ends {
-            parts.push(next..*hour);
-            next = next.max(hour + HOUR);
-        }
-        parts.push(next..span.end);
-        parts.into_iter().filter(|part| part.start < part.end)
-    };
-    spans.into_iter().flat_map(cut).collect()
+    spans
+}
+
+/// Spans without what lies in others, in order.
+fn without(mut spans: Vec<Range<i64>>, apart: &[Range<i64>]) -> Vec<Range<i64>> {
+    for apart in apart {
+        let cut = |span: Range<i64>| {
+            let parts = [span.start..span.end.min(apart.start), span.start.max(apart.end)..span.end];
+            parts.into_iter().filter(|part| part.start < part.end)
+        };
+        spans = spans.into_iter().flat_map(cut).collect();
+    }
+    spans
 }
 
 /// Hands over the rows of a batch; `None` if its columns are not those of aggregates.

@@ -1,6 +1,6 @@
 //! How good the alarm system was: the journal, day by day, through the monitor that also measures the running plant.
 
-use std::{collections::BTreeSet, time::Duration};
+use std::time::Duration;
 
 use duckdb::params;
 use jiff::Timestamp;
@@ -11,7 +11,10 @@ use super::{
     store::{Store, engine, instant, utc},
 };
 use crate::{
-    history::HistoryError,
+    history::{
+        HistoryError,
+        recorded::{Epochs, Leg},
+    },
     plant::{
         alarm::{
             AlarmMonitor, PeriodMetrics,
@@ -19,14 +22,11 @@ use crate::{
         },
         record::AlarmRecord,
     },
+    report::figures::EventLeg,
 };
 
 /// The journal in memory at a time.
 const CHUNK: Duration = Duration::from_secs(86_400);
-/// A window of the monitor, in microseconds.
-const WINDOW: i64 = 600_000_000;
-/// Windows that are read one by one: two days.
-const LOOKED_INTO_MAX: i64 = 288;
 /// Alarm events behind the figures of one answer: years of a plant that is run well.
 const EVENTS_MAX: u64 = 2_000_000;
 
@@ -79,56 +79,32 @@ impl Store {
         Ok(Recent { active, events, watched: self.watched(since, now)?.into_iter().collect() })
     }
 
-    /// The windows in which anything was stored. Lines have a row every minute; where there is none, single windows are
-    /// read for samples, and many are read at once.
-    pub(super) fn watched(&self, from: Timestamp, to: Timestamp) -> Result<BTreeSet<i64>, HistoryError> {
-        let span = params![utc(from), utc(to), ROWS_MAX + 1];
-        let list = |sql| self.whole_list(sql, span, |row| row.get::<_, i64>(0));
-        let mut watched: BTreeSet<i64> = list(sql::WATCHED_BY_LINES)?.into_iter().collect();
-        let (first, last) = (from.as_microsecond().div_euclid(WINDOW), (to.as_microsecond() - 1).div_euclid(WINDOW));
-        if last - first - watched.len() as i64 >= LOOKED_INTO_MAX {
-            match list(sql::WATCHED_BY_SAMPLES) {
-                // Then not all at once.
-                Err(error) if error.is_damage() => {}
-                windows => {
-                    watched.extend(windows?);
-                    return Ok(watched);
-                }
-            }
-        }
-        for window in first..=last {
-            if !watched.contains(&window) && self.has_samples(window, from, to)? {
-                watched.insert(window);
-            }
-        }
-        Ok(watched)
-    }
-
-    fn has_samples(&self, window: i64, from: Timestamp, to: Timestamp) -> Result<bool, HistoryError> {
-        let (Some(begin), Some(end)) = (instant(window * WINDOW), instant((window + 1) * WINDOW)) else {
-            return Ok(false);
-        };
-        let params = params![utc(begin.max(from)), utc(end.min(to))];
-        match self.list(sql::ANY_SAMPLE, params, |row| row.get::<_, i32>(0)) {
-            Ok(rows) => Ok(!rows.is_empty()),
-            // What cannot be read was stored all the same.
-            Err(error) if error.is_damage() => Ok(true),
-            Err(error) => Err(error),
-        }
-    }
-
     /// The raising events of the alarms that were active at an instant and not suppressed: a suppressed alarm is not stale.
     pub(super) fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::standing_at(), params![utc(at), ROWS_MAX + 1], alarm)
+        self.whole_list(&sql::standing_at(&Epochs::All.before()), params![utc(at), ROWS_MAX + 1], alarm)
     }
 
-    /// The raising events of the alarms that were active at an instant, also of those that were suppressed.
-    pub(super) fn active_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::active_at(), params![utc(at), ROWS_MAX + 1], alarm)
-    }
-
-    /// The events of alarms in a span, oldest first.
+    /// The events of alarms in a span, in the order in which they were stored.
     pub(super) fn events(&self, from: Timestamp, to: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::journal(sql::OLDEST), params![utc(from), utc(to), ROWS_MAX + 1], alarm)
+        Ok(self.event_legs(from, to)?.into_iter().flat_map(|leg| leg.events).collect())
+    }
+
+    /// The same with what was active before, in parts in order of time: several where the clock was set back.
+    pub(super) fn event_legs(&self, from: Timestamp, to: Timestamp) -> Result<Vec<EventLeg>, HistoryError> {
+        let mut all = Vec::new();
+        for Leg { from, to, epochs, began, ended } in self.legs(from, to)? {
+            let (Some(begin), Some(end)) = (instant(from), instant(to)) else { continue };
+            let from = began.and_then(instant).map_or(begin, |began| began.max(begin));
+            let until = ended.and_then(instant).map_or(end, |ended| ended.min(end));
+            let before = |sql: &str| self.whole_list(sql, params![utc(from), ROWS_MAX + 1], alarm);
+            let mut active = before(&sql::active_at(&epochs.before()))?;
+            let mut standing = before(&sql::standing_at(&epochs.before()))?;
+            // By another setting of the clock.
+            active.iter_mut().chain(&mut standing).for_each(|event| event.at = event.at.min(from));
+            let sql = sql::journal(&epochs.condition(), sql::OLDEST);
+            let events = self.whole_list(&sql, params![utc(begin), utc(end), ROWS_MAX + 1], alarm)?;
+            all.push(EventLeg { from, until, active, standing, events });
+        }
+        Ok(all)
     }
 }

@@ -126,6 +126,7 @@ impl Store {
             samples: self.db.query_row(sql::COUNT_SAMPLES, [], |row| row.get(0)).map_err(engine)?,
             oldest: self.oldest_in_table()?.and_then(instant),
             extent: self.extent(),
+            pauses: self.pauses_in_all(now)?,
             folder: self.archive_folder(),
             disk: files::disk(&self.path),
             rule: self.def.history,

@@ -83,12 +83,14 @@ impl Store {
         let rule = self.def.batches.iter().find(|rule| rule.name == report.batch.name);
         // The clock may have been set back since it began.
         let Some(rule) = rule.filter(|_| from < until) else { return Ok(report) };
-        let (active, events) = (self.active_at(from)?, self.events(from, until)?);
-        report.alarms = Some(events.iter().filter(|event| event.event == AlarmEvent::Raised).count() as u64);
+        let events = self.event_legs(from, until)?;
+        report.alarms =
+            Some(events.iter().flat_map(|leg| &leg.events).filter(|event| event.event == AlarmEvent::Raised).count()
+                as u64);
         let mut tags = rule.tags.clone();
         tags.extend(rule.energy.filter(|energy| !tags.contains(energy)));
         let gathered = self.gather(&tags, std::iter::empty(), (from, until))?;
-        report.tags = gathered.rows(&self.def, &tags, active.iter().chain(&events));
+        report.tags = gathered.rows(&self.def, &tags, &events);
         let energy = rule.energy.map(|energy| self.def.tag(energy).name.as_str());
         let energy = report.tags.iter().find(|figures| Some(figures.tag.as_str()) == energy);
         report.energy = energy.and_then(|figures| batch::energy(figures, elapsed(from, until)));

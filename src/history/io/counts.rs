@@ -50,6 +50,8 @@ pub(super) enum Counts {
 #[derive(Debug, Clone)]
 pub(super) struct CountedTag {
     counts: Counts,
+    /// What is read outside of it, where the clock was set back, is counted there.
+    span: Range<i64>,
     /// In the span.
     pub gain: Exact,
     /// What was not plain counting, by the time when that was known; of a correction with who made it, and why.
@@ -66,12 +68,20 @@ impl CountedTag {
     }
 
     fn new(counts: Counts) -> CountedTag {
-        CountedTag { counts, gain: Exact::default(), steps: Vec::new() }
+        CountedTag { counts, span: i64::MIN..i64::MAX, gain: Exact::default(), steps: Vec::new() }
     }
 
     /// The span begins: what was counted before is not in it.
-    fn begin(&mut self) {
-        (self.gain, self.steps) = (Exact::default(), Vec::new());
+    fn begin(&mut self, span: Range<i64>) {
+        (self.span, self.gain, self.steps) = (span, Exact::default(), Vec::new());
+    }
+
+    /// Books what was counted at an instant.
+    fn book(&mut self, at: i64, gain: Exact, steps: impl IntoIterator<Item = CounterStep>) {
+        if self.span.contains(&at) {
+            self.gain = self.gain + gain;
+            self.steps.extend(steps.into_iter().map(unsaid));
+        }
     }
 
     fn is_known(&self) -> bool {
@@ -98,42 +108,36 @@ impl CountedTag {
     }
 
     fn read(&mut self, value: Exact, at: Timestamp, until: Timestamp) {
-        match &mut self.counts {
+        let (gain, step) = match &mut self.counts {
             Counts::Counter(counter) => {
                 let counted = counter.read(Reading { value, at, until });
-                self.gain = self.gain + counted.gain;
-                self.steps.extend(counted.step.map(unsaid));
+                (counted.gain, counted.step)
             }
-            Counts::Starts(last) => {
-                self.gain = self.gain + last.replace(value).map_or(Exact::default(), |last| rise(last, value));
-            }
-        }
+            Counts::Starts(last) => (last.replace(value).map_or(Exact::default(), |last| rise(last, value)), None),
+        };
+        self.book(at.as_microsecond(), gain, step);
     }
 
     /// A row of a tier; `false` where its readings are needed.
     fn read_row(&mut self, row: &Aggregate, step: i64) -> bool {
-        match &mut self.counts {
+        let gain = match &mut self.counts {
             // How long ago it was read last is known of a whole row only.
-            Counts::Counter(_) if !row.is_whole(step) => false,
-            Counts::Counter(counter) => {
-                let gain = counter.read_plain(&row.summary());
-                self.gain = self.gain + gain.unwrap_or_default();
-                gain.is_some()
-            }
+            Counts::Counter(_) if !row.is_whole(step) => None,
+            Counts::Counter(counter) => counter.read_plain(&row.summary()),
             Counts::Starts(last) => {
                 let first = last.replace(row.stats.last).map_or(Exact::default(), |last| rise(last, row.first));
-                self.gain = self.gain + first + row.gain;
-                true
+                Some(first + row.gain)
             }
-        }
+        };
+        self.book(row.at, gain.unwrap_or_default(), None);
+        gain.is_some()
     }
 
     /// A row of which no readings are kept.
     fn read_kept(&mut self, row: &Aggregate) {
         if let Counts::Counter(counter) = &mut self.counts {
             let (gain, steps) = counter.read_rows(&row.summary());
-            self.gain = self.gain + gain;
-            self.steps.extend(steps.into_iter().map(unsaid));
+            self.book(row.at, gain, steps);
         }
     }
 
@@ -156,7 +160,12 @@ impl Store {
         mut tags: Vec<(TagId, CountedTag)>,
         (from, to): (Timestamp, Timestamp),
     ) -> Result<Vec<(TagId, CountedTag)>, HistoryError> {
-        let (begin, end) = (from.as_microsecond(), to.as_microsecond());
+        let span = from.as_microsecond()..to.as_microsecond();
+        // Of a time to which the clock came back all is read: each epoch goes on from what the one before it ended with.
+        let doubled = self.doubled()?;
+        let around = |at: i64| doubled.iter().map(|of| of.span.clone()).find(|span| span.start < at && at < span.end);
+        let begin = around(span.start).map_or(span.start, |around| around.start);
+        let end = around(span.end).map_or(span.end, |around| around.end);
         let week = floor(begin - pace::HOURS * HOUR, HOUR);
         self.count_before(&mut tags, week, begin)?;
         let (known, mut unknown): (Vec<_>, Vec<_>) = tags.into_iter().partition(|(_, tag)| tag.is_known());
@@ -165,7 +174,7 @@ impl Store {
             self.count_before(&mut unknown, floor(begin - LATEST, HOUR), week)?;
             tags.append(&mut unknown);
         }
-        tags.iter_mut().for_each(|(_, tag)| tag.begin());
+        tags.iter_mut().for_each(|(_, tag)| tag.begin(span.clone()));
         for piece in self.pieces(begin..end, Tier::Hour)? {
             self.count_piece(&mut tags, piece, i64::MIN)?;
         }
@@ -208,6 +217,10 @@ impl Store {
     fn count_piece(&self, tags: &mut [(TagId, CountedTag)], piece: Piece, closely: i64) -> Result<(), HistoryError> {
         let (Some(from), Some(to)) = (instant(piece.from), instant(piece.to)) else { return Ok(()) };
         let ids: Vec<TagId> = tags.iter().map(|(id, _)| *id).collect();
+        let finest = if piece.tier == Tier::Raw { self.finest(from)? } else { piece.tier };
+        if piece.tier != finest {
+            return self.count_edge(tags, piece, finest);
+        }
         let Some(step) = piece.tier.step() else {
             self.each_part_of(&ids, (from, to), Tier::Raw, |place, part| {
                 if let CurvePart::Held(held) = part {
@@ -227,6 +240,24 @@ impl Store {
             let skimmed = near.min(rows.len().saturating_sub(2));
             rows[..skimmed].iter().for_each(|row| tag.skim(row));
             self.count_each(*id, tag, &rows[skimmed..], step)?;
+        }
+        Ok(())
+    }
+
+    /// Counts at an edge within a minute or an hour of which no samples are kept: it counts whole where it begins.
+    fn count_edge(&self, tags: &mut [(TagId, CountedTag)], piece: Piece, tier: Tier) -> Result<(), HistoryError> {
+        let Some(step) = tier.step() else { return Ok(()) };
+        let ids: Vec<TagId> = tags.iter().map(|(id, _)| *id).collect();
+        let first = floor(piece.from + step - 1, step);
+        let (Some(from), Some(to)) = (instant(first), instant(floor(piece.to + step - 1, step))) else { return Ok(()) };
+        if from < to {
+            self.each_part_of(&ids, (from, to), tier, |place, part| {
+                if let CurvePart::Aggregate(row) = part
+                    && !tags[place].1.read_row(&row, step)
+                {
+                    tags[place].1.read_kept(&row);
+                }
+            })?;
         }
         Ok(())
     }

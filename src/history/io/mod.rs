@@ -58,6 +58,8 @@ mod room;
 pub mod read;
 pub mod past;
 pub mod samples;
+mod recorded;
+mod walk;
 pub mod tables;
 pub mod archive;
 pub mod archiver;

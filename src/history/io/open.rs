@@ -15,7 +15,7 @@ use super::{
     probe,
     read::action,
     restore, room, sql,
-    store::{Store, after, engine},
+    store::{Store, engine},
 };
 use crate::{
     history::{HistoryError, words::joined},
@@ -104,7 +104,7 @@ impl Store {
     /// What a plant goes on from in what it follows: batches, control runs and totals.
     pub(super) fn restore_followed(&self) -> Result<Restored, HistoryError> {
         let (batches, runs) = (self.latest_batches()?, self.latest_runs()?);
-        let off = self.extent().map(|(_, last)| last);
+        let off = self.last_written();
         Ok(Restored { batches, runs, totals: self.last_totals()?, off, ..Restored::default() })
     }
 
@@ -160,11 +160,13 @@ impl Store {
                 // A block that a checkpoint needs and cannot read would end every later one.
                 store.checkpoint().map_err(|error| failure(path, error))?;
             }
+            // Before anything is stored: the end of the curves is a commit too.
+            let found = store.last_commit();
             let read = read(&store).map_err(|error| failure(path, error))?;
-            Ok((store, archive, read))
+            Ok((store, archive, (read, found)))
         };
         let (opened, repaired) = mend(path, now, &try_open, &mut report)?;
-        let (store, archive, read) = opened.map_err(|failure| {
+        let (store, archive, (read, found)) = opened.map_err(|failure| {
             if fresh {
                 files::remove(path);
             }
@@ -173,7 +175,7 @@ impl Store {
                 Failure::Damaged(why) => HistoryError::Engine(why),
             }
         })?;
-        let missing = missing(&noted, &store.last_commit(), trouble.is_some());
+        let missing = missing(&noted, &found, trouble.is_some());
         let kept = end_cut(path, now, missing.is_some());
         let trouble = joined([&trouble.or(repaired), &missing, &kept, &archive]);
         store.note_last_commit();
@@ -207,7 +209,8 @@ impl Store {
         }
         store.ids = ids(def, &store.dictionary().map_err(engine)?);
         store.read_last_commit().map_err(engine)?;
-        store.ended = store.extent().and_then(|(_, last)| after(last));
+        store.read_recording().map_err(engine)?;
+        store.ended = store.ended().map_err(engine)?;
         Ok(store)
     }
 
@@ -254,6 +257,7 @@ impl Store {
         store.check_tags().map_err(Failure::Obstacle)?;
         let missing = store.adopt_files().map_err(|error| failure(path, error))?;
         store.read_last_commit().map_err(failed)?;
+        store.read_recording().map_err(failed)?;
         Ok((store, joined([&other, &missing])))
     }
 

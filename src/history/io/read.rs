@@ -73,12 +73,12 @@ impl Store {
             }
             Query::Reports { limit } => self.made_reports(*limit).map(Answer::Reports),
             Query::Past { at } => self.past(*at, now).map(|past| Answer::Past(Box::new(past))),
-            Query::Samples { from, to } => self.stored(*from, *to).map(Answer::Samples),
+            Query::Samples { epoch, from, to } => self.stored(*epoch, (*from, *to)).map(Answer::Samples),
             Query::Unarchived { from, to } => self.unarchived(*from, *to).map(Answer::Unarchived),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),
             Query::Registers(_) => Err(HistoryError::Engine("registers are read by the line".to_owned())),
             Query::Journal { from, to, limit } => {
-                self.span_list(&sql::journal(sql::NEWEST), (*from, *to, *limit), &[], alarm).map(Answer::Journal)
+                self.span_list(&sql::journal("", sql::NEWEST), (*from, *to, *limit), &[], alarm).map(Answer::Journal)
             }
             Query::Actions { from, to, limit } => {
                 self.span_list(&sql::actions(sql::NEWEST), (*from, *to, *limit), &[], action).map(Answer::Actions)
@@ -135,7 +135,7 @@ impl Store {
         }
         let gathered = self.gather(&counters, std::iter::empty(), (after(from), after(to)))?;
         for series in series.iter_mut().filter(|series| counters.contains(&series.tag)) {
-            let figures = gathered.rows(&self.def, &[series.tag], std::iter::empty());
+            let figures = gathered.rows(&self.def, &[series.tag], &[]);
             series.counted = figures.first().and_then(|figures| figures.difference);
         }
         Ok(())

@@ -19,30 +19,33 @@ use super::{
 use crate::{
     history::{
         HistoryError,
+        recorded::seconds,
         series::Span,
         tiers::{Aggregate, CurvePart, Tier},
     },
     plant::{
         PlantDef,
         counter::{self, CounterRule, CounterStep},
-        def::{Section, TagId, TrendGroup},
+        def::{DeviceDef, Section, TagId, TrendGroup},
         exact::Exact,
-        record::AlarmRecord,
         report::PeriodKind,
-        tag::DataType,
+        tag::{Access, DataType, Poll, TagDef},
         time::elapsed,
     },
     report::{
         Compared, Gap, Outage, Period, RecordRow, RunFigures, ShiftReport, TagFigures, calendar,
         chart::{Chart, ChartCurve},
         counters::CounterRow,
-        figures::{self, Figures, TagDescription},
+        figures::{self, EventLeg, Figures, TagDescription, Trace},
         step_series::ValuesAt,
     },
 };
 
 /// Charts of a report whose plant file names none.
 const CHARTS: usize = 6;
+/// Outages of devices that are traced to their samples, and by how many tags each.
+const TRACED_MAX: usize = 100;
+const TRACED_TAGS_MAX: usize = 8;
 /// Columns of a curve.
 const COLUMNS: usize = 240;
 
@@ -67,7 +70,6 @@ impl Gathered {
 
 /// What is gathered of some tags over a span.
 pub(super) struct GatheredTags {
-    span: (Timestamp, Timestamp),
     of: HashMap<TagId, Gathered>,
     latest: HashMap<TagId, f64>,
     counted: HashMap<TagId, CountedTag>,
@@ -75,21 +77,12 @@ pub(super) struct GatheredTags {
 }
 
 impl GatheredTags {
-    /// The figures of some of them, each once. `events` are those of the span in order, after the raising events of the
-    /// alarms that were active at its begin.
-    pub(super) fn rows<'a>(
-        &self,
-        def: &PlantDef,
-        tags: &[TagId],
-        events: impl Iterator<Item = &'a AlarmRecord>,
-    ) -> Vec<TagFigures> {
-        let mut by_subject: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
-        events.for_each(|event| by_subject.entry(&event.subject).or_default().push(event));
-        let (from, until) = self.span;
+    /// The figures of some of them, each once, with the events of the span.
+    pub(super) fn rows(&self, def: &PlantDef, tags: &[TagId], events: &[EventLeg]) -> Vec<TagFigures> {
+        let in_alarm = figures::times_in_alarm(events);
         let row = |tag: &TagId| {
             let label = TagDescription::new(def.tag(*tag), &self.latest);
-            let events = by_subject.get(label.tag.as_str()).into_iter().flatten().copied();
-            let in_alarm = figures::time_in_alarm(events, from, until);
+            let in_alarm = in_alarm.get(label.tag.as_str()).copied().unwrap_or_default();
             Some(self.of.get(tag)?.figures?.end(label, self.gain(*tag), in_alarm))
         };
         tags.iter().filter_map(row).collect()
@@ -143,9 +136,8 @@ impl Store {
             Some(PeriodKind::Week | PeriodKind::Month) => None,
             Some(PeriodKind::Shift | PeriodKind::Day) | None => self.recorded((from, until), now)?,
         };
-        let active = self.active_at(from)?;
-        let alarms = self.events(from, until)?;
-        let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
+        let events = self.event_legs(from, until)?;
+        let suppressed = figures::suppressed_in(&events);
         let actions =
             self.whole_list(&sql::actions(sql::OLDEST), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
         let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(chain_hash(row.get(0)?, row.get(1)?)))?;
@@ -160,7 +152,7 @@ impl Store {
             }
             None => (Vec::new(), None),
         };
-        let tags = gathered.rows(def, &reported, active.iter().chain(&alarms));
+        let tags = gathered.rows(def, &reported, &events);
         let (counters, runs) = (gathered.counters(def), gathered.runs(def));
         let charts = self.charts((from, until), &gathered.latest)?;
         let (control_runs, left_out) = self.control_runs_of(from, until)?;
@@ -168,7 +160,9 @@ impl Store {
         let mut unreadable = gathered.unreadable;
         unreadable.extend(left_out);
         let compared = self.compared(&reported, period, until)?;
-        let outages = self.outages((from, until), &active, &alarms)?;
+        let outages = self.outages((from, until), &events)?;
+        let coarse = self.coarse((from, until))?;
+        let alarms = events.into_iter().flat_map(|leg| leg.events).collect();
         let alarm_metrics = self.alarm_metrics(from, until, now)?;
         let batches = match def.batches.as_slice() {
             [] => Vec::new(),
@@ -185,6 +179,7 @@ impl Store {
             counters,
             runs,
             outages,
+            coarse,
             charts,
             batches,
             control_runs,
@@ -203,7 +198,7 @@ impl Store {
         let periods = if until < period.to { Vec::new() } else { calendar::comparable(&self.def, period) };
         let figures = |period: Period| {
             let gathered = self.gather(tags, std::iter::empty(), (period.from, period.to))?;
-            Ok(Compared { tags: gathered.rows(&self.def, tags, std::iter::empty()), period })
+            Ok(Compared { tags: gathered.rows(&self.def, tags, &[]), period })
         };
         let mut compared = periods.into_iter().map(figures).collect::<Result<Vec<_>, HistoryError>>()?;
         compared.retain(|compared| compared.tags.iter().any(|tag| 0.0 < tag.good));
@@ -248,17 +243,42 @@ impl Store {
         Ok(charts)
     }
 
-    /// When devices did not answer, and the 10-minute windows in which nothing was stored.
-    fn outages(
-        &self,
-        (from, until): (Timestamp, Timestamp),
-        active: &[AlarmRecord],
-        alarms: &[AlarmRecord],
-    ) -> Result<Vec<Outage>, HistoryError> {
-        let mut outages = figures::not_running(&self.watched(from, until)?, from, until);
-        outages.extend(figures::not_responding(&self.def, active.iter().chain(alarms), from, until));
+    /// When devices did not answer, and when no station recorded.
+    fn outages(&self, (from, until): (Timestamp, Timestamp), events: &[EventLeg]) -> Result<Vec<Outage>, HistoryError> {
+        let off = |(from, to, is_of_clock)| {
+            let why = if is_of_clock { figures::CLOCK_SET_FORWARD } else { figures::NOT_RUNNING };
+            Outage { from, to, what: None, why: why.to_owned() }
+        };
+        let mut outages: Vec<Outage> = self.pauses(from, until)?.into_iter().map(off).collect();
+        let mut traced = 0;
+        for leg in events {
+            for outage in figures::not_responding(&self.def, leg.all(), leg.from, leg.until) {
+                traced += 1;
+                outages.push(if traced <= TRACED_MAX { self.traced(outage, leg.from)? } else { outage });
+            }
+        }
         outages.sort_by_key(|outage| outage.from);
         Ok(outages)
+    }
+
+    /// An outage as the samples of its device show it, where they are kept: since when it has no values, and whether its line was
+    /// lost.
+    fn traced(&self, outage: Outage, not_before: Timestamp) -> Result<Outage, HistoryError> {
+        let named = |device: &&DeviceDef| Some(&device.name) == outage.what.as_ref();
+        let Some(device) = self.def.devices.iter().find(named) else { return Ok(outage) };
+        let is_read = |tag: &&TagDef| tag.is_stored() && tag.poll != Poll::Never && tag.access != Access::Write;
+        let tags: Vec<TagId> =
+            self.def.tags_of(device.id).filter(is_read).map(|tag| tag.id).take(TRACED_TAGS_MAX).collect();
+        // Each tag has a row in every hour.
+        let (Some(begin), Some(end)) = (
+            outage.from.checked_sub(Duration::from_secs(3_600)).ok(),
+            outage.from.checked_add(Duration::from_micros(1)).ok(),
+        ) else {
+            return Ok(outage);
+        };
+        let mut traces = vec![Trace::default(); tags.len()];
+        self.each_sample(&tags, begin, end, |place, sample| traces[place].next(sample))?;
+        Ok(outage.traced(&traces, not_before))
     }
 
     /// Gathers the figures of some tags over a span, and the latest good values of those that choose their units and
@@ -270,11 +290,10 @@ impl Store {
         (from, until): (Timestamp, Timestamp),
     ) -> Result<GatheredTags, HistoryError> {
         let tags = tags_to_read(&self.def, shown, more);
+        let seconds = seconds(&self.legs(from, until)?);
         let shown: HashSet<TagId> = shown.iter().copied().collect();
-        let gather = |tag: &TagId| Gathered {
-            figures: shown.contains(tag).then(|| Figures::new(from, until)),
-            latest_good: None,
-        };
+        let gather =
+            |tag: &TagId| Gathered { figures: shown.contains(tag).then(|| Figures::new(seconds)), latest_good: None };
         let mut gathered: Vec<Gathered> = tags.iter().map(gather).collect();
         let unreadable = self.each_part(&tags, (from, until), Tier::Hour, |place, part| gathered[place].add(part))?;
         let latest = tags
@@ -284,7 +303,7 @@ impl Store {
             .collect();
         let counted = self.count(counting(&self.def, &shown, &latest), (from, until))?.into_iter().collect();
         let of = tags.into_iter().zip(gathered).collect();
-        Ok(GatheredTags { span: (from, until), of, latest, counted, unreadable })
+        Ok(GatheredTags { of, latest, counted, unreadable })
     }
 
     fn record(

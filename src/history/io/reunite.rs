@@ -126,6 +126,7 @@ fn append(whole: &Path, later: &Path, now: Timestamp) -> Result<(), HistoryError
     let db = connect(whole, AccessMode::ReadWrite).map_err(engine)?;
     let store = Store::around(db, whole, &Arc::default());
     store.read_last_commit().map_err(engine)?;
+    store.read_recording().map_err(engine)?;
     // It ended where it was set aside.
     store.end_curves_left_behind(now)?;
     let attached = store.db.execute_batch(&format!("ATTACH {} AS later (READ_ONLY)", quoted(later)));
@@ -183,7 +184,8 @@ INSERT INTO control_run SELECT l.* REPLACE (least(l.epoch + shift.epoch, 65534) 
         l.number + coalesce((SELECT max(r.number) FROM control_run r WHERE r.controller = l.controller), 0) AS number)
     FROM later.control_run l, shift ORDER BY l.rowid;
 INSERT INTO import FROM later.import;
-INSERT INTO watched FROM later.watched WHERE ten_minutes NOT IN (FROM watched);
+INSERT INTO recorded SELECT l.* REPLACE (least(l.epoch + shift.epoch, 65534) AS epoch)
+    FROM later.recorded l, shift ORDER BY l.rowid;
 INSERT INTO deleted SELECT * FROM later.deleted EXCEPT SELECT * FROM deleted;
 DELETE FROM archive;
 INSERT INTO archive FROM later.archive;

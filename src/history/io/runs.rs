@@ -98,7 +98,7 @@ impl Store {
         let rule = self.def.runs.iter().find(|rule| *self.def.device(rule.controller).name == *run.controller);
         let Some((tag, _)) = rule.and_then(|rule| rule.energy).filter(|_| from < until) else { return Ok(None) };
         let gathered = self.gather(&[tag], std::iter::empty(), (from, until))?;
-        let figures = gathered.rows(&self.def, &[tag], std::iter::empty());
+        let figures = gathered.rows(&self.def, &[tag], &[]);
         Ok(figures.first().and_then(|figures| batch::energy(figures, elapsed(from, until))))
     }
 

@@ -15,6 +15,7 @@ use super::{
     read::{check_span, within},
     sql,
     store::{Store, engine, instant, utc},
+    walk::Read,
 };
 use crate::{
     history::{ArchiveFile, HistoryError, Unarchived, tiers::Tier},
@@ -37,8 +38,6 @@ const GAP_PARTS: i64 = 500;
 const GAP_MIN: i64 = 60_000_000;
 /// Samples that are handed out at once.
 pub const UNARCHIVED_MAX: u64 = 50_000;
-/// The same, of all sources: more than a plant has tags, so that one instant is never too much.
-pub const STORED_MAX: u64 = 100_000;
 /// How a tag is asked for that the file does not know, and one that was not asked for.
 const NONE: u32 = u32::MAX;
 
@@ -52,14 +51,6 @@ struct Row {
     quality: u8,
     /// Whether it has a value, and a rest.
     has: (bool, bool),
-}
-
-/// What is handed over.
-enum Read {
-    /// A sample, with the place of its tag.
-    Sample(u32, Sample),
-    /// From then on nothing can be read of any tag.
-    Nothing(Timestamp),
 }
 
 /// Where the samples of a span lie.
@@ -91,73 +82,24 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
+    /// All tags, each with its stored number as its place.
+    pub(super) fn all(condition: String) -> Wanted {
+        Wanted { places: (0..=u32::from(u16::MAX)).collect(), tags: condition }
+    }
+
     pub(super) fn place(&self, number: u16) -> Option<usize> {
         Some(self.places[usize::from(number)]).filter(|place| *place != NONE).map(|place| place as usize)
     }
 }
 
 impl Store {
-    /// Hands over the samples of some different tags that matter in a span: its own and those of [`HOLD_MAX`] before. Each
-    /// comes with the place of its tag in `tags`, each tag's in order of time. Returns what could not be read; there, no
-    /// value is known.
-    pub(super) fn each_sample(
-        &self,
-        tags: &[TagId],
-        from: Timestamp,
-        to: Timestamp,
-        mut each: impl FnMut(usize, Sample),
-    ) -> Result<Vec<Gap>, HistoryError> {
-        let all = 0..tags.len();
-        let gaps = self.each_row(&self.wanted(tags), (in_force(from), to), |read| match read {
-            Read::Sample(place, sample) => each(place as usize, sample),
-            Read::Nothing(at) => all.clone().for_each(|place| each(place, Sample::bad(Cause::Unreadable, at))),
-        })?;
-        if let Some(at) = self.ended {
-            all.for_each(|place| each(place, Sample::bad(Cause::StationOff, at)));
-        }
-        Ok(gaps)
-    }
-
-    /// The same of all tags that are stored, each with its stored number.
-    pub(super) fn each_stored(
-        &self,
-        from: Timestamp,
-        to: Timestamp,
-        each: impl FnMut(u16, Sample),
-    ) -> Result<Vec<Gap>, HistoryError> {
-        self.each_where(sql::of_tags(None), from, to, each)
-    }
-
-    /// The same of those that came from files.
-    pub(super) fn each_imported(
-        &self,
-        from: Timestamp,
-        to: Timestamp,
-        each: impl FnMut(u16, Sample),
-    ) -> Result<Vec<Gap>, HistoryError> {
-        self.each_where(format!(" AND epoch = {}", sql::IMPORTED), from, to, each)
-    }
-
-    fn each_where(
-        &self,
-        condition: String,
-        from: Timestamp,
-        to: Timestamp,
-        mut each: impl FnMut(u16, Sample),
-    ) -> Result<Vec<Gap>, HistoryError> {
-        let all = Wanted { places: (0..=u32::from(u16::MAX)).collect(), tags: condition };
-        self.each_row(&all, (in_force(from), to), |read| {
-            if let Read::Sample(place, sample) = read {
-                each(u16::try_from(place).unwrap_or(u16::MAX), sample);
-            }
-        })
-    }
-
-    fn each_row(
+    /// The rows of some epochs, in order of time.
+    pub(super) fn each_row_of(
         &self,
         wanted: &Wanted,
+        epochs: &str,
         (from, to): (Timestamp, Timestamp),
-        mut each: impl FnMut(Read),
+        each: &mut impl FnMut(Read),
     ) -> Result<Vec<Gap>, HistoryError> {
         let begin = from.as_microsecond();
         let (mut next, end) = (begin, to.as_microsecond());
@@ -177,7 +119,7 @@ impl Store {
             // What happened at one instant is never cut.
             let max = if to - next > 1 { 2 * self.piece } else { usize::MAX };
             let sources = Sources { table: hot < to, files: overlapping(&files, &(next..to)) };
-            match self.read(wanted, &sources, (next, to), max, &mut rows) {
+            match self.read((wanted, epochs), &sources, (next, to), max, &mut rows) {
                 Ok(Piece::TooLong) => span = ((to - next) / 8).max(1),
                 Ok(Piece::Whole) => {
                     // Rows of one instant keep the order in which they were written.
@@ -198,7 +140,7 @@ impl Store {
                     let (Some(from), Some(until)) = (instant(next), instant(to)) else { return Err(error) };
                     // Each is in force no longer than any other sample.
                     let bad = std::iter::successors(Some(from), |at| at.checked_add(HOLD_MAX).ok());
-                    bad.take_while(|at| *at < until).for_each(|at| each(Read::Nothing(at)));
+                    bad.take_while(|at| *at < until).for_each(|at| each(Read::Nothing(Cause::Unreadable, at)));
                     self.unreadable.replace(Some(format!("{from:.0} to {until:.0} cannot be read: {}", error.words())));
                     match gaps.last_mut().filter(|last| last.to == from) {
                         Some(last) => last.to = until,
@@ -214,22 +156,6 @@ impl Store {
             self.changed.set(true);
         }
         Ok(gaps)
-    }
-
-    /// The samples of this plant's tags that were stored in a span, and nothing that was in force before.
-    pub(super) fn stored(&self, from: Timestamp, to: Timestamp) -> Result<Vec<(TagId, Sample)>, HistoryError> {
-        check_span(from, to)?;
-        let tags: Vec<TagId> = self.def.tags.iter().map(|tag| tag.id).collect();
-        let (mut rows, mut count) = (Vec::new(), 0);
-        self.each_row(&self.wanted(&tags), (from, to), |read| {
-            let Read::Sample(place, sample) = read else { return };
-            count += 1;
-            if count <= STORED_MAX {
-                rows.push((tags[place as usize], sample));
-            }
-        })?;
-        within(count, STORED_MAX)?;
-        Ok(rows)
     }
 
     /// The samples that are not archived, in a span: also those of tags that the plant has no longer, or with another unit.
@@ -276,7 +202,7 @@ impl Store {
 
     fn read(
         &self,
-        wanted: &Wanted,
+        (wanted, epochs): (&Wanted, &str),
         sources: &Sources,
         (from, to): (i64, i64),
         max: usize,
@@ -289,7 +215,7 @@ impl Store {
         }
         let rests = sources.table || any_rests(&sources.files);
         let files = (!sources.files.is_empty()).then(|| self.parquet(&sources.files, rests));
-        let sql = sql::samples(&wanted.tags, sources.table, files.as_deref(), rests);
+        let sql = sql::samples(&format!("{}{epochs}", wanted.tags), sources.table, files.as_deref(), rests);
         // Not from the cache: a statement that is left before its end must go.
         let mut statement = self.db.prepare(&sql).map_err(engine)?;
         // The rows are fetched by `step`, because the stream itself panics where it meets an error.
@@ -388,9 +314,4 @@ fn push(batch: &StructArray, wanted: &Wanted, rows: &mut Vec<Row>) -> Option<()>
         }
     }
     Some(())
-}
-
-/// From when on a sample may be in force at an instant.
-fn in_force(from: Timestamp) -> Timestamp {
-    from.checked_sub(HOLD_MAX).unwrap_or(Timestamp::MIN)
 }

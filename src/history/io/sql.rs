@@ -114,50 +114,46 @@ pub const FIRST_STORED: &str = "SELECT epoch_us(utc) FROM sample LIMIT 1";
 /// The first and the last instant of the journal.
 pub const JOURNALED: &str = "SELECT min(utc), max(utc) FROM alarm_journal";
 
-/// The windows of ten minutes, by their number since 1970, in which a line or an alarm did anything, or which are archived: in
-/// these a station ran.
-pub const WATCHED_BY_LINES: &str = "SELECT DISTINCT epoch_us(utc) // 600000000 FROM (
-        SELECT utc FROM alarm_journal WHERE utc >= $1 AND utc < $2
-        UNION ALL SELECT utc - INTERVAL 1 MINUTE FROM line_minute WHERE utc >= $1 AND utc < $2
-        UNION ALL SELECT make_timestamp(ten_minutes * 600000000) FROM watched
-            WHERE ten_minutes >= epoch_us($1) // 600000000 AND ten_minutes < (epoch_us($2) + 599999999) // 600000000)
-    ORDER BY 1 LIMIT $3";
-
-/// The same by the samples, which are far more rows; not by those that were imported.
-pub const WATCHED_BY_SAMPLES: &str =
-    "SELECT DISTINCT epoch_us(utc) // 600000000 FROM sample WHERE utc >= $1 AND utc < $2
-        AND epoch IS DISTINCT FROM 65535 ORDER BY 1 LIMIT $3";
-/// A row if there is any sample in a span that a station recorded.
-pub const ANY_SAMPLE: &str = "SELECT 1 FROM sample WHERE utc >= ? AND utc < ? AND epoch IS DISTINCT FROM 65535 LIMIT 1";
+/// When stations recorded.
+pub const RECORDED: &str = "SELECT epoch, epoch_us(from_utc), epoch_us(to_utc) FROM recorded";
+/// The last of these.
+pub const LAST_RECORDED: &str = "SELECT epoch, epoch_us(from_utc), epoch_us(to_utc) FROM recorded
+    WHERE epoch IS NOT NULL ORDER BY epoch DESC, to_utc DESC LIMIT 1";
+/// Another one.
+pub const ENTER_RECORDED: &str = "INSERT INTO recorded VALUES (?, ?, ?)";
+/// It goes on.
+pub const WIDEN_RECORDED: &str = "UPDATE recorded SET from_utc = ?, to_utc = ? WHERE epoch = ? AND from_utc = ?";
+/// Whether a station that ended in order wrote so at an instant.
+pub const IS_MARKED_OFF: &str = "SELECT count(*) > 0 FROM sample WHERE utc = ? AND quality = ?";
 
 /// The order of a list, and its limit.
 pub const NEWEST: &str = "ORDER BY utc DESC, rowid DESC LIMIT ?";
-/// The other one.
-pub const OLDEST: &str = "ORDER BY utc, rowid LIMIT ?";
+/// The other one, in which it was written.
+pub const OLDEST: &str = "ORDER BY coalesce(epoch, 0), utc, rowid LIMIT ?";
 
-/// Alarm events in a span.
-pub fn journal(order: &str) -> String {
-    format!("SELECT {} FROM alarm_journal WHERE utc >= ? AND utc < ? {order}", EVENT_COLUMNS.join(", "))
+/// Alarm events in a span, of the epochs of a condition.
+pub fn journal(epochs: &str, order: &str) -> String {
+    format!("SELECT {} FROM alarm_journal WHERE utc >= ? AND utc < ?{epochs} {order}", EVENT_COLUMNS.join(", "))
 }
 
 /// The raising events of the alarms that were active at an instant, also of those that were suppressed.
-pub fn active_at() -> String {
-    raised_at("", "event IN ('raised', 'raised (suppressed)')")
+pub fn active_at(before: &str) -> String {
+    raised_at(before, "", "event IN ('raised', 'raised (suppressed)')")
 }
 
 /// The raising events of the alarms that were active at an instant and have not been suppressed since.
-pub fn standing_at() -> String {
-    raised_at(", 'shelved', 'suppressed by design', 'out of service'", "event = 'raised'")
+pub fn standing_at(before: &str) -> String {
+    raised_at(before, ", 'shelved', 'suppressed by design', 'out of service'", "event = 'raised'")
 }
 
 /// The alarms whose latest event before an instant fulfils `is`. Events that raise or end an alarm count, and `others`.
-fn raised_at(others: &str, is: &str) -> String {
+fn raised_at(before: &str, others: &str, is: &str) -> String {
     let columns = EVENT_COLUMNS.join(", ");
     format!(
         "SELECT {columns} FROM (
             SELECT *, rowid AS place FROM alarm_journal
-            WHERE utc < ? AND event IN ('raised', 'raised (suppressed)', 'RTN', 'RTN (suppressed)'{others})
-            QUALIFY row_number() OVER (PARTITION BY subject, message ORDER BY utc DESC, rowid DESC) = 1)
+            WHERE {before} AND event IN ('raised', 'raised (suppressed)', 'RTN', 'RTN (suppressed)'{others})
+            QUALIFY row_number() OVER (PARTITION BY subject, message ORDER BY epoch DESC, utc DESC, rowid DESC) = 1)
          WHERE {is} ORDER BY utc, place LIMIT ?"
     )
 }
@@ -259,9 +255,6 @@ pub const REMOVE_FILE: &str = "DELETE FROM archive WHERE path = ?";
 pub const ENTER_DELETED: &str = "INSERT INTO deleted VALUES (?, ?, ?)";
 /// Until when files of a tier were deleted.
 pub const DELETED_UNTIL: &str = "SELECT max(until_utc) FROM deleted WHERE tier = ?";
-/// The windows of ten minutes in which samples lie that are about to be archived.
-pub const ENTER_WATCHED: &str = "INSERT INTO watched SELECT DISTINCT epoch_us(utc) // 600000000 FROM sample
-    WHERE utc >= $1 AND utc < $2 AND epoch IS DISTINCT FROM 65535 AND epoch_us(utc) // 600000000 NOT IN (FROM watched)";
 /// Deletes the samples of a span.
 pub const DELETE_SAMPLES: &str = "DELETE FROM sample WHERE utc >= ? AND utc < ?";
 /// Widens what is known to be stored.
@@ -317,6 +310,23 @@ pub fn form_tables() -> String {
         first DOUBLE NOT NULL, last DOUBLE NOT NULL, gain DOUBLE NOT NULL, good_ms UINTEGER NOT NULL, n UINTEGER NOT NULL,
         min_rest DOUBLE, max_rest DOUBLE, first_rest DOUBLE, last_rest DOUBLE, gain_rest DOUBLE";
     FORMED.map(|table| format!("CREATE OR REPLACE TEMP TABLE {table} ({columns});")).concat()
+}
+
+/// Where the clock was set back, of the rows of each epoch one: what rises from one to the other is not known.
+pub fn unite_epochs() -> String {
+    let alone = |rest: &str| format!("CASE WHEN count(*) = 1 THEN any_value({rest}) END");
+    let [min, max, first, last] = ["min_rest", "max_rest", "first_rest", "last_rest"].map(alone);
+    let unite = |table: &str| {
+        format!(
+            "CREATE OR REPLACE TEMP TABLE united AS SELECT utc, tag, min(min) AS min, max(max) AS max,
+                sum(mean * good_ms) / sum(good_ms) AS mean, first(first ORDER BY rowid) AS first, last(last ORDER BY rowid) AS last,
+                sum(gain) AS gain, sum(good_ms)::UINTEGER AS good_ms, sum(n)::UINTEGER AS n, {min} AS min_rest,
+                {max} AS max_rest, {first} AS first_rest, {last} AS last_rest, sum(gain_rest) AS gain_rest
+            FROM {table} GROUP BY utc, tag;
+            DELETE FROM {table}; INSERT INTO {table} FROM united; DROP TABLE united;"
+        )
+    };
+    FORMED.map(unite).concat()
 }
 
 fn within(span: &Range<i64>) -> String {

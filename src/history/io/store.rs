@@ -19,6 +19,7 @@ use super::{
     disk, files,
     interrupt::{Interrupt, Open},
     last::{self, LastCommit},
+    recorded::{Recording, recorded_at},
     reports::append_report,
     room,
     runs::append_run,
@@ -26,7 +27,7 @@ use super::{
     sql,
 };
 use crate::{
-    history::{HistoryError, tiers::in_milliseconds},
+    history::{HistoryError, recorded::recorded, tiers::in_milliseconds},
     plant::{
         batch::BatchRecord,
         def::PlantDef,
@@ -48,6 +49,8 @@ pub struct Store {
     /// The last commit, as the database itself has it, and the epoch that it ended in.
     last: Cell<LastCommit>,
     epoch: Cell<u16>,
+    /// What is being recorded.
+    pub(super) recording: Cell<Recording>,
     /// Device and number of the file as it was opened.
     file: Option<(u64, u64)>,
     /// The stored number of each tag, by `TagId`; `None` for a tag that the file does not know (only when read-only).
@@ -76,6 +79,7 @@ impl Store {
             extent: self.extent.clone(),
             last: self.last.clone(),
             epoch: self.epoch.clone(),
+            recording: self.recording.clone(),
             file: self.file,
             ids: self.ids.clone(),
             ended: self.ended,
@@ -110,29 +114,43 @@ impl Store {
         });
         let begun = records.iter().filter(|record| is_clock_set(record)).count();
         let epoch = |passed: usize| self.epoch.get().saturating_add(u16::try_from(passed).unwrap_or(u16::MAX));
+        let mut recording = self.recording.get();
         self.commit(stored, epoch(begun), || {
+            let mut times = Vec::new();
             for (passed, records) in records.split(is_clock_set).enumerate() {
                 self.append_epoch(records, epoch(passed))?;
+                times.extend(recorded(epoch(passed), records.iter().filter_map(recorded_at)));
             }
+            recording = self.enter_recorded(&times)?;
             Ok(true)
-        })
+        })?;
+        self.recording.set(recording);
+        Ok(())
     }
 
     /// Ends every curve at an instant: from here on the station is off.
     pub fn mark_station_off(&self, at: Timestamp) -> Result<(), HistoryError> {
-        let Some((_, last)) = self.extent() else { return Ok(()) };
+        let Some(last) = self.last_written() else { return Ok(()) };
         // Each tag has a row in every hour.
         let since = last.checked_sub(jiff::SignedDuration::from_hours(1)).unwrap_or(Timestamp::MIN);
         let (off, epoch) = (Quality::Bad(Cause::StationOff).code(), self.epoch.get());
+        let mut recording = self.recording.get();
         self.commit(std::iter::once(at), epoch, || {
-            Ok(self.db.execute(sql::END_CURVES, params![utc(at), off, epoch, utc(since)])? > 0)
-        })
+            let ended = self.db.execute(sql::END_CURVES, params![utc(at), off, epoch, utc(since)])? > 0;
+            if ended {
+                recording = self.enter_recorded(&recorded(epoch, std::iter::once(at.as_microsecond())))?;
+            }
+            Ok(ended)
+        })?;
+        // What a station stores next is of another run.
+        self.recording.set(Recording { goes_on: false, ..recording });
+        Ok(())
     }
 
-    /// Ends the curves that a station left behind when it died, one second after the last row of all. To be called
+    /// Ends the curves that a station left behind when it died, one second after the row that it wrote last. To be called
     /// before the first append of a new station, so that no curve or mean runs through the time in between.
     pub fn end_curves_left_behind(&self, now: Timestamp) -> Result<(), HistoryError> {
-        let Some((_, last)) = self.extent() else { return Ok(()) };
+        let Some(last) = self.last_written() else { return Ok(()) };
         let Some(end) = after(last) else { return Ok(()) };
         // Not after the first rows to come; if the clock went back, those rows lie elsewhere anyway.
         self.mark_station_off(if now > last { end.min(now) } else { end })
@@ -180,6 +198,7 @@ impl Store {
             extent: Cell::new(None),
             last: Cell::new(LastCommit { identity: 0, number: 0, at: None }),
             epoch: Cell::new(0),
+            recording: Cell::default(),
             ids: Vec::new(),
             ended: None,
             piece: PIECE,

@@ -133,7 +133,7 @@ impl Writer {
         match result {
             Ok(Opened { store, trouble, read }) => {
                 if !self.was_open {
-                    let ahead = store.extent().map(|(_, last)| last).filter(|last| *last > self.started + CLOCK_STEP);
+                    let ahead = store.last_written().filter(|last| *last > self.started + CLOCK_STEP);
                     let words = |last| format!("the clock is behind the last record, {last:.0}: is it right?");
                     self.clock = ahead.map(words);
                     if self.clock.is_some() {

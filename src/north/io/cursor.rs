@@ -1,5 +1,5 @@
-//! The cursor file: a line with the instant up to which the history was read for the broker, and of a station that has stopped
-//! one with what it sent last.
+//! The cursor file: a line with the instant up to which the history was read for the broker and the epoch of its clock, and of a
+//! station that has stopped one with what it sent last.
 
 use std::{
     io,
@@ -21,6 +21,8 @@ const BYTES_MAX: u64 = 64 << 20;
 pub struct Cursor {
     /// The instant.
     pub at: Timestamp,
+    /// The epoch of the clock; `None` from an earlier version.
+    pub epoch: Option<u16>,
     /// What was sent last, by the names of the tags; `None` after a failure.
     pub sent: Option<Vec<(String, Sample)>>,
 }
@@ -42,13 +44,16 @@ pub fn read(path: &Path) -> Result<Option<Cursor>, String> {
 /// What cannot be read behind the instant is not known.
 fn parse(text: &str) -> Option<Cursor> {
     let (at, sent) = text.split_once('\n').unwrap_or((text, ""));
-    Some(Cursor { at: at.trim().parse().ok()?, sent: serde_json::from_str(sent).ok() })
+    let (at, epoch) = at.trim().split_once(' ').map_or((at.trim(), None), |(at, epoch)| (at, Some(epoch)));
+    let epoch = epoch.map(|epoch| epoch.parse().ok());
+    Some(Cursor { at: at.parse().ok()?, epoch: epoch.unwrap_or_default(), sent: serde_json::from_str(sent).ok() })
 }
 
 /// Blocks while the disk works.
-pub fn write(path: &Path, Cursor { at, sent }: &Cursor) -> Result<(), String> {
+pub fn write(path: &Path, Cursor { at, epoch, sent }: &Cursor) -> Result<(), String> {
     let sent = sent.as_ref().map(|sent| serde_json::to_string(sent).expect("names and finite numbers") + "\n");
-    let text = format!("{at}\n{}", sent.unwrap_or_default());
+    let epoch = epoch.map(|epoch| format!(" {epoch}")).unwrap_or_default();
+    let text = format!("{at}{epoch}\n{}", sent.unwrap_or_default());
     write_atomic(path, text.as_bytes(), 0o640).map_err(|error| format!("{}: {error}", path.display()))
 }
 
@@ -64,18 +69,18 @@ mod tests {
         assert_eq!(read(&path), Ok(None));
         let at = Timestamp::from_microsecond(1_700_000_000_123_456).expect("in range");
         let sample = Sample::good(0.1 + 0.2, at).uncertain(Cause::Stale);
-        for sent in [
-            None,
-            Some(vec![]),
-            Some(vec![("TIC-1.PV".to_owned(), sample), ("é".to_owned(), Sample::bad(Cause::Timeout, at))]),
+        for (epoch, sent) in [
+            (None, None),
+            (Some(0), Some(vec![])),
+            (Some(7), Some(vec![("TIC-1.PV".to_owned(), sample), ("é".to_owned(), Sample::bad(Cause::Timeout, at))])),
         ] {
-            let cursor = Cursor { at, sent };
+            let cursor = Cursor { at, epoch, sent };
             write(&path, &cursor).expect("a writable folder");
             assert_eq!(read(&path), Ok(Some(cursor)));
         }
         // What was cut off is not known.
         std::fs::write(&path, format!("{at}\n[[\"TIC-1.PV\",{{")).expect("a writable file");
-        assert_eq!(read(&path), Ok(Some(Cursor { at, sent: None })));
+        assert_eq!(read(&path), Ok(Some(Cursor { at, epoch: None, sent: None })));
         std::fs::write(&path, "yesterday\n").expect("a writable file");
         assert!(read(&path).is_err_and(|why| why.ends_with("tank.mqtt-cursor: expected an instant")));
     }

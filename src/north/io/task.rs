@@ -21,6 +21,7 @@ use crate::{
     history::{
         Answer, HistoryError, Query,
         io::{QueryRequest, reader::STATION},
+        recorded::StoredSamples,
     },
     north::{
         deadband::Deadband,
@@ -29,7 +30,7 @@ use crate::{
     },
     plant::{
         PlantDef, Snapshot,
-        def::{DeviceDef, MqttDef, TagId},
+        def::{DeviceDef, MqttDef},
         event::Event,
         mqtt_request::MqttRequestStatus,
         north_def::NorthStatus,
@@ -89,7 +90,7 @@ pub(crate) async fn run(task: NorthTask, mut stopped: watch::Receiver<bool>) {
         Ok(cursor) => (cursor, None),
         Err(why) => (None, Some(why)),
     };
-    let forwarder = forwarder(&task, cursor.unwrap_or(Cursor { at: now, sent: None }));
+    let forwarder = forwarder(&task, cursor.unwrap_or(Cursor { at: now, epoch: None, sent: None }));
     let state = Deadband::new(task.def.tags.len());
     let status = NorthStatus { sent_until: forwarder.complete_until(), error: damaged, ..NorthStatus::default() };
     let mut north = North {
@@ -121,8 +122,9 @@ pub(crate) async fn run(task: NorthTask, mut stopped: watch::Receiver<bool>) {
 }
 
 /// Goes on where the station before has ended.
-fn forwarder(task: &NorthTask, Cursor { at, sent }: Cursor) -> Forwarder {
-    let forwarder = Forwarder::new(at, task.def.tags.len(), task.clock.speed());
+fn forwarder(task: &NorthTask, Cursor { at, epoch, sent }: Cursor) -> Forwarder {
+    let epoch = epoch.unwrap_or_else(|| task.history.borrow().epoch);
+    let forwarder = Forwarder::new((epoch, at), task.def.tags.len(), task.clock.speed());
     match sent {
         Some(sent) => {
             let known = |(name, sample): (String, Sample)| Some((task.def.tag_named(&name)?, sample));
@@ -236,16 +238,17 @@ impl North {
     }
 
     async fn forward(&mut self) -> Result<bool, String> {
-        {
+        let latest = {
             // Behind what waits in memory the cursor must not go.
             let history = self.task.history.borrow();
             if history.failing.is_some() || history.waiting > 0 {
                 return Ok(false);
             }
-        }
+            history.epoch
+        };
         let now = self.task.clock.utc();
-        let (from, to) = self.forwarder.window(now);
-        let samples = match self.ask(Query::Samples { from, to }).await {
+        let Some((epoch, from, to)) = self.forwarder.window(latest, now) else { return Ok(false) };
+        let samples = match self.ask(Query::Samples { epoch: Some(epoch), from, to }).await {
             Ok(samples) => samples,
             Err(HistoryError::TooManyRows { .. }) => {
                 self.forwarder.on_too_many();
@@ -258,7 +261,7 @@ impl North {
         };
         let batch = self.forwarder.on_samples(&self.task.mqtt, to, samples);
         self.deliver(&batch).await?;
-        Ok(to < now)
+        Ok(to < now || batch.until.0 != epoch)
     }
 
     async fn deliver(&mut self, batch: &Batch) -> Result<(), String> {
@@ -283,12 +286,13 @@ impl North {
     }
 
     async fn write_cursor(&self, sent: Option<Vec<(String, Sample)>>) -> Result<(), String> {
-        let (path, cursor) = (self.path.clone(), Cursor { at: self.forwarder.cursor(), sent });
+        let (epoch, at) = self.forwarder.cursor();
+        let (path, cursor) = (self.path.clone(), Cursor { at, epoch: Some(epoch), sent });
         let written = spawn_blocking(move || cursor::write(&path, &cursor)).await;
         written.unwrap_or_else(|error| Err(error.to_string()))
     }
 
-    async fn ask(&self, query: Query) -> Result<Vec<(TagId, Sample)>, HistoryError> {
+    async fn ask(&self, query: Query) -> Result<StoredSamples, HistoryError> {
         let (reply, answer) = oneshot::channel();
         let request = (STATION, QueryRequest { query, reply });
         self.task.queries.try_send(request).map_err(|_| HistoryError::NotOpen)?;

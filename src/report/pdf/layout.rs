@@ -5,7 +5,7 @@ use unicode_segmentation::UnicodeSegmentation;
 use crate::{
     plant::{def::Paper, number::to_usize},
     report::{
-        document::{ColumnKind, Content, Document, Fact, Section, Table, offset, plain},
+        document::{ColumnKind, Content, Document, Fact, Section, Table, plain},
         drawing::{Drawing, Ink, Rgb, Shape, TEXT},
     },
     t,
@@ -123,8 +123,7 @@ impl<M: Metrics> Layout<'_, M> {
         }
         self.line(&document.title, 16.0, true);
         self.line(&document.heading, 11.0, false);
-        let times = t!("times are local, {offset}", offset = offset(&document.zone, document.until));
-        self.line(&plain(&times), 9.0, false);
+        self.line(&document.times_line(), 9.0, false);
     }
 
     fn section(&mut self, section: &Section) {

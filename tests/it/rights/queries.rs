@@ -36,7 +36,7 @@ fn queries(def: &PlantDef, to: Timestamp) -> Vec<Query> {
         Query::Batches { from, to, limit },
         Query::ControlRuns { controller: None, from, to, limit },
         Query::Reports { limit },
-        Query::Samples { from, to },
+        Query::Samples { epoch: None, from, to },
         Query::Unarchived { from, to },
         Query::Overview,
         Query::Audit { from, to, words: all(), by: all(), action: all(), limit },

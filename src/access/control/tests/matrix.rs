@@ -130,7 +130,7 @@ every!(queries: Query {
     Query::Reports { .. } => [Query::Reports { limit: 1 }],
     Query::Past { .. } => [Query::Past { at: AT }],
     Query::Overview => [Query::Overview],
-    Query::Samples { .. } => span(|from, to| Query::Samples { from, to }),
+    Query::Samples { .. } => span(|from, to| Query::Samples { epoch: None, from, to }),
     Query::Unarchived { .. } => span(|from, to| Query::Unarchived { from, to }),
     Query::Registers(_) => [Query::Registers(LiveRead {
         line: L1, unit: UNIT, spans: Vec::new(), not_before: None, relearn: false,

@@ -3,14 +3,17 @@
 use duckdb::params;
 use jiff::Timestamp;
 
-use crate::history::{
-    ArchiveFile, HistoryError,
-    io::{
-        files, sql,
-        store::{Store, engine, instant, utc},
+use crate::{
+    history::{
+        ArchiveFile, HistoryError,
+        io::{
+            files, sql,
+            store::{Store, engine, instant, utc},
+        },
+        retention::{self, Deletion},
+        tiers::Tier,
     },
-    retention::{self, Deletion},
-    tiers::Tier,
+    report::coarse::{Coarse, Kept},
 };
 
 impl Store {
@@ -38,6 +41,22 @@ impl Store {
         let until: Option<i64> =
             self.db.query_row(sql::DELETED_UNTIL, params![tier.word()], |row| row.get(0)).map_err(engine)?;
         Ok(until.and_then(instant))
+    }
+
+    /// Where samples are not kept any more, and what is.
+    pub(in crate::history::io) fn coarse(
+        &self,
+        (from, until): (Timestamp, Timestamp),
+    ) -> Result<Vec<Coarse>, HistoryError> {
+        let (mut next, mut coarse) = (from, Vec::new());
+        for (tier, kept) in [(Tier::Hour, Kept::Nothing), (Tier::Minute, Kept::Hours), (Tier::Raw, Kept::Minutes)] {
+            let to = self.deleted_until(tier)?.map_or(next, |deleted| deleted.min(until));
+            if next < to {
+                coarse.push(Coarse { from: next, to, kept });
+                next = to;
+            }
+        }
+        Ok(coarse)
     }
 
     /// The finest tier that has what was stored from an instant on.

@@ -53,7 +53,6 @@ impl Store {
         let new: Vec<ArchiveFile> = new.into_iter().map(NewFile::rename).collect::<Result<_, _>>()?;
         let within = [span.start, span.end].map(|at| instant(at).map(utc));
         self.enter(&new, &old, || {
-            self.db.execute(sql::ENTER_WATCHED, params![within[0], within[1]])?;
             let deleted = self.db.execute(sql::DELETE_SAMPLES, params![within[0], within[1]])?;
             // What came meanwhile is not in the file: all of it once more.
             if deleted as u64 == rows { Ok(()) } else { Err(duckdb::Error::StatementChangedRows(deleted)) }
@@ -99,6 +98,10 @@ impl Store {
         match failed {
             Some(error) => return Err(engine(error)),
             None => minutes.flush().and_then(|()| hours.flush()).map_err(engine)?,
+        }
+        drop((minutes, hours));
+        if self.doubled()?.iter().any(|doubled| doubled.span.start < span.end && span.start < doubled.span.end) {
+            self.db.execute_batch(&sql::unite_epochs()).map_err(engine)?;
         }
         match gaps.first() {
             None => Ok(()),

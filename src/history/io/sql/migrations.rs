@@ -27,9 +27,13 @@
 ///
 /// Samples of a file have the epoch [`IMPORTED`](super::IMPORTED), and `import` has a row for each file.
 ///
-/// `archive` is the manifest of the files in the archive, see there; `watched` are windows of ten minutes, by their number
-/// since 1970, in which archived samples lie; `deleted` are the files that the rules of the plant have deleted.
-pub const MIGRATIONS: [&str; 15] = [
+/// `archive` is the manifest of the files in the archive, see there; `deleted` are the files that the rules of the plant have
+/// deleted.
+///
+/// `recorded` are the times in which a station recorded, by the clock of each epoch, from the first to the last instant that it
+/// stored. Of a file that had no such table they are those of its rows, and of windows of ten minutes (`watched`) where nothing
+/// else is known of what was archived: there, the epoch is NULL.
+pub const MIGRATIONS: [&str; 16] = [
     "
 CREATE TABLE tag (id USMALLINT NOT NULL, name VARCHAR NOT NULL, unit VARCHAR NOT NULL);
 CREATE TABLE sample (utc TIMESTAMP NOT NULL, tag USMALLINT NOT NULL, value DOUBLE, quality UTINYINT NOT NULL);
@@ -122,5 +126,20 @@ CREATE TABLE control_run (
 ALTER TABLE sample ADD COLUMN rest DOUBLE;
 ALTER TABLE alarm_journal ADD COLUMN value_rest DOUBLE;
 ALTER TABLE archive ADD COLUMN rests BOOLEAN DEFAULT false;
+",
+    "
+CREATE TABLE recorded (epoch USMALLINT, from_utc TIMESTAMP NOT NULL, to_utc TIMESTAMP NOT NULL);
+INSERT INTO recorded SELECT epoch, min(a), max(z) FROM (
+    SELECT epoch, a, z, sum(begins) OVER (PARTITION BY epoch ORDER BY a, z ROWS UNBOUNDED PRECEDING) AS part FROM (
+        SELECT epoch, a, z, CASE WHEN a <= max(z) OVER (PARTITION BY epoch ORDER BY a, z
+            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING) + INTERVAL 150 SECONDS THEN 0 ELSE 1 END AS begins FROM (
+            SELECT DISTINCT epoch, date_trunc('second', utc) AS a, date_trunc('second', utc) AS z FROM sample
+                WHERE epoch IS DISTINCT FROM 65535
+            UNION ALL SELECT epoch, utc, utc FROM alarm_journal
+            UNION ALL SELECT epoch, utc - INTERVAL 1 MICROSECOND, utc - INTERVAL 1 MICROSECOND FROM line_minute
+            UNION ALL SELECT NULL, make_timestamp(ten_minutes * 600000000), make_timestamp((ten_minutes + 1) * 600000000)
+                FROM watched WHERE ten_minutes NOT IN (SELECT epoch_us(utc - INTERVAL 1 MICROSECOND) // 600000000 FROM line_minute))))
+    GROUP BY epoch, part ORDER BY epoch, min(a);
+DROP TABLE watched;
 ",
 ];

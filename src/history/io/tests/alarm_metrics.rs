@@ -22,10 +22,11 @@ const BY_PRIORITY: &str = "SELECT count(*) FILTER (priority = 1), count(*) FILTE
         count(*) FILTER (priority = 3), count(*) FILTER (priority = 4)
     FROM alarm_journal WHERE event = 'raised' AND utc >= $1 AND utc < $2";
 
-/// All windows of ten minutes with anything in them, those with more than ten alarms, the worst, and their microseconds.
+/// All windows of ten minutes in which a station recorded, those with more than ten alarms, the worst, and their microseconds.
 const WINDOWS: &str = "WITH ten AS (
-        SELECT DISTINCT time_bucket(INTERVAL 10 MINUTES, utc) AS begins
-        FROM (SELECT utc FROM sample UNION ALL SELECT utc FROM alarm_journal) WHERE utc >= $1 AND utc < $2),
+        SELECT DISTINCT unnest(range(time_bucket(INTERVAL 10 MINUTES, greatest(from_utc, $1::TIMESTAMP)),
+            least(to_utc + INTERVAL 1 MICROSECOND, $2::TIMESTAMP), INTERVAL 10 MINUTES)) AS begins
+        FROM recorded WHERE to_utc >= $1 AND from_utc < $2),
     counts AS (
         SELECT begins, count(j.utc) AS raised FROM ten
         LEFT JOIN (SELECT utc FROM alarm_journal WHERE event = 'raised' AND utc >= $1 AND utc < $2) j

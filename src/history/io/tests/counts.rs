@@ -28,7 +28,7 @@ const DAY_S: i64 = 24 * HOUR_S;
 const STEP: f64 = 5.0;
 
 /// PV is a counter in kWh, MV of one whose greatest rate is known; SV is on or off.
-fn def() -> Arc<PlantDef> {
+pub(super) fn def() -> Arc<PlantDef> {
     let mut def = plant("Asia/Kathmandu", &THREE);
     for (place, max_rate) in [(0, None), (2, Some(60.0))] {
         let tag: &mut TagDef = &mut def.tags[place];
@@ -39,13 +39,13 @@ fn def() -> Arc<PlantDef> {
     Arc::new(def)
 }
 
-fn report(store: &Store, from: i64, to: i64) -> ShiftReport {
+pub(super) fn report(store: &Store, from: i64, to: i64) -> ShiftReport {
     let query = Query::Report { period: Period::free(sec(from), sec(to)) };
     let Answer::Report(report) = store.answer(&query, sec(40 * DAY_S)).unwrap() else { panic!() };
     *report
 }
 
-fn counted(report: &ShiftReport, tag: TagId) -> f64 {
+pub(super) fn counted(report: &ShiftReport, tag: TagId) -> f64 {
     let named = |figures: &&TagFigures| figures.tag == def().tag(tag).name;
     report.tags.iter().find(named).and_then(|figures| figures.difference).map_or(0.0, Exact::near)
 }

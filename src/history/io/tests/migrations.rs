@@ -32,7 +32,7 @@ INSERT INTO alarm_journal (utc, subject, priority, value, limit_value, by_whom, 
     ('1970-01-01 00:00:15', 'TIC-1.PV', 2, 85.5, 85.0, NULL, 0, 'suppressed', 'low', NULL, NULL),
     ('1970-01-01 00:00:16', 'TIC-1.PV', 2, 85.5, 85.0, NULL, 0, 'raised quietly', 'low', NULL, NULL),
     ('1970-01-01 00:00:17', 'TIC-1.PV', 2, 85.5, 85.0, NULL, 0, 'returned quietly', 'low', NULL, NULL),
-    ('1970-01-01 00:00:18', 'TIC-1.PV', 2, 85.5, 85.0, NULL, 1, 'released', 'low', NULL, NULL);
+    ('1970-01-01 00:00:18', 'TIC-1.PV', 2, 85.5, 85.0, NULL, 0, 'released', 'low', NULL, NULL);
 INSERT INTO operator_action (utc, by_whom, action, target, old_value, outcome, epoch, number, hash) VALUES
     ('1970-01-01 00:00:20', 'somchai', 'order', 'TIC-1.SV', '70.0 °C', 'verified', 0, 1, NULL),
     ('1970-01-01 00:00:21', 'somchai', 'write', 'TIC-1.SV', '70.0 °C', 'verified', 0, 2, NULL),

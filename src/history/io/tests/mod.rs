@@ -18,6 +18,7 @@ mod flips;
 mod import;
 mod alarm_metrics;
 mod moved;
+mod outages;
 mod pieces;
 mod power;
 mod procedures;

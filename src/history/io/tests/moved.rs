@@ -25,10 +25,10 @@ fn an_hour_is_never_missing_while_it_is_archived() {
             }
             let (from, to) = (sec(hour * HOUR_S), sec((hour + 1) * HOUR_S));
             // One that is refused while the archive changes is asked again.
-            let answer = reader.answer(&Query::Samples { from, to }, sec(hours * HOUR_S));
+            let answer = reader.answer(&Query::Samples { epoch: None, from, to }, sec(hours * HOUR_S));
             let Ok(Answer::Samples(samples)) = answer else { continue };
             asked += 1;
-            wrong.extend((samples.len() != 120).then_some((hour, samples.len())));
+            wrong.extend((samples.samples.len() != 120).then_some((hour, samples.samples.len())));
         }
     });
     for hour in 0..hours - 1 {

@@ -169,6 +169,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         compared: Vec::new(),
         runs: Vec::new(),
         outages: Vec::new(),
+        coarse: Vec::new(),
         charts: Vec::new(),
         batches: Vec::new(),
         tags: vec![
