@@ -221,11 +221,6 @@ impl Snapshot {
         let mut runs = (0..).map(ProcedureId).zip(&self.procedures);
         runs.find_map(|(id, run)| run.as_deref().filter(|run| run.at_work()).map(|run| (id, run)))
     }
-    /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
-    pub fn acknowledge_all(&self) -> Option<CommandKind> {
-        let waits = self.alarms.iter().any(|alarm| alarm.state.needs_acknowledgement());
-        waits.then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: self.annunciations }))
-    }
     /// The details of a fault of the station, as of the last time it was active.
     pub fn fault_details(&self, alarm: AlarmId) -> &str {
         let Condition::Station(fault) = self.def.alarm(alarm).condition else { return "" };

@@ -1,12 +1,16 @@
 //! How good the alarm system was: the journal, day by day, through the monitor that also measures the running plant.
 
-use std::{collections::BTreeSet, time::Duration};
+use std::{
+    collections::{BTreeSet, HashSet},
+    sync::Arc,
+    time::Duration,
+};
 
 use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{ROWS_MAX, alarm, check_span, within},
+    read::{ROWS_MAX, alarm, check_span, shared, within},
     sql,
     store::{Store, engine, instant, utc},
 };
@@ -15,6 +19,7 @@ use crate::{
     plant::{
         alarm::{
             AlarmMonitor, PeriodMetrics,
+            manager::name_of,
             monitor::{LEAD, RUNNING},
         },
         record::AlarmRecord,
@@ -119,12 +124,32 @@ impl Store {
 
     /// The raising events of the alarms that were active at an instant and not suppressed: a suppressed alarm is not stale.
     pub(super) fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::standing_at(), params![utc(at), ROWS_MAX + 1], alarm)
+        self.without_lost(self.whole_list(&sql::standing_at(), params![utc(at), ROWS_MAX + 1], alarm)?, at)
     }
 
     /// The raising events of the alarms that were active at an instant, also of those that were suppressed.
     pub(super) fn active_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::active_at(), params![utc(at), ROWS_MAX + 1], alarm)
+        self.without_lost(self.whole_list(&sql::active_at(), params![utc(at), ROWS_MAX + 1], alarm)?, at)
+    }
+
+    /// The events that suppressed an alarm at an instant.
+    pub(super) fn suppressing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+        self.whole_list(&sql::suppressing_at(), params![utc(at), ROWS_MAX + 1], alarm)
+    }
+
+    /// Without the alarms of which nothing is heard any more because a plant file took them away: earlier versions stored no
+    /// end of them.
+    fn without_lost(&self, mut raised: Vec<AlarmRecord>, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+        let known: HashSet<(&str, &str)> = self.def.alarms.iter().map(|alarm| name_of(&self.def, alarm)).collect();
+        let is_known = |event: &AlarmRecord| known.contains(&(&*event.subject, &*event.message));
+        if raised.iter().all(is_known) {
+            return Ok(raised);
+        }
+        let named = |row: &duckdb::Row| Ok((shared(row, 0)?, shared(row, 1)?));
+        let later: HashSet<(Arc<str>, Arc<str>)> =
+            self.whole_list(sql::NAMED_SINCE, params![utc(at), ROWS_MAX + 1], named)?.into_iter().collect();
+        raised.retain(|event| is_known(event) || later.contains(&(event.subject.clone(), event.message.clone())));
+        Ok(raised)
     }
 
     /// The events of alarms in a span, oldest first.

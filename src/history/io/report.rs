@@ -145,7 +145,7 @@ impl Store {
         };
         let active = self.active_at(from)?;
         let alarms = self.events(from, until)?;
-        let suppressed = figures::suppressed(&active, &self.standing_at(from)?, &alarms, from, until);
+        let suppressed = figures::suppressed(&active, &self.suppressing_at(from)?, &alarms, from, until);
         let actions =
             self.whole_list(&sql::actions(sql::OLDEST), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
         let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(chain_hash(row.get(0)?, row.get(1)?)))?;
