@@ -1,22 +1,30 @@
 //! `sightglass check`: every error of a file at once, or its warnings, the read plan of each line and whether the line has the capacity.
 
-use std::path::PathBuf;
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+use jiff::Timestamp;
 
 use crate::{
     bus::{
         admission, listen,
         plan::{self, Block, UnreadableRanges},
     },
+    history::io::alarm_file,
     plant::{
-        PlantDef,
+        Plant, PlantDef,
         admission::{Admission, DeadDevice},
         def::{LineDef, LineId},
+        losses::Loss,
+        record::AlarmRecord,
         tag::Poll,
     },
     profile::{self, Search},
 };
 
-use super::{CliError, say, say_problems};
+use super::{CliError, client, in_runtime, paths, say, say_problems};
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -26,6 +34,10 @@ pub struct Args {
     /// Refuse a plant with warnings: every alarm must be complete and of use
     #[arg(long)]
     strict: bool,
+    /// Name the alarms, shelvings and alarms out of service of a plant that this file would end, and what else is at work:
+    /// those of its running station, else those that it left behind [default: the plant of this file]
+    #[arg(long, value_name = "PLANT", num_args = 0..=1, default_missing_value = "")]
+    against: Option<String>,
 }
 
 /// Checks; on success prints what would be read, how busy each line would be, and whether every poll can meet its period.
@@ -43,7 +55,36 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if warnings.count() > 0 {
         say_problems(&warnings);
     }
+    let Some(against) = args.against else { return Ok(()) };
+    let plant = Path::new(if against.is_empty() { &def.name } else { &against });
+    let name = plant.file_stem().map_or_else(|| def.name.clone(), |stem| stem.to_string_lossy().into_owned());
+    let losses = in_runtime(losses(def, &name))?;
+    say("");
+    match losses.as_slice() {
+        [] => say(&format!("nothing that stands in {name} would be lost or renamed")),
+        [..] => losses.iter().for_each(|loss| say(&format!("against {name}: {loss}"))),
+    }
     Ok(())
+}
+
+/// What a definition would end of a plant: of its running station, else of the state that its alarms were left in.
+async fn losses(def: Arc<PlantDef>, name: &str) -> Result<Vec<String>, CliError> {
+    match client::open(Some(name)).await {
+        Ok(session) => {
+            let losses = session.snapshots.borrow().losses(&def);
+            return Ok(losses.iter().map(Loss::to_string).collect());
+        }
+        Err(CliError::NotRunning(_)) => {}
+        Err(error) => return Err(error),
+    }
+    let path = alarm_file::beside(&paths::history_of(name));
+    let left = alarm_file::left(&path).map_err(CliError::Failed)?;
+    let succession = Plant::new(def, Timestamp::UNIX_EPOCH, 1.0).restore(&left);
+    let loss = |end: &AlarmRecord| {
+        let becomes = end.reason.as_deref().unwrap_or("ends");
+        format!("alarm {} {} {becomes}", end.subject, end.message)
+    };
+    Ok(succession.ended.iter().map(loss).collect())
 }
 
 /// The plan of a line and its admission, a line of text each.

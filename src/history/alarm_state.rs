@@ -1,7 +1,7 @@
 //! The text of the alarm-state file: of each alarm the last event of every kind (and step of its action), one checked line each, oldest first.
 //!
 //! ```text
-//! sightglass alarm state 2
+//! sightglass alarm state 3
 //! 5f0c9a1be2d34477 {"at":"2026-05-01T12:00:00Z","subject":"TIC-1.PV","text":"high",…}
 //!  └ the first 8 bytes of the SHA-256 of what follows
 //! ```
@@ -17,8 +17,10 @@ use sha2::{Digest, Sha256};
 use crate::plant::record::AlarmRecord;
 
 /// The first line; its number goes up with every change of the others.
-pub const HEADER: &str = "sightglass alarm state 2\n";
-/// Most events that are kept: fifteen kinds of some thousand alarms, also of those that the plant file no longer has.
+pub const HEADER: &str = "sightglass alarm state 3\n";
+/// That of files whose events do not say which alarm they are of but by its name.
+const HEADER_BEFORE: &str = "sightglass alarm state 2\n";
+/// Most events that are kept: seventeen kinds of some thousand alarms, also of those that the plant file no longer has.
 const EVENTS_MAX: usize = 50_000;
 /// Hexadecimal digits of a checksum.
 const DIGITS: usize = 16;
@@ -96,10 +98,11 @@ pub fn parse(bytes: &[u8]) -> Result<LatestEvents, String> {
     let mut events = LatestEvents::default();
     let mut lines = bytes[..end].split_inclusive(|byte| *byte == b'\n');
     let header = lines.next().unwrap_or_default();
-    if header != HEADER.as_bytes() && header.starts_with(b"sightglass alarm state ") {
+    let is_known = [HEADER, HEADER_BEFORE].map(str::as_bytes).contains(&header);
+    if !is_known && header.starts_with(b"sightglass alarm state ") {
         return Err("it has the format of another version".to_owned());
     }
-    if header != HEADER.as_bytes() {
+    if !is_known {
         return Err(format!("line 1 is not `{}`", HEADER.trim_end()));
     }
     for (number, line) in (2..).zip(lines) {
@@ -171,7 +174,14 @@ mod tests {
     #[test]
     fn a_newer_or_missing_file_is_not_read_as_no_alarms() {
         assert!(parse(b"").is_err_and(|why| why.contains("line 1")));
-        assert!(parse(b"sightglass alarm state 3\n").is_err_and(|why| why.contains("another version")));
+        assert!(parse(b"sightglass alarm state 4\n").is_err_and(|why| why.contains("another version")));
         assert!(parse(HEADER.as_bytes()).unwrap().is_empty());
+    }
+
+    #[test]
+    fn a_file_of_the_version_before_is_read() {
+        let text = r#"{"at":"2026-05-01T12:00:00Z","subject":"TIC-1.PV","message":"high","priority":"High","event":"Raised","value":null,"limit":75.0,"by":null,"reason":null,"until":null,"first_out":null}"#;
+        let events = parse(format!("{HEADER_BEFORE}{} {text}\n", checksum(text)).as_bytes()).unwrap();
+        assert!(events.iter().map(|event| (&*event.message, &event.identity)).eq([("high", &None)]));
     }
 }

@@ -77,7 +77,7 @@ keyword_enum! {
         Unknown => "unknown",
         /// Its end was seen.
         Ended => "ended",
-        /// It had ended before the plant could be read again.
+        /// It had ended before the plant could be read again, or is no longer followed.
         FoundEnded => "found ended",
     }
 }
@@ -178,8 +178,13 @@ impl BatchTracker {
         self.lose(off?)
     }
 
+    /// The plant file has its rule no more: its end would never be seen.
+    pub fn remove(self, at: Timestamp) -> Option<BatchRecord> {
+        removed(self.latest.as_ref()?, at)
+    }
+
     /// It is not followed from here on.
-    pub fn lose(&mut self, at: Timestamp) -> Option<BatchRecord> {
+    fn lose(&mut self, at: Timestamp) -> Option<BatchRecord> {
         let running = self.running().filter(|latest| latest.event != BatchEvent::Unknown)?;
         let record = next(running, BatchEvent::Unknown, None, at);
         self.push(record)
@@ -243,6 +248,11 @@ impl BatchTracker {
     fn push(&mut self, record: BatchRecord) -> Option<BatchRecord> {
         self.latest.insert(record).clone().into()
     }
+}
+
+/// The end of a batch without a rule, unless it has ended.
+pub fn removed(latest: &BatchRecord, at: Timestamp) -> Option<BatchRecord> {
+    (!latest.event.is_end()).then(|| next(latest, BatchEvent::FoundEnded, None, at))
 }
 
 fn next(latest: &BatchRecord, event: BatchEvent, phase: Option<Arc<str>>, at: Timestamp) -> BatchRecord {

@@ -50,7 +50,8 @@ impl Record {
 }
 
 impl AlarmRecord {
-    fn move_to_utc(&mut self, by: SignedDuration) {
+    /// The same in UTC.
+    pub fn move_to_utc(&mut self, by: SignedDuration) {
         move_by(&mut self.at, by);
         self.until.iter_mut().for_each(|until| move_by(until, by));
         move_first_out(&mut self.first_out, by);

@@ -190,10 +190,12 @@ impl ControlRun {
     pub fn is_partial(&self) -> bool {
         self.good < WHOLE
     }
-    /// As it is called once its station has ended without a word of it.
-    pub fn interrupted(&self) -> ControlRun {
-        ControlRun { state: RunState::Interrupted, place: self.place + 1, ..self.clone() }
+    /// As it stands once it is known that the station which followed it has ended; `None` if it had ended before.
+    pub fn interrupted(&self) -> Option<ControlRun> {
+        let interrupted = || ControlRun { state: RunState::Interrupted, place: self.place + 1, ..self.clone() };
+        self.is_running().then(interrupted)
     }
+
     /// It goes on.
     pub fn is_running(&self) -> bool {
         self.state == RunState::Running

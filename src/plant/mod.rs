@@ -66,6 +66,7 @@ pub mod sweep;
 pub mod snapshot;
 pub mod entry;
 pub mod past;
+pub mod losses;
 pub(crate) mod totalizer;
 pub(crate) mod delay;
 pub(crate) mod calculation;

@@ -33,7 +33,8 @@ impl Past {
     /// As a terminal draws it. What is not stored is as in a plant of which nothing is known; counters are those of a minute.
     pub fn snapshot(&self, def: Arc<PlantDef>) -> Snapshot {
         let mut plant = Plant::new(def.clone(), self.at, 1.0);
-        plant.restore(&self.events);
+        // Nothing is recorded of it.
+        let _ = plant.restore(&self.events);
         plant.set_samples(&self.samples);
         let mut snapshot = plant.snapshot();
         let samples = &snapshot.samples;

@@ -222,8 +222,12 @@ impl ProcessImage {
                 Poll::Every(period) => (period, Cause::Stale),
                 Poll::Once => continue,
                 // Known from a write or a look; it may have changed since.
-                Poll::Never if sample.quality.is_good() => (NEVER_READ_AGAIN / PERIODS_UNCERTAIN, Cause::Stale),
-                Poll::Never => continue,
+                Poll::Never => {
+                    if sample.quality.is_good() && NEVER_READ_AGAIN < elapsed(sample.at, at) {
+                        self.mark_uncertain(tag.id, Cause::OnRequest);
+                    }
+                    continue;
+                }
             };
             let age = elapsed(sample.at, at);
             if sample.quality.is_bad() || sample.is_stated() {

@@ -62,15 +62,27 @@ pub struct AlarmRecord {
     pub until: Option<Timestamp>,
     /// Its place among the alarms that were raised together.
     pub first_out: Option<FirstOut>,
+    /// Which alarm it is, however it is called; the state file keeps it, the journal does not.
+    #[serde(default)]
+    pub identity: Option<AlarmIdentity>,
 }
 
 impl AlarmRecord {
     /// An event without operator, value and limit.
     pub fn new(at: Timestamp, subject: &str, message: &str, priority: Priority, event: AlarmEvent) -> AlarmRecord {
         let (subject, message) = (subject.into(), message.into());
-        let (value, limit, by, reason, until, first_out) = (None, None, None, None, None, None);
-        AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out }
+        let (value, limit, by, reason, until, first_out, identity) = (None, None, None, None, None, None, None);
+        AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out, identity }
     }
+}
+
+/// What an alarm is, apart from its wording: two plant files have the same alarm where these are the same.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct AlarmIdentity {
+    /// Its `id` in the plant file, else subject and condition: `TIC-1.PV high`.
+    pub name: Arc<str>,
+    /// It stays until it is reset.
+    pub latches: bool,
 }
 
 /// The place of an alarm among those that were raised within a short time of each other.
@@ -116,6 +128,10 @@ keyword_enum! {
         StepDone => "step done",
         /// The operator took that back.
         StepUndone => "step undone",
+        /// The plant file has it no more, or has it by another name, which is the reason of the event.
+        Removed => "removed with the plant file",
+        /// It goes on under another name: the alarm whose name is the reason of the event, no new activation.
+        CarriedOver => "carried over",
     }
 }
 
@@ -125,21 +141,49 @@ impl AlarmEvent {
         matches!(self, AlarmEvent::RaisedSuppressed | AlarmEvent::ReturnedSuppressed)
     }
 
+    /// Nothing was annunciated: it began or ended a suppression by design, or happened to an alarm that is suppressed. Lists
+    /// count these and show the others.
+    pub fn is_quiet(self) -> bool {
+        self.is_suppressed() || matches!(self, AlarmEvent::SuppressedByDesign | AlarmEvent::Unsuppressed)
+    }
+
     /// Is it about a step of the action?
     pub fn is_of_step(self) -> bool {
         matches!(self, AlarmEvent::StepDone | AlarmEvent::StepUndone)
     }
 
-    /// An active alarm is annunciated no longer: its condition cleared, or it was suppressed.
+    /// Is the condition of its alarm active from here on? `None`: as before.
+    pub fn active(self) -> Option<bool> {
+        match self {
+            AlarmEvent::Raised | AlarmEvent::RaisedSuppressed | AlarmEvent::CarriedOver => Some(true),
+            AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed | AlarmEvent::Removed => Some(false),
+            AlarmEvent::Acknowledged
+            | AlarmEvent::ReAlarmed
+            | AlarmEvent::Reset
+            | AlarmEvent::Shelved
+            | AlarmEvent::Unshelved
+            | AlarmEvent::SuppressedByDesign
+            | AlarmEvent::Unsuppressed
+            | AlarmEvent::OutOfService
+            | AlarmEvent::InService
+            | AlarmEvent::StepDone
+            | AlarmEvent::StepUndone => None,
+        }
+    }
+
+    /// The event that takes this one back, where it suppresses: an alarm may be suppressed for several reasons at a time.
+    pub fn ended_by(self) -> Option<AlarmEvent> {
+        match self {
+            AlarmEvent::Shelved => Some(AlarmEvent::Unshelved),
+            AlarmEvent::SuppressedByDesign => Some(AlarmEvent::Unsuppressed),
+            AlarmEvent::OutOfService => Some(AlarmEvent::InService),
+            _ => None,
+        }
+    }
+
+    /// An active alarm is annunciated no longer: its condition cleared, it was suppressed, or it is there no more.
     pub fn ends_annunciation(self) -> bool {
-        matches!(
-            self,
-            AlarmEvent::ReturnedToNormal
-                | AlarmEvent::ReturnedSuppressed
-                | AlarmEvent::Shelved
-                | AlarmEvent::SuppressedByDesign
-                | AlarmEvent::OutOfService
-        )
+        self.active() == Some(false) || self.ended_by().is_some()
     }
 }
 

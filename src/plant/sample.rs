@@ -65,6 +65,8 @@ keyword_enum! {
         Reloaded = 18 => "plant file reloaded",
         /// The master of a line that is only listened to was heard reading it for the first time.
         Unproven = 19 => "heard, not proven",
+        /// It is read on request only, and that was some time ago.
+        OnRequest = 20 => "read on request",
     }
 }
 
@@ -96,7 +98,8 @@ impl Cause {
             | Cause::NotHeard
             | Cause::Stated
             | Cause::Reloaded
-            | Cause::Unproven => true,
+            | Cause::Unproven
+            | Cause::OnRequest => true,
         }
     }
 }

@@ -167,6 +167,12 @@ impl TagDef {
             .is_some_and(|calculation| matches!(calculation.over_time, Some(super::calculation::OverTime::Total(_))))
     }
 
+    /// Is it read, or calculated, without anybody asking? Of all others nothing is known most of the time, and nothing is
+    /// wrong with that.
+    pub fn is_read(&self) -> bool {
+        self.calculation.is_some() || self.access != Access::Write && self.poll != Poll::Never
+    }
+
     /// Is it stored in the history?
     pub fn is_stored(&self) -> bool {
         self.store != StorePolicy::Never

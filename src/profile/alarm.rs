@@ -37,6 +37,7 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
         alarms.push(alarm);
     }
     check_names(tables, problems);
+    check_keys(tables, problems);
     check_order(tables, problems);
     let of_devices = defs.devices.iter().map(|device| (&device.name, not_responding(device)));
     // What another master polls has no worst case here.
@@ -70,6 +71,18 @@ fn check_names(tables: &[At<AlarmTable>], problems: &mut Problems) {
         };
         let message = format!("duplicate alarm `{}` of {}", text.value, subject.value);
         seen.insert(&format!("{}\n{}", subject.value, text.value), text.at, message, problems);
+    }
+}
+
+/// An `id` is one word, and that of one alarm: it stands for the alarm when all else of it has changed.
+fn check_keys(tables: &[At<AlarmTable>], problems: &mut Problems) {
+    let mut seen = Unique::default();
+    for key in tables.iter().filter_map(|table| table.value.id.as_ref()) {
+        // Subject and condition of an alarm without `id` are two words.
+        if key.value.is_empty() || key.value.contains(char::is_whitespace) {
+            problems.add(key.at, "not a valid `id`").label("expected one word, such as \"tank-hot\"");
+        }
+        seen.insert(&key.value, key.at, format!("duplicate alarm `id` {}", key.value), problems);
     }
 }
 
@@ -113,6 +126,7 @@ fn alarm(
         problem.label("expected at least \"1min\"");
     }
     AlarmDef {
+        key: table.id.as_ref().map(|key| key.value.as_str().into()),
         priority: table.priority.value_or(Priority::High),
         class: table.class.map_or_else(|| class_of(subject, condition), |class| class.value),
         area: text(&table.area),

@@ -56,6 +56,8 @@ toml_tables! {
         opt "off_delay" off_delay: Duration,
         need "priority" priority: Priority,
         need "message" message: String,
+        /// Which alarm it is, whatever its message, tag or condition become.
+        opt "id" id: String,
         opt "cause" cause: String,
         opt "effect" effect: String,
         opt "action" action: String,

@@ -140,6 +140,10 @@ fn summary(report: &ShiftReport, def: &PlantDef) -> Vec<Fact> {
     facts.push(fact("good values %", Cell::number(share, 1)));
     let of = |priority| raised(&report.alarms, priority);
     facts.push(fact("alarms", Cell::count(Priority::ALL.into_iter().map(of).sum())));
+    // Not in the list of events: who needs them looks into the journal.
+    if let quiet @ 1.. = report.alarms.iter().filter(|alarm| alarm.event.is_quiet()).count() {
+        facts.push(fact("alarm events not annunciated", Cell::count(quiet)));
+    }
     facts.push(fact("operator actions", Cell::count(report.actions.len())));
     if !def.report.text.is_empty() {
         facts.push(fact("note", Cell::text(&def.report.text)));

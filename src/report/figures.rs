@@ -119,8 +119,8 @@ pub struct EventLeg {
     pub until: Timestamp,
     /// The raising events of the alarms that were active at its begin.
     pub active: Vec<AlarmRecord>,
-    /// Of those, which were annunciated then.
-    pub standing: Vec<AlarmRecord>,
+    /// The events that suppressed any alarm then.
+    pub suppressing: Vec<AlarmRecord>,
     /// The events in it, in order.
     pub events: Vec<AlarmRecord>,
 }
@@ -148,8 +148,8 @@ pub fn times_in_alarm(legs: &[EventLeg]) -> HashMap<&str, Duration> {
 /// The alarms that were active while they were not annunciated, of all parts of a period.
 pub fn suppressed_in(legs: &[EventLeg]) -> Vec<SuppressedSummary> {
     let mut all: Vec<SuppressedSummary> = Vec::new();
-    for EventLeg { from, until, active, standing, events } in legs {
-        for found in suppressed(active, standing, events, *from, *until) {
+    for EventLeg { from, until, active, suppressing, events } in legs {
+        for found in suppressed(active, suppressing, events, *from, *until) {
             let is_same =
                 |other: &&mut SuppressedSummary| (&other.subject, &other.message) == (&found.subject, &found.message);
             match all.iter_mut().find(is_same) {
@@ -216,25 +216,13 @@ pub fn not_responding<'a>(
     };
     for event in events {
         let Some((&name, _)) = known.get_key_value(&(&*event.subject, &*event.message)) else { continue };
-        match event.event {
-            AlarmEvent::Raised | AlarmEvent::RaisedSuppressed => {
+        match event.event.active() {
+            Some(true) => {
                 let begun = event.at.checked_sub(known[&name]).unwrap_or(event.at);
                 open.entry(name).or_insert(begun.max(from));
             }
-            AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
-                outages.extend(open.remove(&name).map(|begun| outage(name, begun, event.at)));
-            }
-            AlarmEvent::Acknowledged
-            | AlarmEvent::ReAlarmed
-            | AlarmEvent::Reset
-            | AlarmEvent::Shelved
-            | AlarmEvent::Unshelved
-            | AlarmEvent::SuppressedByDesign
-            | AlarmEvent::Unsuppressed
-            | AlarmEvent::OutOfService
-            | AlarmEvent::InService
-            | AlarmEvent::StepDone
-            | AlarmEvent::StepUndone => {}
+            Some(false) => outages.extend(open.remove(&name).map(|begun| outage(name, begun, event.at))),
+            None => {}
         }
     }
     outages.extend(open.into_iter().map(|(name, begun)| outage(name, begun, until)));
@@ -254,14 +242,10 @@ pub fn time_in_alarm<'a>(events: impl Iterator<Item = &'a AlarmRecord>, from: Ti
             total += elapsed(since, at);
         }
         since = at;
-        match event.event {
-            AlarmEvent::Raised | AlarmEvent::RaisedSuppressed => {
-                active.insert(&event.message);
-            }
-            AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => {
-                active.remove(&*event.message);
-            }
-            _ => {}
+        match event.event.active() {
+            Some(true) => drop(active.insert(&event.message)),
+            Some(false) => drop(active.remove(&*event.message)),
+            None => {}
         }
     }
     if !active.is_empty() {
@@ -281,43 +265,26 @@ pub fn record(instants: &[Timestamp], sv: &[Option<Sample>], pv: &[Option<Sample
 }
 
 /// The alarms that were active over `from..until` while they were not annunciated. `active` are the raising events of those
-/// active at `from`, `standing` of those that were annunciated then; `events` are those of the period, in order.
+/// active at `from`, `suppressing` the events that suppressed any alarm then; `events` are those of the period, in order.
 pub fn suppressed(
     active: &[AlarmRecord],
-    standing: &[AlarmRecord],
+    suppressing: &[AlarmRecord],
     events: &[AlarmRecord],
     from: Timestamp,
     until: Timestamp,
 ) -> Vec<SuppressedSummary> {
     let mut alarms: BTreeMap<(&str, &str), SuppressionTracker> = BTreeMap::new();
-    let annunciated: HashSet<(&str, &str)> = standing.iter().map(|event| (&*event.subject, &*event.message)).collect();
-    for event in active {
-        let name = (&*event.subject, &*event.message);
-        alarms.entry(name).or_insert_with(|| SuppressionTracker::new(event)).set(
-            true,
-            !annunciated.contains(&name),
-            from,
-        );
+    for event in active.iter().chain(suppressing) {
+        let alarm = alarms.entry((&event.subject, &event.message)).or_insert_with(|| SuppressionTracker::new(event));
+        alarm.on_event(event.event, from);
     }
     for event in events {
         let alarm = alarms.entry((&event.subject, &event.message)).or_insert_with(|| SuppressionTracker::new(event));
-        let (active, quiet) = match event.event {
-            AlarmEvent::Raised => (true, false),
-            AlarmEvent::RaisedSuppressed => (true, true),
-            AlarmEvent::ReturnedToNormal | AlarmEvent::ReturnedSuppressed => (false, alarm.quiet),
-            AlarmEvent::Shelved | AlarmEvent::SuppressedByDesign | AlarmEvent::OutOfService => (alarm.active, true),
-            AlarmEvent::Unshelved | AlarmEvent::Unsuppressed | AlarmEvent::InService => (alarm.active, false),
-            AlarmEvent::Acknowledged
-            | AlarmEvent::ReAlarmed
-            | AlarmEvent::Reset
-            | AlarmEvent::StepDone
-            | AlarmEvent::StepUndone => continue,
-        };
+        alarm.on_event(event.event, event.at);
         alarm.found.raised += u64::from(event.event == AlarmEvent::RaisedSuppressed);
-        alarm.set(active, quiet, event.at);
     }
     let ended = alarms.into_values().map(|mut alarm| {
-        alarm.set(false, false, until);
+        alarm.count(until);
         alarm.found
     });
     ended.filter(|found| found.raised > 0 || !found.active.is_zero()).collect()
@@ -326,7 +293,10 @@ pub fn suppressed(
 /// Follows an alarm through a period.
 struct SuppressionTracker {
     active: bool,
-    quiet: bool,
+    /// The latest activation was not annunciated, whatever suppressed it.
+    raised_suppressed: bool,
+    /// What suppresses it, each for itself: the one ends while the other lasts.
+    suppressed_by: Vec<AlarmEvent>,
     since: Timestamp,
     found: SuppressedSummary,
 }
@@ -335,14 +305,33 @@ impl SuppressionTracker {
     fn new(event: &AlarmRecord) -> SuppressionTracker {
         let (subject, message) = (event.subject.clone(), event.message.clone());
         let found = SuppressedSummary { subject, message, priority: event.priority, raised: 0, active: Duration::ZERO };
-        SuppressionTracker { active: false, quiet: false, since: event.at, found }
+        let (active, raised_suppressed, suppressed_by) = (false, false, Vec::new());
+        SuppressionTracker { active, raised_suppressed, suppressed_by, since: event.at, found }
     }
 
-    fn set(&mut self, active: bool, quiet: bool, at: Timestamp) {
-        if self.active && self.quiet {
+    fn on_event(&mut self, event: AlarmEvent, at: Timestamp) {
+        self.count(at);
+        self.active = event.active().unwrap_or(self.active);
+        match event {
+            AlarmEvent::Raised | AlarmEvent::CarriedOver | AlarmEvent::Removed => {
+                (self.raised_suppressed, self.suppressed_by) = (false, Vec::new());
+            }
+            AlarmEvent::RaisedSuppressed => self.raised_suppressed = true,
+            AlarmEvent::Unshelved | AlarmEvent::Unsuppressed | AlarmEvent::InService => {
+                self.suppressed_by.retain(|by| by.ended_by() != Some(event));
+                self.raised_suppressed = false;
+            }
+            _ if event.ended_by().is_some() && !self.suppressed_by.contains(&event) => self.suppressed_by.push(event),
+            _ => {}
+        }
+    }
+
+    /// Counts what has passed since the last event.
+    fn count(&mut self, at: Timestamp) {
+        if self.active && (self.raised_suppressed || !self.suppressed_by.is_empty()) {
             self.found.active += elapsed(self.since, at);
         }
-        (self.active, self.quiet, self.since) = (active, quiet, at);
+        self.since = at;
     }
 }
 

@@ -291,6 +291,7 @@ pub fn shift_report() -> ShiftReport {
             reason: None,
             until: None,
             first_out: None,
+            identity: None,
         }],
         alarm_metrics: alarm_metrics::tests::figures(),
         actions: vec![ActionRecord {

@@ -17,12 +17,20 @@ use crate::{
 #[derive(Debug, Default)]
 pub(super) struct RecordedFiles {
     plant: Option<Arc<str>>,
+    plant_since: Option<Timestamp>,
     users: Option<Arc<str>>,
 }
 
 impl RecordedFiles {
     pub fn new(opened: &Opened) -> RecordedFiles {
-        RecordedFiles { plant: opened.plant_file.clone(), users: opened.users_file.clone() }
+        let (plant, plant_since) = (opened.plant_file.clone(), opened.plant_file_since);
+        RecordedFiles { plant, plant_since, users: opened.users_file.clone() }
+    }
+
+    /// Since when the plant file is as it is now; `None` if it is not the last one recorded.
+    pub fn plant_file_since(&self, file: Option<&PlantFile>) -> Option<Timestamp> {
+        let same = file.is_some_and(|file| self.plant.as_deref() == Some(&sha256(file.bytes())));
+        self.plant_since.filter(|_| same)
     }
 
     /// The first entries of a station: its start, then plant file and users if they differ from the last ones recorded. `users`

@@ -31,6 +31,7 @@ use crate::{
     },
     plant::{
         Plant, PlantDef,
+        alarm::Succession,
         command::{Command, CommandId, CommandKind, CommandStatus},
         event::Event,
         record::ChainHash,
@@ -161,7 +162,8 @@ fn begin(
     let mut audit_queue = AuditQueue::new(&recorder);
     // Without such a file, at the first start or after it was damaged, the journal has the state.
     let from_journal = recorder.alarms.events.is_none();
-    recorder.alarms.events.iter().for_each(|events| plant.restore(events));
+    let succession = recorder.alarms.events.iter().map(|events| plant.restore(events)).next().unwrap_or_default();
+    let file_since = audit_queue.files().plant_file_since(file.as_ref());
     let users = guarded.as_ref().and_then(|(access, _)| access.users_digest());
     if let Some(state) = guarded.as_ref().and_then(|(access, _)| users_fault(access, &recorder.opened)) {
         plant.on_fault(StationFault::UsersFile, state);
@@ -169,7 +171,8 @@ fn begin(
     audit_queue.put_start(&def.name, file.as_ref(), users, clock.utc());
     let past = Some(Past::new(history.restored.take(), from_journal));
     let (records, audit) = (Some(records), Some(audit_queue));
-    let persistence = Persistence { records, store, past, audit, sets: Some(sets), found: Some(found), observer };
+    let (sets, found) = (Some(sets), Some(found));
+    let persistence = Persistence { records, store, past, audit, sets, found, observer, succession, file_since };
     let threads = Threads { queries, jobs, history: Some(history), audit_writer: recorder.join };
     Ok(assemble(def, clock, connectors, plant, file, persistence, threads, guarded))
 }
@@ -204,6 +207,8 @@ pub fn start_transient(
         sets: None,
         found: None,
         observer: Some(observer),
+        succession: Succession::default(),
+        file_since: None,
     };
     let threads = Threads { queries, jobs: (jobs, PathBuf::new()), history: None, audit_writer: None };
     assemble(def, clock, connectors, plant, None, persistence, threads, None)

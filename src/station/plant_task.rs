@@ -2,6 +2,7 @@
 
 mod files;
 mod reload;
+mod restored;
 
 use std::{path::PathBuf, sync::Arc, time::Duration};
 
@@ -25,14 +26,12 @@ use crate::{
     access::{Completion, Durability},
     bus::io::clock::Clock,
     history::{
-        io::{
-            open::Restored,
-            thread::{HistoryInput, offer},
-        },
+        io::thread::{HistoryInput, offer},
         words::joined,
     },
     plant::{
         Effects, Plant, SetWork, Snapshot,
+        alarm::Succession,
         command::{BusRequest, CommandStatus, WriteJob},
         def::LineId,
         event::Event,
@@ -72,6 +71,10 @@ pub(super) struct Persistence {
     /// What was found of devices.
     pub found: Option<FoundFile>,
     pub observer: Option<RecordObserver>,
+    /// What was restored from the state file and is to be recorded.
+    pub succession: Succession,
+    /// The last change of the plant file that is on record, if it is as it was then.
+    pub file_since: Option<Timestamp>,
 }
 
 /// The loop around the reducer: sole owner of the plant.
@@ -106,6 +109,8 @@ impl PlantTask {
     /// Runs until the links have stopped.
     pub async fn run(mut self, mut inputs: Inputs) {
         self.file_sets(SetWork::Read);
+        let succession = std::mem::take(&mut self.persistence.succession);
+        self.record_succession(succession);
         if self.persistence.past.is_none() {
             // There is no history that they could go on from.
             self.plant.restore_totals(&[]);
@@ -231,33 +236,6 @@ impl PlantTask {
             audit.mark(&mut snapshot);
         }
         self.publish.send_replace(Arc::new(snapshot));
-    }
-
-    /// Restores alarm states and metrics from the history.
-    fn restore_history(&mut self, restored: Restored) {
-        let Some(past) = self.persistence.past.take() else { return };
-        let at_start = past.at_start;
-        let Restored { events, recent, entries, batches, mut runs, procedure, totals, off } = past.join(restored);
-        let behind = self.clock.behind_utc();
-        let off = off.map(|off| off.checked_sub(behind).unwrap_or(off));
-        runs.iter_mut().for_each(|run| run.move_from_utc(behind));
-        self.plant.restore_totals(&totals);
-        let resumed = self.plant.restore_batches(&batches, off);
-        self.dispatch(resumed);
-        let mut interrupted = self.plant.restore_runs(&runs);
-        interrupted.extend(self.plant.restore_procedures(procedure.as_ref()));
-        self.dispatch(interrupted);
-        if let (Some(entries), Some(audit)) = (entries, &mut self.persistence.audit) {
-            audit.compare(entries);
-        }
-        if !events.is_empty() {
-            tracing::info!(events = events.len(), "the alarm state is restored from the journal");
-            self.plant.restore(&events);
-            self.send_to_audit_log(Vec::new(), events);
-        }
-        if at_start {
-            self.plant.restore_alarm_counts(&recent.active, &recent.events, &recent.watched, self.clock.now());
-        }
     }
 
     fn handle_audit_message(&mut self, message: AuditMessage) {

@@ -68,7 +68,11 @@ pub fn forbidden_text(cx: &ViewContext, tag: TagId) -> Option<String> {
     };
     rights::missing(cx, &kind)
         .or_else(|| Notice::why_unreachable(cx, def.device))
-        .or_else(|| value.is_none().then(|| t!("? unknown: {name} is not good", name = def.name)))
+        .or_else(|| {
+            // What is not read is not known, and need not be.
+            let is_unknown = value.is_none() && def.is_read();
+            is_unknown.then(|| t!("? unknown: {name} is not good", name = def.name))
+        })
         .or_else(|| blocks(value?))
         .or_else(|| unmet_text(cx, tag))
 }

@@ -121,6 +121,7 @@ fn the_quality_of_the_alarms_is_reported_in_lines_and_in_json() {
             reason: None,
             until: None,
             first_out: None,
+            identity: None,
         })
     };
     let store = Store::open(&path, &def, at(0)).unwrap().store;

@@ -318,3 +318,61 @@ async fn an_unreachable_host_holds_no_reload() {
     assert_eq!((sample(&after, "DA.R2"), slave.connections()), (sample(&before, "DA.R2"), 1));
     assert_eq!(station.stop("DA.R2"), [NOT_READ, Quality::Good, OFF]);
 }
+
+/// An alarm of DA.R1, which is always 1.
+fn with_alarm(text: &str, message: &str) -> String {
+    let alarm = "[[alarm]]\ntag = \"DA.R1\"\nhigh = 0.5\ndeadband = 0.1\non_delay = \"0s\"\npriority = \"high\"\n";
+    format!("{text}{alarm}message = \"{message}\"\n")
+}
+
+/// The alarm events of a history: message, event, reason.
+fn journal(history: &Path) -> Vec<String> {
+    let db = duckdb::Connection::open(history).unwrap();
+    let rows =
+        "SELECT message || '|' || event || '|' || coalesce(reason, '') FROM alarm_journal WHERE subject = 'DA.R1'
+        ORDER BY utc, rowid";
+    let mut rows = db.prepare(rows).unwrap();
+    let rows = rows.query_map([], |row| row.get::<_, String>(0)).unwrap();
+    rows.map(Result::unwrap).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn no_alarm_leaves_without_an_event() {
+    let (folder, slaves) = (folder(), [true, true].map(Slave::start));
+    let ports = slaves.each_ref().map(|slave| slave.port);
+    let text = plant(ports, "Both", 1_000);
+    let mut station = Station::start(folder.path(), &with_alarm(&text, "over")).await;
+    let before = station.until("the alarm", |now| !now.alarms.is_empty() && is_good(now, &ALL)).await;
+    fs::write(folder.path().join("other.toml"), &text).unwrap();
+    let (done, said) = station.call(&["check", "other.toml", "--against", "both"]);
+    assert!(done && said.contains("against both: alarm DA.R1 over (UNACK) ends"), "{said}");
+    // Another message is the same alarm.
+    let (done, said) = station.reload(&with_alarm(&text, "too high"));
+    assert!(done && said.contains("alarm DA.R1 over (UNACK) goes on as DA.R1 too high"), "{said}");
+    let after = station.until("another run", |now| now.run != before.run && !now.alarms.is_empty()).await;
+    assert_eq!((after.alarms[0].raised_at, after.alarms[0].times), (before.alarms[0].raised_at, 1));
+    let (done, said) = station.call(&["stop"]);
+    assert!(done, "{said}");
+    assert_eq!(station.process.end(), Some(0));
+    let history = folder.path().join("h.duckdb");
+    let so_far = [
+        "over|raised|",
+        "over|removed with the plant file|goes on as DA.R1 too high",
+        "too high|carried over|was DA.R1 over",
+    ];
+    assert_eq!(journal(&history), so_far);
+    // The next station has another plant file: the same alarm by another name, then none.
+    let mut station = Station::start(folder.path(), &with_alarm(&text, "far too high")).await;
+    let restarted = station.until("the alarm", |now| !now.alarms.is_empty()).await;
+    assert_eq!(restarted.alarms[0].raised_at, before.alarms[0].raised_at, "since it was raised");
+    assert!(station.call(&["stop"]).0 && station.process.end() == Some(0));
+    let mut station = Station::start(folder.path(), &text).await;
+    station.until("values", |now| is_good(now, &ALL) && now.history.committed_at.is_some()).await;
+    assert!(station.call(&["stop"]).0 && station.process.end() == Some(0));
+    let then = [
+        "too high|removed with the plant file|goes on as DA.R1 far too high",
+        "far too high|carried over|was DA.R1 too high",
+        "far too high|removed with the plant file|",
+    ];
+    assert_eq!(journal(&history), [&so_far[..], &then].concat());
+}

@@ -130,6 +130,8 @@ pub struct Opened {
     pub wrong: Vec<String>,
     /// The hash of the plant file that was recorded last.
     pub plant_file: Option<Arc<str>>,
+    /// When that was.
+    pub plant_file_since: Option<Timestamp>,
     /// The hash of the users that was recorded last.
     pub users_file: Option<Arc<str>>,
     /// The latest sound entries, with their chain hashes, oldest first: to compare the history with, and to complete it.
@@ -153,6 +155,7 @@ impl AuditLog {
         let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry, chain_hash| {
             if &*entry.action == PLANT_FILE {
                 opened.plant_file.clone_from(&entry.new);
+                opened.plant_file_since = Some(entry.utc);
             } else if &*entry.action == USERS_FILE {
                 opened.users_file.clone_from(&entry.new);
             }

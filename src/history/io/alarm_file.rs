@@ -36,6 +36,16 @@ pub struct RestoredAlarms {
     pub trouble: Option<String>,
 }
 
+/// The events that a station has left in its file, to look at; none where there is no file.
+pub fn left(path: &Path) -> Result<Vec<AlarmRecord>, String> {
+    let bytes = match read(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        bytes => bytes.map_err(|error| format!("{} cannot be read: {error}", path.display()))?,
+    };
+    let events = parse_whole(&bytes).map_err(|why| format!("{}: {why}", path.display()))?;
+    Ok(events.iter().cloned().collect())
+}
+
 /// The state of the alarms, in memory and on disk.
 #[derive(Debug)]
 pub struct AlarmFile {

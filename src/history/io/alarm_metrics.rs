@@ -1,12 +1,12 @@
 //! How good the alarm system was: the journal, day by day, through the monitor that also measures the running plant.
 
-use std::time::Duration;
+use std::{collections::HashSet, sync::Arc, time::Duration};
 
 use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{ROWS_MAX, alarm, check_span, within},
+    read::{ROWS_MAX, alarm, check_span, shared, within},
     sql,
     store::{Store, engine, instant, utc},
 };
@@ -18,6 +18,7 @@ use crate::{
     plant::{
         alarm::{
             AlarmMonitor, PeriodMetrics,
+            manager::name_of,
             monitor::{LEAD, RUNNING},
         },
         record::AlarmRecord,
@@ -81,7 +82,24 @@ impl Store {
 
     /// The raising events of the alarms that were active at an instant and not suppressed: a suppressed alarm is not stale.
     pub(super) fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::standing_at(&Epochs::All.before()), params![utc(at), ROWS_MAX + 1], alarm)
+        let standing =
+            self.whole_list(&sql::standing_at(&Epochs::All.before()), params![utc(at), ROWS_MAX + 1], alarm)?;
+        self.without_lost(standing, at)
+    }
+
+    /// Without the alarms of which nothing is heard any more because a plant file took them away: earlier versions stored no
+    /// end of them.
+    fn without_lost(&self, mut raised: Vec<AlarmRecord>, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+        let known: HashSet<(&str, &str)> = self.def.alarms.iter().map(|alarm| name_of(&self.def, alarm)).collect();
+        let is_known = |event: &AlarmRecord| known.contains(&(&*event.subject, &*event.message));
+        if raised.iter().all(is_known) {
+            return Ok(raised);
+        }
+        let named = |row: &duckdb::Row| Ok((shared(row, 0)?, shared(row, 1)?));
+        let later: HashSet<(Arc<str>, Arc<str>)> =
+            self.whole_list(sql::NAMED_SINCE, params![utc(at), ROWS_MAX + 1], named)?.into_iter().collect();
+        raised.retain(|event| is_known(event) || later.contains(&(event.subject.clone(), event.message.clone())));
+        Ok(raised)
     }
 
     /// The events of alarms in a span, in the order in which they were stored.
@@ -97,13 +115,13 @@ impl Store {
             let from = began.and_then(instant).map_or(begin, |began| began.max(begin));
             let until = ended.and_then(instant).map_or(end, |ended| ended.min(end));
             let before = |sql: &str| self.whole_list(sql, params![utc(from), ROWS_MAX + 1], alarm);
-            let mut active = before(&sql::active_at(&epochs.before()))?;
-            let mut standing = before(&sql::standing_at(&epochs.before()))?;
+            let mut active = self.without_lost(before(&sql::active_at(&epochs.before()))?, from)?;
+            let mut suppressing = before(&sql::suppressing_at(&epochs.before()))?;
             // By another setting of the clock.
-            active.iter_mut().chain(&mut standing).for_each(|event| event.at = event.at.min(from));
+            active.iter_mut().chain(&mut suppressing).for_each(|event| event.at = event.at.min(from));
             let sql = sql::journal(&epochs.condition(), sql::OLDEST);
             let events = self.whole_list(&sql, params![utc(begin), utc(end), ROWS_MAX + 1], alarm)?;
-            all.push(EventLeg { from, until, active, standing, events });
+            all.push(EventLeg { from, until, active, suppressing, events });
         }
         Ok(all)
     }

@@ -266,6 +266,7 @@ pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
             (Some(began), Some(rank)) => Some(FirstOut { began, rank }),
             (_, None) | (None, _) => None,
         },
+        identity: None,
     })
 }
 

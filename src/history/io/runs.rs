@@ -69,7 +69,7 @@ impl Store {
         for run in runs.iter_mut().filter(|run| run.is_running()) {
             match self.ended {
                 // The next station will say so, too.
-                Some(ended) if ended <= until => *run = run.interrupted(),
+                Some(ended) if ended <= until => *run = run.interrupted().unwrap_or_else(|| run.clone()),
                 // It was stored some minutes before.
                 Some(_) | None => {
                     run.until = until;

@@ -337,7 +337,7 @@ impl Store {
 }
 
 fn append_alarm(to: &mut Appender, alarm: &AlarmRecord, epoch: u16) -> duckdb::Result<()> {
-    let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out } = alarm;
+    let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out, .. } = alarm;
     let (at, priority, event, until) = (utc(*at), priority.number(), event.word(), until.map(utc));
     let (began, rank) = first_out.map(|first_out| (utc(first_out.began), first_out.rank)).unzip();
     let (value, rest) = (value.map(Exact::near), value.and_then(Exact::rest));

@@ -12,11 +12,9 @@ use super::{
     state::{AlarmState, OperatorNote},
 };
 use crate::plant::{
-    command::CommandKind,
     def::{AlarmDef, AlarmId},
     exact::Exact,
     record::{AlarmEvent, AlarmRecord},
-    snapshot::Snapshot,
 };
 
 /// Most characters of a note or reason.
@@ -69,14 +67,6 @@ pub enum AlarmCommand {
         /// Done, or not.
         done: bool,
     },
-}
-
-impl Snapshot {
-    /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
-    pub fn acknowledge_all(&self) -> Option<CommandKind> {
-        let waits = self.alarms.iter().any(|alarm| alarm.state.needs_acknowledgement());
-        waits.then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: self.annunciations }))
-    }
 }
 
 /// Why a request about an alarm was refused.

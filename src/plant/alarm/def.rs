@@ -1,6 +1,6 @@
 //! What a plant file says about an alarm: condition, priority, delays, guidance.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +16,8 @@ use crate::plant::{
 pub struct AlarmDef {
     /// Its place.
     pub id: AlarmId,
+    /// Its `id` in the plant file: the same alarm under whatever name.
+    pub key: Option<Arc<str>>,
     /// What it watches.
     pub subject: Subject,
     /// When it is active.
@@ -49,6 +51,7 @@ impl AlarmDef {
     pub fn new(id: AlarmId, subject: Subject, condition: Condition, message: impl Into<String>) -> AlarmDef {
         AlarmDef {
             id,
+            key: None,
             subject,
             condition,
             priority: Priority::High,

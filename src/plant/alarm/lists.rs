@@ -5,12 +5,13 @@ use std::{cmp::Reverse, sync::Arc};
 use jiff::Timestamp;
 
 use super::{
-    AlarmManager,
+    AlarmCommand, AlarmManager,
     state::{AlarmState, AlarmStateMachine, OperatorNote},
 };
 use crate::plant::{
+    command::CommandKind,
     def::AlarmId,
-    snapshot::{ActiveAlarm, SuppressedAlarm},
+    snapshot::{ActiveAlarm, Snapshot, SuppressedAlarm},
 };
 
 /// What a snapshot shows of the manager. Shared, because most snapshots show the same.
@@ -64,6 +65,19 @@ impl AlarmManager {
             (self.def.alarm(alarm.id).priority, !waits, Reverse(alarm.raised_at))
         });
         Lists { active: Arc::new(active), suppressed: Arc::new(suppressed), sound }
+    }
+}
+
+impl Snapshot {
+    /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
+    pub fn acknowledge_all(&self) -> Option<CommandKind> {
+        let waits = self.alarms.iter().any(|alarm| alarm.state.needs_acknowledgement());
+        waits.then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: self.annunciations }))
+    }
+    /// The most urgent alarm that waits for an acknowledgement, else the most urgent one: what every page names.
+    pub fn foremost_alarm(&self) -> Option<&ActiveAlarm> {
+        let mut waiting = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
+        waiting.next().or_else(|| self.alarms.first())
     }
 }
 

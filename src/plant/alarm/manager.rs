@@ -12,11 +12,12 @@ use super::{
     condition::{ConditionMemory, Facts, holds},
     lists::Lists,
     state::{AlarmDelays, AlarmState, AlarmStateMachine},
+    succession,
 };
 use crate::plant::{
     def::{AlarmDef, AlarmId, LineId, PlantDef, Subject},
     exact::Exact,
-    record::{AlarmEvent, AlarmRecord, FirstOut},
+    record::{AlarmEvent, AlarmIdentity, AlarmRecord, FirstOut},
     station::STATION,
 };
 
@@ -29,13 +30,15 @@ const UNKNOWN_MAX: Duration = Duration::from_secs(60);
 pub struct AlarmManager {
     pub(super) def: Arc<PlantDef>,
     pub(super) machines: Vec<AlarmStateMachine>,
+    /// What each alarm is, whatever it is called, by [`AlarmId`].
+    pub(super) identities: Arc<[AlarmIdentity]>,
     /// What conditions that look back remember, by [`AlarmId`].
-    memories: Vec<ConditionMemory>,
+    pub(super) memories: Vec<ConditionMemory>,
     /// Since when it is unknown whether an alarm is enabled, on the manager's own clock, by [`AlarmId`].
-    unknown: Vec<Option<Duration>>,
+    pub(super) unknown: Vec<Option<Duration>>,
     /// The manager's own clock: what has passed while it was evaluated. It never goes back, whatever the station's clock does.
-    ran: Duration,
-    evaluated_at: Option<Timestamp>,
+    pub(super) ran: Duration,
+    pub(super) evaluated_at: Option<Timestamp>,
     /// The latest first-out group of each line, and of the station itself: its last alarm, and when its first was raised on the
     /// manager's own clock.
     first_out: HashMap<Option<LineId>, (FirstOut, Duration)>,
@@ -51,6 +54,7 @@ impl AlarmManager {
     pub fn new(def: Arc<PlantDef>) -> AlarmManager {
         AlarmManager {
             machines: vec![AlarmStateMachine::default(); def.alarms.len()],
+            identities: succession::identities(&def).into(),
             memories: vec![ConditionMemory::default(); def.alarms.len()],
             unknown: vec![None; def.alarms.len()],
             def,
@@ -80,40 +84,6 @@ impl AlarmManager {
             self.remind(alarm, facts, passed, at, &mut records);
         }
         records
-    }
-
-    /// Restores the alarms from the journal after a restart: of each alarm at least the last event of every
-    /// kind, oldest first. Alarm events that the plant no longer has are passed over.
-    pub fn restore(&mut self, events: &[AlarmRecord]) {
-        let def = self.def.clone();
-        let known = by_name(&def);
-        for event in events {
-            if let Some(id) = known.get(&(&*event.subject, &*event.message)) {
-                self.apply(*id, event);
-            }
-        }
-    }
-
-    /// Goes on under another definition: each alarm of a name stands as it did. Where its condition is another, its delay and
-    /// what it looks back on begin again.
-    pub fn redefine(&mut self, def: &Arc<PlantDef>) {
-        let AlarmManager { ran, evaluated_at, edges, silenced, .. } = *self;
-        let begun = AlarmManager { ran, evaluated_at, edges, silenced, ..AlarmManager::new(def.clone()) };
-        let mut before = std::mem::replace(self, begun);
-        let known = by_name(&before.def);
-        let reference =
-            |def: &PlantDef, alarm: &AlarmDef| alarm.condition.reference().map(|tag| def.tag(tag).name.clone());
-        for alarm in &def.alarms {
-            let Some(was) = known.get(&name_of(def, alarm)) else { continue };
-            let (place, from, was) = (alarm.id.index(), was.index(), before.def.alarm(*was));
-            self.machines[place] = std::mem::take(&mut before.machines[from]);
-            if alarm.condition == was.condition && reference(def, alarm) == reference(&before.def, was) {
-                self.memories[place] = std::mem::take(&mut before.memories[from]);
-                self.unknown[place] = before.unknown[from];
-            } else {
-                self.machines[place].pending_since = None;
-            }
-        }
     }
 
     /// How an alarm stands.
@@ -254,8 +224,8 @@ impl AlarmManager {
         record
     }
 
-    fn apply(&mut self, id: AlarmId, record: &AlarmRecord) {
-        let latch = self.def.alarm(id).latch;
+    pub(super) fn apply(&mut self, id: AlarmId, record: &AlarmRecord) {
+        let latch = record.identity.as_ref().map_or(self.def.alarm(id).latch, |identity| identity.latches);
         let machine = &mut self.machines[id.index()];
         let waited = machine.state().needs_acknowledgement();
         machine.apply(record, latch);
@@ -302,16 +272,13 @@ impl AlarmManager {
     ) -> AlarmRecord {
         let record =
             AlarmRecord::new(at, subject_name(&self.def, alarm.subject), &alarm.message, alarm.priority, event);
-        AlarmRecord { value, limit: alarm.condition.limit(), ..record }
+        let identity = self.identities.get(alarm.id.index()).cloned();
+        AlarmRecord { value, limit: alarm.condition.limit(), identity, ..record }
     }
 }
 
-/// The alarms of a plant by subject and message, as the journal knows them.
-fn by_name(def: &PlantDef) -> HashMap<(&str, &str), AlarmId> {
-    def.alarms.iter().map(|alarm| (name_of(def, alarm), alarm.id)).collect()
-}
-
-fn name_of<'a>(def: &'a PlantDef, alarm: &'a AlarmDef) -> (&'a str, &'a str) {
+/// Subject and message of an alarm, as the journal knows it.
+pub fn name_of<'a>(def: &'a PlantDef, alarm: &'a AlarmDef) -> (&'a str, &'a str) {
     (subject_name(def, alarm.subject), &alarm.message)
 }
 

@@ -9,6 +9,7 @@ pub(crate) mod monitor;
 pub(crate) mod metrics;
 pub(crate) mod rate;
 pub(crate) mod state;
+pub(crate) mod succession;
 #[cfg(test)]
 mod tests;
 
@@ -17,3 +18,4 @@ pub use manager::AlarmManager;
 pub use metrics::{AlarmMetrics, PeriodMetrics};
 pub use monitor::AlarmMonitor;
 pub use state::AlarmState;
+pub use succession::Succession;

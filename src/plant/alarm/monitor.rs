@@ -125,7 +125,9 @@ impl AlarmMonitor {
     pub fn already(&mut self, event: &AlarmRecord) {
         let history = self.alarms.entry(named(event)).or_default();
         match event.event {
-            AlarmEvent::Raised => (history.active, history.acknowledged) = (Some(event.at), false),
+            AlarmEvent::Raised | AlarmEvent::CarriedOver => {
+                (history.active, history.acknowledged) = (Some(event.at), false);
+            }
             AlarmEvent::Acknowledged => history.acknowledged = true,
             ended if ended.ends_annunciation() => history.active = None,
             _ => {}
@@ -139,6 +141,8 @@ impl AlarmMonitor {
             AlarmEvent::Raised => self.raised(event),
             AlarmEvent::Acknowledged => self.alarms.entry(named(event)).or_default().acknowledged = true,
             AlarmEvent::ReturnedToNormal => self.returned(event),
+            // No activation: it is the same alarm under another name.
+            AlarmEvent::CarriedOver => self.already(event),
             // A suppressed alarm burdens no operator: it is neither stale nor fleeting.
             ended if ended.ends_annunciation() => {
                 self.alarms.entry(named(event)).or_default().acknowledged = true;

@@ -236,6 +236,18 @@ impl AlarmStateMachine {
                     self.steps.push(note());
                 }
             }
+            AlarmEvent::CarriedOver => {
+                (self.active, self.unacknowledged, self.pending_since) = (true, true, None);
+                self.latched |= latch;
+                (self.raised_at, self.annunciated_at) = (Some(event.at), Some(event.at));
+                (self.returned_at, self.acknowledged) = (None, None);
+                self.steps.clear();
+                (self.value, self.first_out) = (event.value, event.first_out);
+            }
+            AlarmEvent::Removed => {
+                let AlarmStateMachine { times, edge, .. } = *self;
+                *self = AlarmStateMachine { times, edge, ..AlarmStateMachine::default() };
+            }
         }
     }
 

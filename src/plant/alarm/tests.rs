@@ -1,6 +1,7 @@
 //! The manager as a whole: what is annunciated, acknowledged, suppressed, reminded of and restored.
 
 mod anything;
+mod edits;
 mod steps;
 mod suppression;
 

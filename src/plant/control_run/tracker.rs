@@ -77,7 +77,7 @@ impl RunTracker {
         }
         self.last_number = Some(latest.as_ref().map_or(0, |latest| latest.number));
         let latest = latest?;
-        let interrupted = latest.is_running().then(|| latest.interrupted());
+        let interrupted = latest.interrupted();
         self.ended = Some(Arc::new(interrupted.clone().unwrap_or(latest)));
         interrupted
     }

@@ -1,7 +1,7 @@
 //! The process image: qualities, ages and what is recorded.
 
 use super::*;
-use crate::plant::fixture::{self, DP, FAULT, PV, RUN, TIC};
+use crate::plant::fixture::{self, DP, FAULT, PV, RUN, SV, TIC};
 use crate::plant::{
     event::ExceptionCode,
     tag::{DataType, StorePolicy},
@@ -57,6 +57,20 @@ fn a_text_is_trusted_and_doubted_like_a_number_and_never_stored() {
     assert_eq!(image.texts[PV.index()], None, "what is not known is not shown");
     let stored = |record: &Record| matches!(record, Record::Sample(tag, _) if *tag == PV);
     assert!(!image.records(at(4)).iter().any(stored));
+}
+
+#[test]
+fn a_value_that_is_read_on_request_is_never_called_stale() {
+    let mut def = fixture::plant();
+    def.tags[SV.index()].poll = Poll::Never;
+    let mut image = ProcessImage::new(Arc::new(def), at(0));
+    image.read(&[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)], at(0));
+    for (second, quality) in [(60, Quality::Good), (61, Quality::Uncertain(Cause::OnRequest))] {
+        image.age(at(second));
+        assert_eq!((image.sample(SV).quality, image.sample(SV).value), (quality, Some(70.0)), "{second} s");
+    }
+    image.age(at(100_000));
+    assert_eq!(image.sample(SV), Sample::good(70.0, at(0)).uncertain(Cause::OnRequest), "it is not dropped");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::{Effects, Plant};
 use crate::plant::{
-    alarm::{AlarmCommand, AlarmRefusal, condition::Facts, state::OperatorNote},
+    alarm::{AlarmCommand, AlarmRefusal, Succession, condition::Facts, state::OperatorNote},
     command::{CommandStatus, NotConfirmed, Outcome, Refusal},
     def::{AlarmDef, AlarmId, Condition, DeviceId, PlantDef, Subject},
     device_time::DeviceTime,
@@ -14,13 +14,13 @@ use crate::plant::{
     sample::Quality,
     snapshot::{DeviceState, DeviceStatus, LineStatus},
     station::{STATION, StationFault, StationFaults},
-    tag::{Access, Poll},
 };
 
 impl Plant {
-    /// Restores the alarms from the journal after a restart, oldest event first.
-    pub fn restore(&mut self, events: &[AlarmRecord]) {
-        self.alarm_manager.restore(events);
+    /// Restores the alarms from the journal after a restart, oldest event first; says what is to be recorded of those that
+    /// the plant has no more, or under another name.
+    pub fn restore(&mut self, events: &[AlarmRecord]) -> Succession {
+        self.alarm_manager.restore(events)
     }
 
     /// Carries out a command about alarms.
@@ -171,7 +171,7 @@ fn value_of(def: &crate::plant::PlantDef, image: &ProcessImage, alarm: AlarmId) 
 
 /// Has no tag of a device that is read a value, not even an uncertain one?
 fn has_only_bad(def: &PlantDef, image: &ProcessImage, device: DeviceId) -> bool {
-    let mut read = def.tags_of(device).filter(|tag| tag.poll != Poll::Never && tag.access != Access::Write);
+    let mut read = def.tags_of(device).filter(|tag| tag.is_read() && tag.calculation.is_none());
     read.all(|tag| matches!(image.sample(tag.id).quality, Quality::Bad(_)))
 }
 

@@ -5,7 +5,7 @@ use jiff::Timestamp;
 use super::Plant;
 use crate::plant::{
     PlantDef,
-    batch::{BatchEvent, BatchRecord},
+    batch::{self, BatchEvent, BatchRecord},
     control_run::{ControlRun, View},
     id::TagId,
     record::Record,
@@ -21,13 +21,17 @@ impl Plant {
     }
 
     /// Goes on with the batches of the station before this one, which ended at `off`: `latest` are the last records of each
-    /// name. Without a call of this no batch is recorded.
+    /// name. Without a call of this no batch is recorded. One whose rule is there no more ends.
     pub fn restore_batches(&mut self, latest: &[BatchRecord], off: Option<Timestamp>) -> Vec<Record> {
         let of_each = self.def.batches.iter().zip(&mut self.batches);
         let resumed = of_each.filter_map(|(def, tracker)| {
             tracker.restore(latest.iter().find(|record| record.batch == def.name).cloned(), off)
         });
-        resumed.map(Record::Batch).collect()
+        let mut records: Vec<BatchRecord> = resumed.collect();
+        let is_ruled = |record: &BatchRecord| self.def.batches.iter().any(|def| def.name == record.batch);
+        let left = latest.iter().filter(|record| !is_ruled(record));
+        records.extend(left.filter_map(|record| batch::removed(record, off.unwrap_or(self.at))));
+        records.into_iter().map(Record::Batch).collect()
     }
 
     /// Goes on counting the runs of each controller after its latest one, and interrupts those that the station before this
@@ -35,11 +39,15 @@ impl Plant {
     pub fn restore_runs(&mut self, latest: &[ControlRun]) -> Vec<Record> {
         let plant = &self.def;
         let of_each = plant.runs.iter().zip(&mut self.runs);
-        let interrupted = of_each.filter_map(|(def, tracker)| {
+        let restored = of_each.filter_map(|(def, tracker)| {
             let name = plant.device(def.controller).name.as_str();
             tracker.restore(latest.iter().find(|run| &*run.controller == name).cloned())
         });
-        interrupted.map(|run| Record::Run(Box::new(run))).collect()
+        let mut interrupted: Vec<ControlRun> = restored.collect();
+        let is_ruled =
+            |run: &ControlRun| plant.runs.iter().any(|def| *plant.device(def.controller).name == *run.controller);
+        interrupted.extend(latest.iter().filter(|run| !is_ruled(run)).filter_map(ControlRun::interrupted));
+        interrupted.into_iter().map(|run| Record::Run(Box::new(run))).collect()
     }
 
     pub(super) fn follow_batches(&mut self) -> Vec<Record> {

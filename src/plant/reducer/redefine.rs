@@ -17,7 +17,7 @@ use crate::plant::{
     line::Transport,
     number::to_u16,
     procedure::{ProcedureEnd, ProcedureRun},
-    record::Record,
+    record::{AlarmRecord, Record},
     redefinition::{Redefinition, Renamed},
     snapshot::LineStatus,
 };
@@ -29,6 +29,8 @@ pub struct Redefined {
     pub ended: Effects,
     /// What has begun, under the new ones.
     pub begun: Effects,
+    /// What stands of alarms that are called otherwise, for the state file.
+    pub standing: Vec<AlarmRecord>,
 }
 
 impl Plant {
@@ -40,7 +42,9 @@ impl Plant {
         ended.records.extend(self.image.redefine(def, &change, self.at));
         ended.records.extend(self.redefine_batches(def));
         ended.records.extend(self.redefine_runs(def));
-        self.alarm_manager.redefine(def);
+        let succession = self.alarm_manager.redefine(def, self.at);
+        ended.records.extend(succession.journal(self.at, None).into_iter().map(Record::Alarm));
+        self.count_alarms(&ended.records);
         self.redefine_devices(&change, def);
         self.counters = CounterWatch::default();
         let before = std::mem::replace(&mut self.def, def.clone());
@@ -51,7 +55,7 @@ impl Plant {
         let mut begun = self.evaluate(self.at);
         self.advance_work(self.at, &mut begun);
         self.count_alarms(&begun.records);
-        Redefined { ended, begun }
+        Redefined { ended, begun, standing: succession.state() }
     }
 
     /// How a line is connected, whatever its plant file says.
@@ -106,7 +110,7 @@ impl Plant {
         let names = self.def.batches.iter().map(|batch| batch.name.clone());
         let mut before: BTreeMap<Arc<str>, _> = names.zip(take(&mut self.batches)).collect();
         self.batches = def.batches.iter().map(|batch| before.remove(&batch.name).unwrap_or_default()).collect();
-        before.into_values().filter_map(|mut tracker| tracker.lose(self.at)).map(Record::Batch).collect()
+        before.into_values().filter_map(|tracker| tracker.remove(self.at)).map(Record::Batch).collect()
     }
 
     fn redefine_runs(&mut self, def: &PlantDef) -> Vec<Record> {

@@ -132,3 +132,17 @@ fn limits_of_one_tag_stand_in_order() {
     let errors = load(text.as_bytes(), METER, PLC).expect_err("50 are above the high and the high high");
     assert_eq!(errors.count(), 100, "{errors}");
 }
+
+#[test]
+fn the_id_of_an_alarm_is_one_word_and_that_of_no_other() {
+    let own = |id: &str| format!("high = 80.0\nid = \"{id}\"");
+    let plant = load(PLANT.replacen("high = 80.0", &own("tank-hot"), 1).as_bytes(), METER, PLC).expect("a good plant");
+    assert!(plant.alarms.iter().any(|alarm| alarm.key.as_deref() == Some("tank-hot")));
+    for id in ["", "tank hot"] {
+        check("high = 80.0", &own(id), &["not a valid `id`", "expected one word"]);
+    }
+    let second =
+        "[[alarm]]\ntag = \"D1.T\"\nlow = 5.0\ndeadband = 1.0\nid = \"hot\"\npriority = \"low\"\nmessage = \"cold\"\n";
+    let both = format!("{second}{}[mimic]", second.replace("low = 5.0", "low_low = 2.0").replace("cold", "frozen"));
+    check("[mimic]", &both, &["duplicate alarm `id` hot", "first here"]);
+}

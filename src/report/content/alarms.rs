@@ -80,7 +80,8 @@ pub(super) fn alarms(alarms: &[AlarmRecord]) -> Table {
         Column::text("by"),
         Column::text("reason"),
     ];
-    Table::new(columns).with(alarms.iter().map(|alarm| {
+    let annunciated = alarms.iter().filter(|alarm| !alarm.event.is_quiet());
+    Table::new(columns).with(annunciated.map(|alarm| {
         vec![
             Cell::Time(alarm.at),
             Cell::text(translate(alarm.priority.word())),

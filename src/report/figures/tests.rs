@@ -87,10 +87,10 @@ fn a_counter_has_a_difference_and_no_mean() {
 #[test]
 fn an_alarm_active_while_suppressed_is_listed_with_its_time() {
     use AlarmEvent::{
-        Acknowledged, Raised, RaisedSuppressed, ReturnedSuppressed, ReturnedToNormal, Shelved, SuppressedByDesign,
-        Unsuppressed,
+        Acknowledged, CarriedOver, Raised, RaisedSuppressed, Removed, ReturnedSuppressed, ReturnedToNormal, Shelved,
+        SuppressedByDesign, Unshelved, Unsuppressed,
     };
-    for (active, standing, steps, expect) in [
+    for (active, suppressing, steps, expect) in [
         (None, None, vec![(10, Raised), (30, ReturnedToNormal)], None),
         (
             None,
@@ -102,14 +102,24 @@ fn an_alarm_active_while_suppressed_is_listed_with_its_time() {
         (None, None, vec![(10, Raised), (20, Shelved), (25, Acknowledged), (70, ReturnedToNormal)], Some((0, 50))),
         (None, None, vec![(10, RaisedSuppressed), (20, Unsuppressed), (20, Raised)], Some((1, 10))),
         // Active before the period: annunciated, or not.
-        (Some(Raised), Some(Raised), vec![(40, ReturnedToNormal)], None),
-        (Some(Raised), None, vec![(40, ReturnedToNormal)], Some((0, 40))),
+        (Some(Raised), None, vec![(40, ReturnedToNormal)], None),
+        (Some(Raised), Some(Shelved), vec![(40, ReturnedToNormal)], Some((0, 40))),
         (Some(RaisedSuppressed), None, vec![], Some((0, 100))),
+        // For two reasons: the end of one is not that of the other.
+        (
+            Some(RaisedSuppressed),
+            Some(SuppressedByDesign),
+            vec![(10, Shelved), (30, Unshelved), (60, Unsuppressed), (60, Raised)],
+            Some((0, 60)),
+        ),
+        // It is there no more, or goes on under this name.
+        (None, None, vec![(10, Raised), (20, Shelved), (30, Removed)], Some((0, 10))),
+        (None, None, vec![(10, CarriedOver), (10, Shelved), (30, ReturnedSuppressed)], Some((0, 20))),
     ] {
         let all =
             |steps: &[(i64, AlarmEvent)]| steps.iter().map(|(at, kind)| step(*at, "high", *kind)).collect::<Vec<_>>();
         let before = |kind: Option<AlarmEvent>| all(&kind.map(|kind| (-50, kind)).into_iter().collect::<Vec<_>>());
-        let got = suppressed(&before(active), &before(standing), &all(&steps), sec(0), sec(100));
+        let got = suppressed(&before(active), &before(suppressing), &all(&steps), sec(0), sec(100));
         let got: Vec<_> = got.iter().map(|alarm| (alarm.raised, alarm.active.as_secs())).collect();
         assert_eq!(got, expect.into_iter().collect::<Vec<_>>(), "{steps:?}");
     }
@@ -231,4 +241,13 @@ proptest! {
             prop_assert!((got.near() - mean).abs() < 1e-6, "{} {}", got, mean);
         }
     }
+}
+
+#[test]
+fn unshelved_while_suppressed_by_design_is_still_suppressed() {
+    use AlarmEvent::{Raised, ReturnedSuppressed, Shelved, SuppressedByDesign, Unshelved};
+    let steps = [(10, Raised), (20, Shelved), (30, SuppressedByDesign), (40, Unshelved), (70, ReturnedSuppressed)];
+    let steps = steps.map(|(at, event)| step(at, "high", event));
+    let got = suppressed(&[], &[], &steps, sec(0), sec(100));
+    assert_eq!(got.iter().map(|alarm| (alarm.raised, alarm.active.as_secs())).collect::<Vec<_>>(), [(0, 50)]);
 }

@@ -24,6 +24,7 @@ use crate::{
         PlantDef,
         def::{DeviceId, LineId},
         line_finding::DeviceFinding,
+        losses::Loss,
     },
     profile::PlantFile,
     station::{
@@ -32,6 +33,9 @@ use crate::{
         session_server::{self, NewUsers},
     },
 };
+
+/// So many of what ends are named in the audit log; the journal of alarms has them all.
+const NAMED_MAX: usize = 50;
 
 /// What was read from plant file and users file.
 #[derive(Debug)]
@@ -72,6 +76,7 @@ impl Station {
         let place = store.map(|(records, _)| records.clone().try_reserve_owned());
         let place = place.transpose().map_err(|_| "not reloaded: the history is too busy, try again".to_owned())?;
         let mut summary = self.def.changed_lines(&new.def);
+        summary.push_str(&named(&self.acceptor.snapshots.borrow().losses(&new.def)));
         if users {
             summary.push_str("; the users file is read again");
         }
@@ -164,6 +169,16 @@ impl Station {
         history.queries = sender.clone();
         Some((sender, queries))
     }
+}
+
+/// What ends or goes on under another name, after what becomes of the lines.
+fn named(losses: &[Loss]) -> String {
+    let more = losses.len().saturating_sub(NAMED_MAX);
+    let mut words: String = losses.iter().take(NAMED_MAX).map(|loss| format!("; {loss}")).collect();
+    if 0 < more {
+        words.push_str(&format!("; and {more} more, see the journal"));
+    }
+    words
 }
 
 /// Does the data out go on as it is?

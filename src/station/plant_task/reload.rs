@@ -84,8 +84,9 @@ impl PlantTask {
     }
 
     fn redefine(&mut self, NewPlant { def, run, links, file, history, summary }: NewPlant) {
-        let Redefined { ended, begun } = self.plant.redefine(&def, run, self.clock.now());
+        let Redefined { ended, begun, standing } = self.plant.redefine(&def, run, self.clock.now());
         self.apply_effects(ended);
+        self.keep_standing(standing);
         self.links = links;
         match history {
             Some((place, queries)) => {

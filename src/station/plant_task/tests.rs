@@ -48,8 +48,17 @@ impl Station {
         let recorder = recorder::start(history, clock, records.clone());
         let (_, store) = watch::channel(HistoryStatus::default());
         let audit = Some(AuditQueue::new(&recorder));
-        let persistence =
-            Persistence { records: Some(records), store, past: None, audit, sets: None, found: None, observer: None };
+        let persistence = Persistence {
+            records: Some(records),
+            store,
+            past: None,
+            audit,
+            sets: None,
+            found: None,
+            observer: None,
+            succession: Default::default(),
+            file_since: None,
+        };
         let (request, requests) = mpsc::channel(8);
         let (publish, snapshots) = watch::channel(Arc::new(plant.snapshot()));
         let (events, event_queue) = mpsc::channel(8);

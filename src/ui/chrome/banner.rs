@@ -26,10 +26,10 @@ use crate::{
 /// the counts by priority. "No alarms" is said only when alarms could be seen.
 pub(super) fn banner(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let alarms = &cx.snapshot.alarms;
-    let urgent = alarms.iter().find(|alarm| alarm.state.needs_acknowledgement());
     let trouble = history_text(cx);
-    let other = alarms.first().filter(|_| trouble.is_none());
-    let Some(alarm) = urgent.or(other) else {
+    let foremost = cx.snapshot.foremost_alarm();
+    let foremost = foremost.filter(|alarm| alarm.state.needs_acknowledgement() || trouble.is_none());
+    let Some(alarm) = foremost else {
         let seen_none = alarms.is_empty();
         let blind = if seen_none { blind_text(model, cx) } else { silent_text(model).map(|why| not_judged(&why)) };
         let room = canvas.width().saturating_sub(1);

@@ -120,6 +120,7 @@ impl TabView for Alarms {
             Action::Area if self.page == Page::Journal => self.journal.next_area(cx),
             Action::Area => self.filter.next_area(cx.def()),
             Action::Words => return self.ask_text(),
+            Action::Quiet => self.journal.toggle_quiet(),
             Action::Shift(by) => self.shift(cx, by),
             Action::Now => self.shift(cx, 0),
             Action::Journal => self.turn_to_journal(cx),
@@ -286,8 +287,7 @@ impl Alarms {
 impl Alarms {
     /// The alarms that the page is about.
     fn of_page<'a>(&self, cx: &ViewContext<'a>) -> impl Iterator<Item = &'a ActiveAlarm> {
-        let (def, page, snapshot) = (cx.def(), self.page, cx.snapshot);
-        snapshot.alarms.iter().filter(move |alarm| is_on(page, def.alarm(alarm.id)))
+        on_page(cx, self.page)
     }
 
     fn rows<'a>(&self, cx: &ViewContext<'a>) -> Vec<list::Row<'a>> {
@@ -347,6 +347,13 @@ impl Alarms {
         self.journal.search_for(of.unwrap_or_default());
         self.page = Page::Journal;
     }
+}
+
+/// The alarms of a page. The one that every page names is on the first, whatever it is.
+fn on_page<'a>(cx: &ViewContext<'a>, page: Page) -> impl Iterator<Item = &'a ActiveAlarm> {
+    let (def, snapshot) = (cx.def(), cx.snapshot);
+    let named = snapshot.foremost_alarm().filter(|_| page == Page::Active).map(|alarm| alarm.id);
+    snapshot.alarms.iter().filter(move |alarm| Some(alarm.id) == named || is_on(page, def.alarm(alarm.id)))
 }
 
 /// Does an alarm stand on this page? Urgent trouble of the system is not kept from whoever looks at the process.

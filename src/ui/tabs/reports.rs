@@ -53,6 +53,8 @@ pub enum Action {
     Rows,
     /// The other columns of the figures.
     Columns,
+    /// Show or hide what was not annunciated.
+    Quiet,
     /// The chart of the tag so many rows further on.
     Tag(isize),
 }
@@ -72,6 +74,7 @@ const KEYS: &[Key<Action>] = &[
     Key::new(char('t'), "tag", "chart of the next tag (110 columns or more)", Action::Tag(1)),
     Key::new(char('T'), "", "chart of the previous tag", Action::Tag(-1)),
     Key::new(char('c'), "", "the other columns (narrower than 80)", Action::Columns),
+    Key::new(char('d'), "", "show or hide the alarm events that were not annunciated", Action::Quiet),
     Key::new(char('u'), "", "refresh the figures", Action::Refresh),
     Key::new(char('w'), "", "explain its current values", Action::Why),
 ];
@@ -114,6 +117,8 @@ pub struct Reports {
     scroll: Scroll,
     /// On a narrow screen the last columns of the figures are shown.
     later_columns: bool,
+    /// Also the events of alarms of which nothing was annunciated.
+    quiet: bool,
     number: u32,
 }
 
@@ -135,6 +140,7 @@ impl TabView for Reports {
             outgoing: None,
             scroll: Scroll::default(),
             later_columns: false,
+            quiet: false,
             number: 0,
         }
     }
@@ -302,6 +308,7 @@ impl Reports {
                 self.export = Export::Not;
             }
             Action::Columns => self.later_columns = !self.later_columns,
+            Action::Quiet => self.quiet = !self.quiet,
             Action::Refresh => self.report.query.want(),
             Action::Tag(by) => {
                 let rows = self.report.value.as_ref().map_or(0, |report| report.tags.len());
@@ -355,7 +362,7 @@ impl Reports {
 
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
         let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
-        let figures = |report: &ShiftReport| view::lines(cx, report, None, false).len();
+        let figures = |report: &ShiftReport| view::lines(cx, report, None, false, self.quiet).len();
         let lines = match (&self.preview, &self.report.value) {
             (Some(lines), _) => lines.len(),
             (None, Some(report)) => figures(report),

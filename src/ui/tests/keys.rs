@@ -184,17 +184,10 @@ fn the_journal_lists_alarms_and_actions_in_one_order() {
     let effects = type_keys(&mut model, "3j");
     let ago = |seconds| fixture::now() - jiff::SignedDuration::from_secs(seconds);
     let step = |seconds, step, by: Option<&str>| AlarmRecord {
-        at: ago(seconds),
-        subject: "TIC-1.PV".into(),
-        message: "temperature high".into(),
-        priority: Priority::High,
-        event: step,
         value: Some(72.1.into()),
         limit: Some(72.0),
         by: by.map(Arc::from),
-        reason: None,
-        until: None,
-        first_out: None,
+        ..AlarmRecord::new(ago(seconds), "TIC-1.PV", "temperature high", Priority::High, step)
     };
     for effect in effects {
         let Effect::Query(id, query) = effect else { continue };

@@ -89,7 +89,10 @@ fn several_runs_make_one_chain_in_a_private_file() {
     }
     let summary = verify(&path, &chain_hashes(&rows)).unwrap();
     assert_eq!((summary.entries, summary.compared), (4, 4));
-    assert_eq!(life(&history, &[]).2, Opened { plant_file: Some("x".into()), ..Opened::default() });
+    let opened = life(&history, &[]).2;
+    assert!(opened.plant_file_since.is_some());
+    let expect = Opened { plant_file: Some("x".into()), ..Opened::default() };
+    assert_eq!(Opened { plant_file_since: None, ..opened }, expect);
     for file in [path.clone(), path.with_extension("head")] {
         assert_eq!(fs::metadata(file).unwrap().permissions().mode() & 0o777, 0o600);
     }

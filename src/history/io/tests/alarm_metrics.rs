@@ -8,9 +8,12 @@ use proptest::prelude::*;
 use super::*;
 use crate::{
     history::io::store::utc,
-    plant::alarm::{
-        PeriodMetrics,
-        metrics::{Frequent, Named, place},
+    plant::{
+        alarm::{
+            PeriodMetrics,
+            metrics::{Frequent, Named, place},
+        },
+        def::{AlarmDef, AlarmId, Condition, Subject},
     },
 };
 
@@ -195,11 +198,20 @@ fn metrics_of_special_days_equal_those_counted_by_sql() {
     assert_eq!(store.alarm_metrics(until, until, until), Err(HistoryError::EmptyPeriod));
 }
 
+/// The store of a plant that has these alarms.
+fn watching(db: &Path, messages: &[&str]) -> Store {
+    let condition = Condition::State { is: 1.0 };
+    let alarm = |message: &&str| AlarmDef::new(AlarmId(0), Subject::Tag(PV), condition, *message);
+    let mut def = PlantDef::clone(&def());
+    def.alarms = messages.iter().map(alarm).collect();
+    Store::open(db, &Arc::new(def), sec(START)).unwrap().store
+}
+
 #[test]
 fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
     use AlarmEvent::Raised;
     let (_folder, db) = folder();
-    let store = open(&db, START);
+    let store = watching(&db, &["alarm at -100000"]);
     let [old, before, late] = [-100_000.0, -80_000.0, -1.0].map(|second| (second, format!("alarm at {second}")));
     let steps = [old, before, late].map(|(second, text)| AlarmRecord { at: at(second), ..step(0, &text, Raised) });
     store.append(&steps.clone().map(Record::Alarm)).unwrap();
@@ -211,7 +223,7 @@ fn a_station_that_starts_again_knows_the_alarms_of_its_last_day() {
 fn an_alarm_suppressed_before_a_period_is_not_stale_in_it() {
     use AlarmEvent::{OutOfService, Raised, RaisedSuppressed, Shelved, SuppressedByDesign};
     let (_folder, db) = folder();
-    let store = open(&db, START);
+    let store = watching(&db, &["shelved", "suppressed", "out of service", "quiet", "back"]);
     let pair = |second: f64, text: &str, first, then| {
         [(second, first), (second + 1.0, then)]
             .map(|(second, kind)| Record::Alarm(AlarmRecord { at: at(second), ..step(0, text, kind) }))

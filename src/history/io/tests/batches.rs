@@ -145,3 +145,16 @@ fn a_span_has_the_batches_that_ran_in_it_newest_first() {
     let refused = store.answer(&Query::Batches { from: sec(9), to: sec(9), limit: 1 }, sec(now));
     assert_eq!(refused, Err(HistoryError::EmptyPeriod));
 }
+
+#[test]
+fn a_batch_whose_rule_is_taken_away_does_not_run_for_ever() {
+    let (_folder, db) = folder();
+    station(&db, &making(), 1_030..1_050, 0..0);
+    let def = Arc::new(PlantDef { batches: Vec::new(), ..PlantDef::clone(&making()) });
+    station(&db, &def, 1_100..1_110, 0..0);
+    let store = Store::open_read_only(&db, &def).unwrap();
+    let found = batches(&store, 0, 2_000, 50, 2_000);
+    let end = found[0].batch.to.map(|at| at.as_second());
+    assert!((1_049..=1_050).contains(&end.unwrap()) && !found[0].batch.seen.1, "when its station ended: {end:?}");
+    assert_eq!(batches(&store, 1_500, 2_000, 50, 2_000), []);
+}

@@ -252,3 +252,58 @@ fn an_action_of_a_full_disk_stands_once_in_the_history() {
     let sql = "SELECT string_agg(coalesce(number::VARCHAR, 'none'), ' ' ORDER BY utc) FROM operator_action";
     assert_eq!(store.db.query_row(sql, [], |row| row.get::<_, String>(0)).unwrap(), "1 2 3 4");
 }
+
+/// The alarms as a second found them.
+fn leg(store: &Store, second: i64) -> crate::report::figures::EventLeg {
+    store.event_legs(sec(second), sec(second + 1)).unwrap().remove(0)
+}
+
+/// An earlier version stored no end where a plant file took an alarm away.
+#[test]
+fn an_alarm_that_its_plant_has_no_more_is_not_active_for_ever() {
+    let (_folder, db) = folder();
+    let mut def = plant("Asia/Bangkok", &THREE);
+    let condition = crate::plant::def::Condition::State { is: 1.0 };
+    let subject = crate::plant::def::Subject::Tag(PV);
+    def.alarms = vec![crate::plant::def::AlarmDef::new(crate::plant::def::AlarmId(0), subject, condition, "there")];
+    let def = Arc::new(def);
+    let store = Store::open(&db, &def, sec(0)).unwrap().store;
+    let events = [step(10, "there", AlarmEvent::Raised), step(10, "gone", AlarmEvent::Raised)];
+    store.append(&events.map(Record::Alarm)).unwrap();
+    let messages = |found: Vec<AlarmRecord>| found.iter().map(|event| event.message.to_string()).collect::<Vec<_>>();
+    assert_eq!(messages(leg(&store, 1_000).active), ["there"]);
+    assert_eq!(messages(store.standing_at(sec(1_000)).unwrap()), ["there"]);
+    // What has a later event was in the plant until then.
+    store.append(&[Record::Alarm(step(2_000, "gone", AlarmEvent::Removed))]).unwrap();
+    let mut both = messages(leg(&store, 1_000).active);
+    both.sort();
+    assert_eq!(both, ["gone", "there"]);
+    assert_eq!(messages(leg(&store, 3_000).active), ["there"]);
+    store.append(&[Record::Alarm(step(3_100, "there too", AlarmEvent::CarriedOver))]).unwrap();
+    store.append(&[Record::Alarm(step(9_000, "there too", AlarmEvent::Removed))]).unwrap();
+    assert_eq!(messages(store.standing_at(sec(4_000)).unwrap()), ["there", "there too"]);
+}
+
+#[test]
+fn each_reason_for_a_suppression_ends_for_itself() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let events = [
+        (10, AlarmEvent::Shelved),
+        (20, AlarmEvent::SuppressedByDesign),
+        (30, AlarmEvent::Unshelved),
+        (40, AlarmEvent::OutOfService),
+        (50, AlarmEvent::Unsuppressed),
+        (60, AlarmEvent::Removed),
+    ];
+    store.append(&events.map(|(at, event)| Record::Alarm(step(at, "high", event)))).unwrap();
+    let at =
+        |second: i64| -> Vec<AlarmEvent> { leg(&store, second).suppressing.iter().map(|event| event.event).collect() };
+    use AlarmEvent::{OutOfService, Shelved, SuppressedByDesign};
+    assert_eq!(at(5), []);
+    assert_eq!(at(25), [Shelved, SuppressedByDesign]);
+    assert_eq!(at(35), [SuppressedByDesign]);
+    assert_eq!(at(45), [SuppressedByDesign, OutOfService]);
+    assert_eq!(at(55), [OutOfService]);
+    assert_eq!(at(65), []);
+}

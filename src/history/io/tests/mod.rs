@@ -91,6 +91,7 @@ fn step(at: i64, text: &str, step: AlarmEvent) -> AlarmRecord {
         reason: None,
         until: None,
         first_out: None,
+        identity: None,
     }
 }
 

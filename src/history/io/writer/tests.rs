@@ -27,6 +27,7 @@ fn alarm(at: i64) -> Record {
         reason: None,
         until: None,
         first_out: None,
+        identity: None,
     })
 }
 

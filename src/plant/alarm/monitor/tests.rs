@@ -25,6 +25,7 @@ fn event(second: f64, name: &str, event: AlarmEvent) -> AlarmRecord {
         reason: None,
         until: None,
         first_out: None,
+        identity: None,
     }
 }
 

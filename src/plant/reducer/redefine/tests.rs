@@ -138,7 +138,7 @@ fn a_changed_limit_is_evaluated_and_changes_no_value() {
     let mut other = def();
     let Condition::Limit { limit, .. } = &mut other.alarms[HIGH.index()].condition else { panic!("a limit") };
     *limit = 90.0;
-    let Redefined { ended, begun } = redefine(&mut plant, 4, other);
+    let Redefined { ended, begun, .. } = redefine(&mut plant, 4, other);
     assert_eq!((&ended, plant.snapshot().samples), (&Effects::default(), before.samples));
     let events: Vec<AlarmEvent> = alarm_events(begun).into_iter().map(|event| event.event).collect();
     assert_eq!(events, [AlarmEvent::ReturnedToNormal]);
@@ -148,7 +148,7 @@ fn a_changed_limit_is_evaluated_and_changes_no_value() {
 fn a_removed_tag_ends_its_curve_and_no_other() {
     let mut plant = plant();
     let before = plant.snapshot();
-    let Redefined { ended, begun } = redefine(&mut plant, 4, without_sv());
+    let Redefined { ended, begun, .. } = redefine(&mut plant, 4, without_sv());
     assert_eq!(samples(&ended), [(SV, Sample::bad(Cause::Reloaded, at(4)))], "under the id that it had");
     assert_eq!(samples(&begun), [], "the history has all others");
     let after = plant.snapshot();
@@ -180,7 +180,7 @@ fn a_tag_with_other_registers_says_that_it_was_reloaded() {
     let check = |what: &str, other: PlantDef, changed: &[TagId]| {
         let mut plant = plant();
         let before = plant.snapshot();
-        let Redefined { ended, begun } = redefine(&mut plant, 4, other);
+        let Redefined { ended, begun, .. } = redefine(&mut plant, 4, other);
         assert_eq!(samples(&ended), [], "{what}");
         let stored: Vec<(TagId, Sample)> =
             changed.iter().map(|tag| (*tag, Sample::bad(Cause::Reloaded, at(4)))).collect();
@@ -275,7 +275,7 @@ fn totals_and_batches_go_on_under_other_ids() {
     let mut plant = plant();
     read(&mut plant, 3_600, PLC, &[(RUN, 1.0)]);
     let has_batches = |effects: &Effects| effects.records.iter().any(|record| matches!(record, Record::Batch(_)));
-    let Redefined { ended, begun } = redefine(&mut plant, 3_601, without_sv());
+    let Redefined { ended, begun, .. } = redefine(&mut plant, 3_601, without_sv());
     assert!(!has_batches(&ended) && !has_batches(&begun), "the batch goes on");
     let (run, hours) = (TagId(RUN.0 - 1), TagId(HOURS.0 - 1));
     let effects = read(&mut plant, 5_400, PLC, &[(run, 1.0)]);

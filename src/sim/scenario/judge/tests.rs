@@ -89,6 +89,7 @@ fn an_alarm_counts_in_its_time_and_in_its_step_only() {
                 reason: None,
                 until: None,
                 first_out: None,
+                identity: None,
             })]);
         }
         assert_eq!(is_over(&mut judge), expect, "{expectation:?} {steps:?}");

@@ -101,6 +101,7 @@ fn because(
             }
             Poll::Once | Poll::Never => Some(t!("it is read on request only").to_owned()),
         },
+        Cause::OnRequest => Some(t!("it is read on request only").to_owned()),
         Cause::NotHeard => {
             let heard = exchange.map_or(cx.snapshot.sample(def.id).at, |exchange| exchange.at);
             Some(t!("not heard for {seconds} s", seconds = crate::plant::time::elapsed(heard, cx.now).as_secs()))
@@ -148,6 +149,7 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
             }
             Poll::Once | Poll::Never => Some(t!("read it now: tab 4, u").to_owned()),
         },
+        Cause::OnRequest => Some(t!("read it now: tab 4, u").to_owned()),
         Cause::NotRead => match def.poll {
             Poll::Every(_) | Poll::Once => None,
             Poll::Never => Some(t!("read it now: tab 4, u").to_owned()),

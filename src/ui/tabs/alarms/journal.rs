@@ -36,6 +36,8 @@ pub struct Journal {
     area: Option<String>,
     /// The chosen period; `None` is the last 24 hours.
     period: Option<Period>,
+    /// Also the events of which nothing was annunciated.
+    quiet: bool,
 }
 
 impl Journal {
@@ -76,6 +78,11 @@ impl Journal {
         (self.area, self.scroll) = (filter::area_after(cx.def(), self.area.as_ref()), Scroll::default());
     }
 
+    /// Shows the events of which nothing was annunciated, or hides them.
+    pub fn toggle_quiet(&mut self) {
+        (self.quiet, self.scroll) = (!self.quiet, Scroll::default());
+    }
+
     /// Scrolls.
     pub fn step(&mut self, cx: &ViewContext, motion: Motion, room: usize) {
         self.scroll.on(motion, self.rows(cx).len(), room);
@@ -90,7 +97,7 @@ impl Journal {
     /// Other rows are wanted; those of before must not stand under their heading.
     fn show(&mut self, period: Option<Period>) {
         let (words, area) = (std::mem::take(&mut self.words), self.area.take());
-        *self = Journal { words, area, period, ..Journal::default() };
+        *self = Journal { words, area, period, quiet: self.quiet, ..Journal::default() };
     }
 
     fn limit(&self) -> usize {
@@ -115,7 +122,7 @@ impl Journal {
         let x = canvas.text(1, 0, t!("Journal  "), theme.strong());
         let rows = self.rows(cx);
         let (alarms, actions) = self.records();
-        let all = alarms.len() + actions.len();
+        let all = alarms.iter().filter(|row| self.quiet || !row.event.is_quiet()).count() + actions.len();
         let period = self.period.as_ref().map_or(t!("last 24 hours").to_owned(), |period| period::words(cx, period));
         let mut what = vec![period];
         what.extend(self.area.as_ref().map(|area| t!("area {area}", area)));
@@ -128,6 +135,9 @@ impl Journal {
         if let times @ 1.. = cx.snapshot.history.epoch {
             let often = if times == 1 { t!("once").to_owned() } else { t!("{times} times", times) };
             what.push(t!("clock set {often} (epoch {times})", often, times));
+        }
+        if let hidden @ 1.. = self.hidden(cx) {
+            what.push(t!("{hidden} not annunciated hidden, d shows them", hidden));
         }
         let x = canvas.text(x, 0, &what.join(", "), theme.normal());
         if let Some(trouble) = self.alarms.trouble.as_ref().or(self.actions.trouble.as_ref()) {
@@ -151,22 +161,35 @@ impl Journal {
         }
     }
 
+    /// How many events are hidden because nothing of them was annunciated.
+    fn hidden(&self, cx: &ViewContext) -> usize {
+        if self.quiet { 0 } else { self.alarm_rows(cx).filter(|(row, _)| row.event.is_quiet()).count() }
+    }
+
     fn records(&self) -> (&[AlarmRecord], &[ActionRecord]) {
         (self.alarms.value.as_deref().unwrap_or_default(), self.actions.value.as_deref().unwrap_or_default())
     }
 
-    /// Alarms and operator actions in one list, newest first.
-    fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
-        let (alarms, actions) = self.records();
+    /// The alarm events that are searched for, with their words.
+    fn alarm_rows<'a>(&'a self, cx: &'a ViewContext) -> impl Iterator<Item = (&'a AlarmRecord, String)> {
         let area = self.area.as_ref().map(|area| InArea::new(cx.def(), area));
-        let alarms = alarms.iter().filter(|row| area.as_ref().is_none_or(|area| area.has_alarm(row)));
-        let actions = actions.iter().filter(|row| area.as_ref().is_none_or(|area| area.has_action(row)));
-        let alarms = alarms.filter_map(|row| {
+        let alarms = self.records().0.iter();
+        let alarms = alarms.filter(move |row| area.as_ref().is_none_or(|area| area.has_alarm(row)));
+        alarms.filter_map(|row| {
             let text = alarm_text(cx, row);
             // What is cut off is found too.
             let whole = format!("{text} {} {}", row.subject, translate(&row.message));
-            self.words.fit(&whole).then_some((row.at, text, cx.theme.normal()))
-        });
+            self.words.fit(&whole).then_some((row, text))
+        })
+    }
+
+    /// Alarms and operator actions in one list, newest first.
+    fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
+        let (_, actions) = self.records();
+        let area = self.area.as_ref().map(|area| InArea::new(cx.def(), area));
+        let actions = actions.iter().filter(|row| area.as_ref().is_none_or(|area| area.has_action(row)));
+        let alarms = self.alarm_rows(cx).filter(|(row, _)| self.quiet || !row.event.is_quiet());
+        let alarms = alarms.map(|(row, text)| (row.at, text, cx.theme.normal()));
         let actions = actions.map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
         let mut rows: Vec<_> = alarms.chain(actions.filter(|(_, text, _)| self.words.fit(text))).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.0));

@@ -50,6 +50,8 @@ pub enum Action {
     Controller,
     /// The journal of what the alarm watches; from the journal back to the list.
     Journal,
+    /// Show or hide what was not annunciated.
+    Quiet,
     /// The shift before or after.
     Shift(isize),
     /// The present.
@@ -120,6 +122,13 @@ const SEARCH: [Row; 2] = [
     Key::new(char('j'), "list", "back to the list", Action::Journal),
 ];
 
+const QUIET: [Row; 1] = [Key::new(
+    char('d'),
+    "by design",
+    "show or hide what was not annunciated: suppression by design, events of suppressed alarms",
+    Action::Quiet,
+)];
+
 const SHIFT: [Row; 3] = [
     Key::new(code(KeyCode::Left), "", "previous shift", Action::Shift(-1)),
     Key::new(code(KeyCode::Right), "shift", "next shift", Action::Shift(1)),
@@ -138,7 +147,7 @@ pub fn table(page: Page) -> Vec<Row> {
     let parts: &[&[Row]] = match page {
         Page::Active | Page::System => &[&RESET, &VIEWS, &OPEN, &ACTIONS, &AREA, &MOVE, &GO],
         Page::Suppressed => &[&BACK, &VIEWS, &OPEN, &MOVE, &GO],
-        Page::Journal => &[&SEARCH, &VIEWS, &AREA, &SHIFT, &MOVE],
+        Page::Journal => &[&SEARCH, &VIEWS, &QUIET, &AREA, &SHIFT, &MOVE],
         Page::Metrics => &[&VIEWS, &SHIFT, &MOVE],
         Page::Handover => &[&HANDOVER, &VIEWS, &SHIFT, &MOVE],
     };

@@ -132,9 +132,13 @@ impl Recent {
         stood.into_iter().map(|stood| signs[stood as usize]).collect()
     }
 
-    /// The last events of the day, newest first; `None` until the history has answered.
-    pub fn events(&self) -> Option<&[AlarmRecord]> {
-        self.alarms.value.as_deref()
+    /// The last events that were annunciated, newest first, and how many others there are; `None` until the history has
+    /// answered.
+    pub fn events(&self) -> Option<(Vec<&AlarmRecord>, usize)> {
+        let events = self.alarms.value.as_deref()?;
+        let annunciated: Vec<_> = events.iter().filter(|event| !event.event.is_quiet()).collect();
+        let quiet = events.len() - annunciated.len();
+        Some((annunciated, quiet))
     }
 
     /// Since when alarm events and actions are known, where the journal holds more than was looked through.
@@ -215,7 +219,9 @@ fn ribbon(
             Some(AlarmEvent::ReturnedToNormal | AlarmEvent::Shelved | AlarmEvent::OutOfService) => {
                 before_end(steps, at)
             }
-            Some(AlarmEvent::SuppressedByDesign) => before_end(steps, at),
+            Some(AlarmEvent::SuppressedByDesign | AlarmEvent::Removed) => before_end(steps, at),
+            // It had another name.
+            Some(AlarmEvent::CarriedOver) => Stood::Unknown,
             Some(AlarmEvent::StepDone | AlarmEvent::StepUndone) => ends,
             Some(
                 AlarmEvent::RaisedSuppressed

@@ -126,14 +126,21 @@ fn before(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Row> {
 fn last_events(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let dim = cx.theme.dim();
     canvas.text(0, 0, t!("last events"), dim);
-    let Some(events) = tab.recent.events() else {
+    let Some((events, quiet)) = tab.recent.events() else {
         canvas.text(0, 1, t!("collecting data"), dim);
         return;
     };
-    if events.is_empty() {
+    if events.is_empty() && quiet == 0 {
         canvas.text(0, 1, t!("none"), dim);
     }
     let mut y = 1;
+    if 0 < quiet {
+        let words = t!("{quiet} not annunciated: d in the journal", quiet);
+        for line in wrap(&words, canvas.width()) {
+            canvas.text(0, y, &line, dim);
+            y += 1;
+        }
+    }
     for record in events {
         if canvas.height() <= y {
             return;

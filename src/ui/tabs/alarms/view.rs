@@ -2,7 +2,7 @@
 
 use ratatui::style::Modifier;
 
-use super::{Alarms, Page, columns::Columns, guidance, handover::suppressed_words, is_on, list::Row, side};
+use super::{Alarms, Page, columns::Columns, guidance, handover::suppressed_words, list::Row, on_page, side};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -71,7 +71,7 @@ fn below(cx: &ViewContext, height: u16) -> u16 {
 fn views(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let count = |page| {
         let (mut all, mut waiting) = (0, 0);
-        for alarm in cx.snapshot.alarms.iter().filter(|alarm| is_on(page, cx.def().alarm(alarm.id))) {
+        for alarm in on_page(cx, page) {
             all += 1;
             waiting += usize::from(alarm.state.needs_acknowledgement());
         }
@@ -138,7 +138,6 @@ fn list_alone(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     if rows.is_empty() {
         let words = match all {
             0 if tab.page == Page::System => t!("No active system alarms. j: journal."),
-            0 if !cx.snapshot.alarms.is_empty() => t!("No process alarms are active; v: system alarms."),
             0 => t!("No active alarms. j: journal."),
             _ => t!("No alarm matches the filter. Esc: show all."),
         };

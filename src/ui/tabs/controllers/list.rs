@@ -1,11 +1,7 @@
 //! The first page: every device in one row, with how it stands and what it controls.
 
 use super::device::{signal_mark, status_text};
-use crate::plant::{
-    def::Subject,
-    snapshot::ActiveAlarm,
-    tag::{Access, Poll},
-};
+use crate::plant::{def::Subject, snapshot::ActiveAlarm};
 use crate::ui::{modal::faceplate::unknown_text, tabs::prelude::*};
 
 /// Widths that depend on the plant and the screen.
@@ -177,7 +173,7 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
 /// `25 of 25 values good`. What is never read by itself says nothing about the device.
 pub fn values_good(cx: &ViewContext, device: &DeviceDef) -> (String, Style) {
     let tags = cx.def().tags_of(device.id);
-    let tags = tags.filter(|tag| tag.access != Access::Write && tag.poll != Poll::Never);
+    let tags = tags.filter(|tag| tag.is_read() && tag.calculation.is_none());
     let tags = tags.filter(|tag| tag.is_stored() || !cx.is_past());
     let (good, all) = tags
         .fold((0, 0), |(good, all), tag| (good + usize::from(cx.snapshot.sample(tag.id).quality.is_good()), all + 1));

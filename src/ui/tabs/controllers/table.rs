@@ -125,7 +125,7 @@ impl Table {
         let range = whole(&range, Columns::RANGE);
         let row = columns.row([pen, &name, &text, &shown.unit, &range, &default, &read, meaning]);
         canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
-        if !selected && tag.access != Access::Write && !cx.snapshot.sample(tag.id).quality.is_good() {
+        if !selected && tag.is_read() && !cx.snapshot.sample(tag.id).quality.is_good() {
             canvas.text(1 + columns.value_at(), y, &pad_left(&text, Columns::VALUE), shown.style);
         }
     }

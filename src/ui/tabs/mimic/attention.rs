@@ -91,7 +91,7 @@ fn failed_commands(cx: &ViewContext) -> impl Iterator<Item = Row> {
 pub fn not_normal(cx: &ViewContext) -> Vec<Row> {
     let (def, snapshot, normal) = (cx.def(), cx.snapshot, cx.theme.normal());
     // What the state of its device does not explain.
-    let values = def.tags.iter().filter(|tag| responds(cx, def.device(tag.device)));
+    let values = def.tags.iter().filter(|tag| tag.is_read() && responds(cx, def.device(tag.device)));
     let values = values.filter(|tag| snapshot.sample(tag.id).quality.cause().is_some_and(is_trouble)).map(|tag| {
         let shown = value::show(cx, tag.id);
         (format!("{}  {} {}", tag.name, shown.text, shown.note), shown.style)
@@ -152,7 +152,8 @@ fn is_trouble(cause: Cause) -> bool {
         | Cause::StationOff
         | Cause::Reloaded
         | Cause::NotAuthorised
-        | Cause::NotStored => false,
+        | Cause::NotStored
+        | Cause::OnRequest => false,
     }
 }
 
@@ -216,6 +217,20 @@ mod tests {
         assert!(rows(&down, not_normal).is_empty());
         let shown = rows(&down, needs_action);
         assert!(shown.len() == 2 && shown[1].contains("not connected"), "an alarm, and the line: {shown:?}");
+    }
+
+    #[test]
+    fn what_is_read_on_request_only_is_never_called_abnormal() {
+        use crate::plant::tag::{Access, Poll};
+        let mut fixture = Fixture::normal();
+        let pv = fixture.tag("TIC-1.PV");
+        for (access, poll) in [(Access::ReadWrite, Poll::Never), (Access::Write, Poll::Never)] {
+            (fixture.def.tags[pv.index()].access, fixture.def.tags[pv.index()].poll) = (access, poll);
+            for cause in [Cause::Stale, Cause::OnRequest, Cause::Timeout] {
+                fixture.samples[pv.index()].quality = Quality::Uncertain(cause);
+                assert!(rows(&fixture.snapshot(), not_normal).is_empty(), "{cause:?}");
+            }
+        }
     }
 
     #[test]

@@ -37,6 +37,8 @@ const PENS_MAX: usize = 3;
 const ROWS_MAX: usize = 8;
 /// Events that are listed at most, of the last day.
 const EVENTS_MAX: usize = 40;
+/// So many alarm events are looked through for them: most may be of suppressed alarms.
+const SEARCHED_MAX: usize = 500;
 const EVENTS_SPAN: SignedDuration = SignedDuration::from_hours(24);
 const EVERY_S: f64 = 5.0;
 const TREND_EVERY_S: f64 = 10.0;
@@ -97,7 +99,7 @@ impl Companions {
             let to = cx.now + SignedDuration::from_secs(1);
             let from = to.checked_sub(EVENTS_SPAN).unwrap_or(to);
             let limit = EVENTS_MAX;
-            let query = Query::Journal { from, to, limit };
+            let query = Query::Journal { from, to, limit: SEARCHED_MAX };
             actions.extend(self.alarms.ask(cx, (Tab::Mimic, number), every, timeout, query));
             let query = Query::Actions { from, to, limit };
             actions.extend(self.actions.ask(cx, (Tab::Mimic, number), every, timeout, query));
@@ -154,9 +156,16 @@ impl Companions {
         canvas.text(0, y, t!("last events"), dim);
         y += 1;
         let events = self.events(cx);
-        if events.is_empty() {
+        if events.is_empty() && !self.alarms.value.iter().flatten().any(|record| record.event.is_quiet()) {
             let known = self.alarms.value.is_some() || self.actions.value.is_some();
             canvas.text(0, y, if known { t!("none") } else { t!("collecting data") }, dim);
+        }
+        let quiet = self.alarms.value.iter().flatten().filter(|record| record.event.is_quiet()).count();
+        if 0 < quiet {
+            for line in wrap(&t!("{quiet} not annunciated: d in the journal", quiet), width) {
+                canvas.text(0, y, &line, dim);
+                y += 1;
+            }
         }
         for (at, text, style) in events {
             let x = canvas.text(0, y, &pad(&moment(at, cx.now, &cx.def().time_zone), 10), dim);
@@ -167,9 +176,9 @@ impl Companions {
         }
     }
 
-    /// Alarm events and actions, newest first.
+    /// What was annunciated of alarms, and actions, newest first.
     fn events(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
-        let alarms = self.alarms.value.iter().flatten();
+        let alarms = self.alarms.value.iter().flatten().filter(|record| !record.event.is_quiet()).take(EVENTS_MAX);
         let alarms = alarms.map(|record| (record.at, event_text(cx, record), cx.theme.normal()));
         let one_line = |text: String| text.split_whitespace().collect::<Vec<_>>().join(" ");
         let actions = self.actions.value.iter().flatten();

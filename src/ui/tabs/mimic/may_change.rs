@@ -15,7 +15,10 @@ pub fn rows(cx: &ViewContext) -> Vec<Row> {
     let mut allowed = Vec::new();
     let mut forbidden: Vec<(String, Vec<&str>)> = Vec::new();
     for (shown, command) in actuators.chain(setpoints) {
-        let name = if shown == command { &def.tag(shown).name } else { &def.tag(shown).short };
+        let tag = def.tag(shown);
+        let mut outputs = def.logic.actuators.iter().map(|actuator| def.tag(actuator.output));
+        let is_alone = !outputs.any(|other| other.id != shown && other.short == tag.short);
+        let name = if shown != command && is_alone { &tag.short } else { &tag.name };
         match interlock::forbidden_text(cx, command) {
             None => allowed.push(name.as_str()),
             Some(why) => match forbidden.iter_mut().find(|(other, _)| *other == why) {
@@ -56,6 +59,21 @@ mod tests {
             crate::plant::sample::Quality::Bad(crate::plant::sample::Cause::Timeout);
         assert!(said(&fixture)[1].contains("unknown"), "{:?}", said(&fixture));
         assert!(said(&Fixture::line_down()).iter().all(|row| !row.contains("allowed")));
+    }
+
+    #[test]
+    fn a_command_that_is_not_read_is_not_called_unknown() {
+        use crate::plant::tag::{Access, Poll};
+        for (access, poll) in [(Access::Write, Poll::Never), (Access::ReadWrite, Poll::Never)] {
+            let mut fixture = Fixture::normal();
+            fixture.set("PLC-1.AUTO", 0.0);
+            let command = fixture.tag("PLC-1.MAN.P-1");
+            let tag = &mut fixture.def.tags[command.index()];
+            (tag.access, tag.poll) = (access, poll);
+            fixture.samples[command.index()].quality =
+                crate::plant::sample::Quality::Bad(crate::plant::sample::Cause::NotRead);
+            assert_eq!(said(&fixture), ["✓ P-1, TIC-1.SV: allowed"]);
+        }
     }
 
     #[test]

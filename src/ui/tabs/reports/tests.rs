@@ -144,6 +144,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         reason: None,
         until: None,
         first_out: None,
+        identity: None,
     };
     let (high, low) = (Priority::High, Priority::Low);
     let alarms = vec![

@@ -44,7 +44,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             draw_chart(reports, cx, &mut canvas.part(left, 1, columns - left, rows + 1));
             let cx = &ViewContext { area: Rect { width: left, ..cx.area }, ..*cx };
             let charted = (left < columns).then_some(reports.charted);
-            let lines = lines(cx, report, charted, reports.later_columns);
+            let lines = lines(cx, report, charted, reports.later_columns, reports.quiet);
             let first = reports.scroll.first(lines.len(), usize::from(rows));
             let mut part = canvas.part(0, 2, left, rows);
             let area = part.area();
@@ -212,7 +212,13 @@ fn heading(width: u16, later: bool) -> String {
 
 /// Everything below the heading: figures, counts, alarms, actions.
 /// The row whose tag has the chart is marked.
-pub fn lines(cx: &ViewContext, report: &ShiftReport, charted: Option<usize>, later: bool) -> Vec<Line<'static>> {
+pub fn lines(
+    cx: &ViewContext,
+    report: &ShiftReport,
+    charted: Option<usize>,
+    later: bool,
+    quiet: bool,
+) -> Vec<Line<'static>> {
     let theme = cx.theme;
     let mut lines = Vec::new();
     if report.tags.iter().all(|tag| tag.good == 0.0) {
@@ -238,12 +244,20 @@ pub fn lines(cx: &ViewContext, report: &ShiftReport, charted: Option<usize>, lat
     let short = report.until.duration_since(report.period.from) <= SignedDuration::from_hours(24);
     let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
     let time = |at: Timestamp| format!("  {}  ", draw::local(cx, at, form));
-    let annunciated: Vec<_> = report.alarms.iter().filter(|alarm| !alarm.event.is_suppressed()).collect();
+    let listed: Vec<_> = report.alarms.iter().filter(|alarm| quiet || !alarm.event.is_quiet()).collect();
+    let alarms_title = match report.alarms.len() - listed.len() {
+        0 => t!("alarms").to_owned(),
+        hidden => t!("alarms, {hidden} not annunciated hidden, d shows them", hidden),
+    };
+    let only_hidden = listed.is_empty() && !report.alarms.is_empty();
     let suppressed = report.suppressed.iter().map(|alarm| suppressed_line(cx, alarm));
-    let alarms = annunciated.into_iter().map(|alarm| alarm_line(cx, alarm, time(alarm.at)));
+    let alarms = listed.into_iter().map(|alarm| alarm_line(cx, alarm, time(alarm.at)));
     let actions = report.actions.iter().map(|action| action_line(cx, action, time(action.at)));
     lines.extend(section(cx, t!("suppressed alarms"), suppressed));
-    lines.extend(section(cx, t!("alarms"), alarms));
+    lines.extend(section(cx, &alarms_title, alarms));
+    if only_hidden {
+        lines.push(Line::styled(format!("  {alarms_title}"), theme.dim()));
+    }
     lines.extend(section(cx, t!("operator actions"), actions));
     lines
 }
@@ -304,7 +318,7 @@ fn counts(cx: &ViewContext, report: &ShiftReport) -> Line<'static> {
 /// A heading and its lines, at most [`LIST_MAX`] of them; nothing where there is none.
 fn section<'a>(cx: &ViewContext, title: &str, rows: impl ExactSizeIterator<Item = Line<'a>>) -> Vec<Line<'a>> {
     let rule = cx.theme.pick("─", "-");
-    let rest = usize::from(cx.area.width).saturating_sub(title.len() + 5);
+    let rest = usize::from(cx.area.width.saturating_sub(width(title) + 5));
     let heading = Line::styled(format!(" {rule} {title} {}", rule.repeat(rest)), cx.theme.dim());
     let more = rows.len().saturating_sub(LIST_MAX);
     let mut lines: Vec<Line> = rows.take(LIST_MAX).collect();

@@ -123,17 +123,9 @@ impl Stand {
                 Answer::Series(tags.iter().map(|tag| self.series(*tag, *from, *to, *buckets)).collect())
             }
             Query::Journal { .. } => Answer::Journal(vec![AlarmRecord {
-                at: ago(240),
-                subject: "TIC-1.PV".into(),
-                message: "temperature high".into(),
-                priority: Priority::High,
-                event: AlarmEvent::Raised,
                 value: Some(72.1.into()),
                 limit: Some(72.0),
-                by: None,
-                reason: None,
-                until: None,
-                first_out: None,
+                ..AlarmRecord::new(ago(240), "TIC-1.PV", "temperature high", Priority::High, AlarmEvent::Raised)
             }]),
             Query::Actions { .. } => Answer::Actions(vec![
                 action(ago(200), "write", Some("too slow")),

@@ -150,6 +150,36 @@ fn moved_rows_take_no_key_meant_for_another() {
 }
 
 #[test]
+fn what_was_not_annunciated_is_shown_on_request() {
+    let mut model = model(&Fixture::normal(), Theme::FULL);
+    screen(&mut model, 120, 40);
+    let event = |seconds, event| {
+        let at = fixture::now() - jiff::SignedDuration::from_secs(seconds);
+        AlarmRecord::new(at, "TIC-1.PV", "temperature high", Priority::High, event)
+    };
+    let events =
+        [AlarmEvent::Raised, AlarmEvent::Unsuppressed, AlarmEvent::RaisedSuppressed, AlarmEvent::SuppressedByDesign];
+    let journal: Vec<_> = (1..).map(|n| n * 60).zip(events).map(|(ago, kind)| event(ago, kind)).collect();
+    for effect in type_keys(&mut model, "3j") {
+        if let Effect::Query(id, Query::Journal { .. }) = effect {
+            update(&mut model, Msg::Answer(id, Ok(Answer::Journal(journal.clone()))));
+        }
+    }
+    let rows = |model: &mut Model| {
+        let shown = screen(model, 120, 40);
+        (
+            shown.lines().filter(|row| row.contains("temperature high")).count(),
+            shown.contains("3 not annunciated hidden, d shows them"),
+        )
+    };
+    assert_eq!(rows(&mut model), (1, true));
+    type_keys(&mut model, "d");
+    assert_eq!(rows(&mut model), (4, false));
+    type_keys(&mut model, "d");
+    assert_eq!(rows(&mut model), (1, true));
+}
+
+#[test]
 fn the_journal_of_an_area_has_its_alarms_and_actions() {
     let mut fixture = Fixture::normal();
     let now = fixture::now();

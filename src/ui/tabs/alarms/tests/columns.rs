@@ -18,3 +18,20 @@ fn a_status_word_is_shown_in_words_where_there_is_room() {
     assert!(shown.lines().any(|line| line.contains("■") && line.contains("input open, low")), "{shown}");
     assert!(shown.contains("raised at") && !shown.contains("raised at 10"), "{shown}");
 }
+
+#[test]
+fn the_alarm_that_every_page_names_is_in_the_list_that_opens() {
+    let mut fixture = Fixture::normal();
+    let system = &mut fixture.def.alarms[3];
+    (system.class, system.priority) = (AlarmClass::System, Priority::Low);
+    let id = system.id;
+    fixture.alarms = vec![ActiveAlarm::new(id, AlarmState::Unacknowledged, ago(30))];
+    let message = fixture.def.alarm(id).message.clone();
+    for (width, height) in [(80, 24), (120, 40)] {
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "3");
+        let shown = screen(&mut model, width, height);
+        let rows = shown.lines().skip(4).filter(|row| row.contains(&message)).count();
+        assert!(1 <= rows && shown.contains("active 1 (1"), "{shown}");
+    }
+}

@@ -43,5 +43,8 @@ fn a_wide_screen_has_the_whole_state_of_an_alarm() {
     report.alarms[0].event = AlarmEvent::SuppressedByDesign;
     stand.model.tabs.reports.report.value = Some(report);
     let shown = stand.screen();
-    assert!(shown.contains("suppressed by design"), "{shown}");
+    assert!(shown.contains("alarms, 1 not annunciated hidden, d shows them"), "{shown}");
+    stand.press("d");
+    let shown = stand.screen();
+    assert!(shown.contains("suppressed by design") && !shown.contains("hidden"), "{shown}");
 }
