@@ -6,7 +6,12 @@ use std::ops::Range;
 
 use crate::{
     history::tiers::Tier,
-    plant::{command::Outcome, def::ParquetVersion, procedure, record::NOT_PROCESS_ACTIONS},
+    plant::{
+        command::{CommandKind, Outcome},
+        def::{ParquetVersion, ProcedureId},
+        procedure,
+        record::NOT_PROCESS_ACTIONS,
+    },
 };
 
 pub use migrations::MIGRATIONS;
@@ -203,9 +208,11 @@ pub fn unchained(limit: usize) -> String {
 /// The last start or end of a procedure; a refused start is none.
 pub fn latest_procedure() -> String {
     format!(
-        "SELECT {ACTION} FROM operator_action WHERE (action = '{}' AND outcome = '{}') OR action = '{}'
+        "SELECT {ACTION} FROM operator_action WHERE (action = '{}' AND outcome IN ('{}', '{}')) OR action = '{}'
          ORDER BY rowid DESC LIMIT 1",
         procedure::START,
+        CommandKind::StartProcedure(ProcedureId(0)).label(),
+        // So it was called before.
         Outcome::Verified.label(),
         procedure::END
     )
