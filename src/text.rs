@@ -10,7 +10,7 @@ mod date;
 
 use std::{cell::Cell, collections::HashMap, fmt::Display, sync::LazyLock};
 
-pub use answers::said;
+pub use answers::{recorded, recorded_action, said};
 pub use date::{date, weekday};
 
 thread_local! {
@@ -45,6 +45,24 @@ static LANGUAGES: &[Definition] = &[
 /// The catalogues by language, each read when it is first shown.
 static CATALOGUES: LazyLock<Vec<LazyLock<Catalogue>>> =
     LazyLock::new(|| LANGUAGES.iter().map(|language| LazyLock::new(language.load)).collect());
+
+/// The texts with places of a catalogue, those with most words of their own first: what fits several is the most telling.
+static PATTERNS: LazyLock<Vec<Vec<&'static str>>> = LazyLock::new(|| {
+    let of = |language: usize| -> Vec<&'static str> {
+        let own = |text: &str| -> usize {
+            text.split('{').map(|part| part.split_once('}').map_or(part, |(_, own)| own).len()).sum()
+        };
+        let texts = CATALOGUES[language].keys().filter(|text| text.contains('{'));
+        let mut all: Vec<(usize, &'static str)> = texts.map(|text| (own(text), text.as_str())).collect();
+        all.retain(|(own, _)| PATTERN_MIN <= *own);
+        all.sort_by(|one, other| other.cmp(one));
+        all.into_iter().map(|(_, text)| text).collect()
+    };
+    (0..LANGUAGES.len()).map(of).collect()
+});
+
+/// Letters of its own that a text with places has at least, so that it is not any text.
+const PATTERN_MIN: usize = 6;
 
 /// How the years of a date in words are counted. Dates in figures, files and records are always Gregorian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,6 +156,11 @@ pub fn translate(english: &str) -> &str {
 /// The text in the language of this thread, unless that is English.
 pub fn translation(english: &str) -> Option<&'static str> {
     CATALOGUES[LOCALE.get().language.0].get(english).map(String::as_str)
+}
+
+/// The texts with places in the language of this thread.
+fn patterns() -> &'static [&'static str] {
+    &PATTERNS[LOCALE.get().language.0]
 }
 
 /// Makes a file, which is the same whatever language its terminal shows.

@@ -84,6 +84,8 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         let tag = tag_named(&snapshot, &args.tag)?;
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
         confirm(&snapshot, tag, value, args.yes).await?;
+        // The station writes what is asked for, or nothing: what was confirmed is what the device can hold.
+        let value = entry::as_confirmed(&snapshot, tag, value);
         let kind = CommandKind::Write { tag, value };
         let status = actor.send_command(1, kind).await?;
         let words = |value: Option<Exact>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));

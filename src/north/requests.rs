@@ -27,6 +27,7 @@ use crate::{
         PlantDef, Snapshot,
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome},
         def::{MqttDef, TagId},
+        entry,
         exact::Exact,
         mqtt_request::{LastMqttRequest, MqttRefusal, MqttRequestStatus, MqttResult},
         number::digits,
@@ -95,12 +96,15 @@ pub struct PassOn {
 }
 
 impl PassOn {
-    /// The command, on the plant as it is now. `Err`: writing the list took so long that it has expired.
+    /// The command, on the plant as it is now. `Err`: writing the list took so long that it has expired, or the value has more
+    /// decimals than its tag.
     pub fn command(self, snapshot: &Snapshot, terminal: u32, now: Now) -> Result<Command, MqttRefusal> {
         let PassOn { number, tag, value, expected, expires, note } = self;
         if expires <= now.utc {
             return Err(MqttRefusal::Expired);
         }
+        // No one can be asked what was meant; a value that the device would round is refused by the plant.
+        entry::check_decimals(entry::decimals_of(value), snapshot.decimals[tag.index()]).map_err(MqttRefusal::Value)?;
         let command = Command::on(snapshot, CommandId { terminal, number }, CommandKind::Write { tag, value });
         Ok(Command { expected_value: expected.or(command.expected_value), note: Some(note.into()), ..command })
     }

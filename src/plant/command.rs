@@ -130,6 +130,31 @@ impl CommandKind {
         }
     }
 
+    /// What is said of one that went well, the same on screen and on record: only a value is read back, and so verified.
+    pub fn label(&self) -> &'static str {
+        match self {
+            CommandKind::Write { .. } | CommandKind::Restore(_) => "verified",
+            // The line has taken it; what comes of it stands on the bus tab.
+            CommandKind::Test(..) => "started",
+            // Whether they are the right ones only the devices can tell.
+            CommandKind::Configure(_) => "in use",
+            CommandKind::SaveSettings(_) => "saved to plant file",
+            // The line has been asked to; only the device tells whether it answers.
+            CommandKind::Refresh(_) => "requested",
+            CommandKind::Alarm(_)
+            | CommandKind::Connect(..)
+            | CommandKind::StopTest(_)
+            | CommandKind::ReadSets
+            | CommandKind::SaveSet { .. }
+            | CommandKind::StopRestore(_)
+            | CommandKind::StartProcedure(_)
+            | CommandKind::AbortProcedure(_)
+            | CommandKind::CorrectCounter { .. }
+            | CommandKind::HandOver
+            | CommandKind::TakeOver => "done",
+        }
+    }
+
     /// The line that it works on; `None` for one that works on none, or on more than one.
     pub fn line(&self, def: &PlantDef) -> Option<LineId> {
         let of_device = |device: DeviceId| Some(def.device(device).line);
@@ -197,6 +222,14 @@ impl CommandStatus {
     pub fn new(command: Command, by: impl Into<Arc<str>>, at: Timestamp) -> CommandStatus {
         let (by, from, outcome) = (by.into(), "".into(), Outcome::Pending);
         CommandStatus { command, by, from, at, old: None, outcome, outcome_at: at, recorded: true }
+    }
+
+    /// Its outcome in words.
+    pub fn outcome_text(&self) -> String {
+        match &self.outcome {
+            Outcome::Verified => translate(self.command.kind.label()).to_owned(),
+            outcome => outcome.to_string(),
+        }
     }
 
     /// Is it still without an outcome?

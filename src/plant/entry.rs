@@ -5,7 +5,7 @@ use super::{
     alarm::manager::subject_name,
     def::{Condition, Level, Subject, TagId},
     exact::Exact,
-    number::digits,
+    number::{digits, to_i64, to_usize},
     scale,
 };
 use crate::{t, text::translate};
@@ -26,14 +26,7 @@ pub fn check(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, Strin
     }
     let (number, typed) = parse(text).ok_or_else(|| t!("\"{text}\" is not a number", text))?;
     // Trailing zeros count as decimals: a tag without decimals refuses `1,000` and `1.000`, which mean a thousand to their author.
-    let decimals = usize::from(snapshot.decimals[tag.index()]);
-    if typed > decimals {
-        return Err(match decimals {
-            0 => t!("whole numbers only").to_owned(),
-            1 => t!("at most 1 decimal").to_owned(),
-            n => t!("at most {n} decimals", n),
-        });
-    }
+    check_decimals(typed, snapshot.decimals[tag.index()])?;
     let value = match number {
         Number::Absolute(value) => value,
         Number::Step(by) => {
@@ -52,6 +45,25 @@ pub fn check(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, Strin
         )),
         (true, true) => Ok(value),
     }
+}
+
+/// Has a number so many decimals at most as its tag?
+pub fn check_decimals(written: usize, of_tag: u8) -> Result<(), String> {
+    match of_tag {
+        most if written <= usize::from(most) => Ok(()),
+        0 => Err(t!("whole numbers only").to_owned()),
+        1 => Err(t!("at most 1 decimal").to_owned()),
+        n => Err(t!("at most {n} decimals", n)),
+    }
+}
+
+/// The decimals of a number that was computed or read from a file: zeros at its end say nothing there.
+pub fn decimals_of(value: Exact) -> usize {
+    let text = digits(value, None);
+    let (text, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    let after = text.split_once('.').map_or(0, |(_, after)| after.len());
+    to_usize(to_i64(after) - i64::from(exponent))
 }
 
 /// `70.0 → 75.0`, while a number with a sign is typed.
@@ -79,11 +91,8 @@ pub fn needs_confirmation(snapshot: &Snapshot, tag: TagId, value: Exact) -> bool
 /// `72.3 → the resolution of the device is 0.5: 72.5`; `None` where it holds what was typed.
 pub fn rounded_text(snapshot: &Snapshot, tag: TagId, value: Exact) -> Option<String> {
     let rounded = snapshot.rounded_to_device(tag, value);
-    // A single-precision register is as good as exact.
-    let apart = (rounded - value).near().abs();
-    let same = if value.rest().is_some() { rounded == value } else { apart <= 1e-6 * value.near().abs().max(1.0) };
     let step = plain(snapshot.step(tag).into());
-    (!same).then(|| {
+    (!scale::is_held(value, rounded)).then(|| {
         t!(
             "{format} → the resolution of the device is {step}: {plain}",
             format = snapshot.format(tag, value),
@@ -91,6 +100,12 @@ pub fn rounded_text(snapshot: &Snapshot, tag: TagId, value: Exact) -> Option<Str
             plain = plain(rounded)
         )
     })
+}
+
+/// The number to send once [`rounded_text`] has been read: as the device will hold it.
+pub fn as_confirmed(snapshot: &Snapshot, tag: TagId, value: Exact) -> Exact {
+    let rounded = snapshot.rounded_to_device(tag, value);
+    if scale::is_held(value, rounded) { value } else { rounded }
 }
 
 /// Why a number that is allowed may still not be what its author meant.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::{event::Fault, id::LineId, tag::Table};
 
 /// Most spans of one live read.
-const SPANS_MAX: usize = 64;
+pub const SPANS_MAX: usize = 64;
 /// Most registers and bits of one live read.
 const CELLS_MAX: u32 = 4_000;
 

@@ -90,6 +90,9 @@ pub enum MqttRefusal {
     /// The tag is of another device than the topic.
     #[error("{}", t!("the tag is not of the device of this topic"))]
     OtherDevice,
+    /// Not a value that can be typed for the tag.
+    #[error("{0}")]
+    Value(String),
     /// More than are taken at a time.
     #[error("{}", t!("too many requests, wait a moment"))]
     TooMany,

@@ -61,6 +61,11 @@ pub fn rounded_to_device(tag: &TagDef, value: impl Into<Exact>, decimals: u8) ->
     to_raw(tag, value, decimals).map(|raw| to_value(tag, raw, decimals))
 }
 
+/// Does a device that holds the second number hold what was meant by the first? A single-precision register is as good as exact.
+pub fn is_held(value: Exact, held: Exact) -> bool {
+    value.rest().map_or_else(|| (held - value).near().abs() <= 1e-6 * value.near().abs().max(1.0), |_| held == value)
+}
+
 /// The raw number to write for a value within bounds; `None` if the type cannot hold it, or if the value, or what the device
 /// will hold, is beyond a bound: rounding must not lead there, nor hide that more was asked for.
 pub fn raw_within(tag: &TagDef, value: Exact, decimals: u8, (min, max): Bounds) -> Option<Exact> {

@@ -8,6 +8,7 @@ use super::{
 };
 use crate::plant::{
     def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
+    entry,
     exact::Exact,
     number::digits,
     scale,
@@ -198,18 +199,31 @@ fn has_two_states(tag: &TagDef) -> bool {
     is_bit || labels || tag.calculation.is_some()
 }
 
-/// The same, as the device will hold it.
+/// The same of a value that is to be written, as it is typed for the tag; as the device will hold it.
 pub(crate) fn held_number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problems) -> Option<f64> {
     let number = number_of(choice, tag, problems)?;
-    // Decimals that the device announces only make the raw number greater.
-    let held = scale::rounded_to_device(tag, number, 0);
-    if held.is_none() {
-        let problem =
-            problems.add(choice.at, format!("{} does not fit the register of {}", digits(number, None), tag.name));
-        problem.label("expected a value that its type can hold");
+    let Decimals::Fixed(decimals) = tag.decimals else {
+        return check_held(choice.at, number.into(), tag, problems).map(|_| number);
+    };
+    if let Err(why) = entry::check_decimals(entry::decimals_of(number.into()), decimals) {
+        let message = format!("{} has more decimals than {}", digits(number, None), tag.name);
+        problems.add(choice.at, message).label(format!("expected {why}"));
+        return None;
     }
-    match tag.decimals {
-        Decimals::Fixed(_) => held.map(Exact::near),
-        Decimals::From(_) => held.map(|_| number),
+    check_held(choice.at, number.into(), tag, problems).map(Exact::near)
+}
+
+/// The value as the device will hold it. Reports one that it cannot hold, or only rounded. Decimals that it announces are not
+/// known here: they only make the raw number greater.
+pub(super) fn check_held(at: Span, value: Exact, tag: &TagDef, problems: &mut Problems) -> Option<Exact> {
+    let Some(held) = scale::rounded_to_device(tag, value, 0) else {
+        let message = format!("{} does not fit the register of {}", digits(value, None), tag.name);
+        problems.add(at, message).label("expected a value that its type can hold");
+        return None;
+    };
+    if matches!(tag.decimals, Decimals::Fixed(_)) && !scale::is_held(value, held) {
+        let message = format!("{} cannot hold {}", tag.name, digits(value, None));
+        problems.add(at, message).label(format!("expected the next value that it can hold: {}", digits(held, None)));
     }
+    Some(held)
 }

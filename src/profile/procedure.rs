@@ -10,6 +10,7 @@ use super::{
     schema::{ProcedureStepTable, ProcedureTable, ReferenceTable},
 };
 use crate::plant::{
+    control_run::LEAST,
     def::{DeviceId, ProcedureDef, ProcedureStep, Reference, RunDef, TagId},
     exact::Exact,
     number::digits,
@@ -80,6 +81,14 @@ fn reference(table: &ReferenceTable) -> Reference {
     }
 }
 
+/// A measurement that has begun and not ended.
+struct Measurement {
+    controller: DeviceId,
+    at: Span,
+    /// The longest that it can last up to here, where that is known.
+    at_most: Option<Duration>,
+}
+
 /// Reads the steps of one procedure.
 struct StepReader<'a, 'd> {
     label: &'a Arc<str>,
@@ -93,14 +102,14 @@ struct StepReader<'a, 'd> {
 impl StepReader<'_, '_> {
     fn steps(&mut self, tables: &[At<ProcedureStepTable>]) -> Vec<ProcedureStep> {
         let mut steps = Vec::new();
-        let mut open: Vec<(DeviceId, Span)> = Vec::new();
+        let mut open: Vec<Measurement> = Vec::new();
         for table in tables {
             for step in self.step(&table.value) {
                 self.pair(&step, table.at, &mut open);
                 steps.push(step);
             }
         }
-        for (_, at) in open {
+        for Measurement { at, .. } in open {
             self.problems.add(at, "this measurement never ends").label("expected an `end_measurement` after it");
         }
         if let Some(table) = tables.last().filter(|_| STEPS_MAX < steps.len()) {
@@ -111,22 +120,33 @@ impl StepReader<'_, '_> {
     }
 
     /// A measurement begins before it ends, and ends before the next one of its controller begins.
-    fn pair(&mut self, step: &ProcedureStep, at: Span, open: &mut Vec<(DeviceId, Span)>) {
+    fn pair(&mut self, step: &ProcedureStep, at: Span, open: &mut Vec<Measurement>) {
         match step {
             ProcedureStep::BeginMeasurement { controller, .. } => {
-                if open.iter().any(|(of, _)| of == controller) {
+                if open.iter().any(|measurement| measurement.controller == *controller) {
                     self.problems.add(at, "the measurement before this one has not ended").label("begins again");
                 }
-                open.push((*controller, at));
+                open.push(Measurement { controller: *controller, at, at_most: Some(Duration::ZERO) });
             }
             ProcedureStep::EndMeasurement { controller } => {
-                let before = open.len();
-                open.retain(|(of, _)| of != controller);
-                if before == open.len() {
+                let (ended, others) = open.drain(..).partition(|measurement| measurement.controller == *controller);
+                let ended: Vec<Measurement> = ended;
+                *open = others;
+                if ended.is_empty() {
                     self.problems.add(at, "no measurement has begun").label("expected a `begin_measurement` before it");
                 }
+                // So short a run is not kept: the procedure would be carried out up to here, and then fail.
+                if ended.iter().any(|measurement| measurement.at_most.is_some_and(|at_most| at_most < LEAST)) {
+                    let problem = self.problems.add(at, "this measurement is too short to be kept");
+                    problem.label(format!("expected {} s at least after its `begin_measurement`", LEAST.as_secs()));
+                }
             }
-            ProcedureStep::Write { .. } | ProcedureStep::WaitUntil { .. } | ProcedureStep::Hold(_) => {}
+            ProcedureStep::Hold(time) | ProcedureStep::WaitUntil { limit: time, .. } => {
+                let times = open.iter_mut().filter_map(|measurement| measurement.at_most.as_mut());
+                times.for_each(|at_most| *at_most += *time);
+            }
+            // How long a write takes is not known.
+            ProcedureStep::Write { .. } => open.iter_mut().for_each(|measurement| measurement.at_most = None),
         }
     }
 

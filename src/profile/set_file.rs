@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 use super::{
     diagnostic::Problems,
-    names::exact_of,
+    names::{check_held, exact_of},
     reader::{self, At, Choice, Node, Raw, Value, text, toml_tables},
 };
 use crate::plant::{
@@ -18,7 +18,7 @@ use crate::plant::{
     exact::Exact,
     number::digits,
     parameter_set::{ParameterSet, SetValue},
-    tag::TagDef,
+    tag::{Decimals, TagDef},
     visible::is_control_or_bidi,
 };
 
@@ -162,6 +162,9 @@ fn values(table: &At<Raw>, tags: &[&TagDef], settings: bool, problems: &mut Prob
         }
         let Some(value) = Choice::read(&node.value, node.at, problems) else { continue };
         let value = exact_of(&At { value, at: node.at }, tags[place], problems);
+        // Whether it can hold one whose decimals it announces is known when the set is compared with it.
+        let is_known = matches!(tags[place].decimals, Decimals::Fixed(_));
+        let value = value.filter(|value| !is_known || check_held(node.at, *value, tags[place], problems).is_some());
         found.extend(value.map(|value| (place, SetValue { tag: short.clone(), value })));
     }
     found.sort_by_key(|(place, _)| *place);

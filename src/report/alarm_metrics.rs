@@ -10,6 +10,7 @@ use crate::plant::{
     },
     def::PlantDef,
 };
+use crate::t;
 
 /// One figure beside its target and limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -93,9 +94,9 @@ pub fn bad_actors(figures: &PeriodMetrics) -> Vec<BadActor> {
         alarm: alarm.message.to_string(),
         raised,
     };
-    let frequent = figures.top.iter().map(|frequent| bad_actor("frequent", &frequent.alarm, Some(frequent.raised)));
-    let chattering = figures.chattering.iter().map(|alarm| bad_actor("chattering", alarm, None));
-    let fleeting = figures.fleeting.iter().map(|alarm| bad_actor("fleeting", alarm, None));
+    let frequent = figures.top.iter().map(|frequent| bad_actor(t!("frequent"), &frequent.alarm, Some(frequent.raised)));
+    let chattering = figures.chattering.iter().map(|alarm| bad_actor(t!("chattering"), alarm, None));
+    let fleeting = figures.fleeting.iter().map(|alarm| bad_actor(t!("fleeting"), alarm, None));
     frequent.chain(chattering).chain(fleeting).collect()
 }
 

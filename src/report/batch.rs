@@ -119,7 +119,7 @@ fn own_cells(report: &BatchReport, def: &PlantDef, dialect: CsvDialect) -> Vec<S
         time(batch.from),
         batch.to.map(time).unwrap_or_default(),
         minutes(batch.lasted, dialect),
-        plain(state(batch)),
+        plain(words(batch)),
         number(kwh, 3, dialect),
         number(good.map(floor_percent), 1, dialect),
         report.alarms.map(|alarms| alarms.to_string()).unwrap_or_default(),
@@ -152,7 +152,7 @@ pub fn text(batches: &[BatchReport], def: &PlantDef) -> String {
     for report in batches {
         let BatchReport { batch, energy, alarms, tags, .. } = report;
         let to = batch.to.map_or_else(|| "…".into(), local);
-        let mut facts = vec![minutes(report.batch.lasted), state(batch).into()];
+        let mut facts = vec![minutes(report.batch.lasted), words(batch).into()];
         facts.extend(energy.map(|(kwh, good)| match floor_percent(good) < 100.0 {
             true => format!("{kwh:.3} kWh in {:.1} % of the time", floor_percent(good)),
             false => format!("{kwh:.3} kWh"),
@@ -185,7 +185,7 @@ pub fn text(batches: &[BatchReport], def: &PlantDef) -> String {
 }
 
 /// How a batch stands, and what of it was not seen.
-pub fn state(batch: &Batch) -> &'static str {
+pub fn words(batch: &Batch) -> &'static str {
     match (batch.to, batch.seen) {
         (None, (true, _)) => "running",
         (None, (false, _)) => "running, start not seen",

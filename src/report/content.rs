@@ -1,5 +1,5 @@
-//! What a report says: its figures as the sections of a [`Document`], in the language asked for. Texts that are on record, as names
-//! and outcomes, stay as they were recorded.
+//! What a report says: its figures as the sections of a [`Document`], in the language asked for. Names and notes stay
+//! as they were recorded.
 
 mod alarms;
 mod production;
@@ -27,7 +27,7 @@ use crate::{
         record::ActionRecord,
     },
     t,
-    text::{self, Locale, translate},
+    text::{self, Locale, recorded, recorded_action, translate},
 };
 
 /// The report as a document: the sections that the plant file asks for, without those that would be empty.
@@ -97,10 +97,10 @@ fn content(kind: Kind, report: &ShiftReport, def: &PlantDef) -> Option<Content> 
     match kind {
         Kind::Summary => Some(Content::Facts(summary(report, def))),
         Kind::Handover => table(handover(report)),
-        Kind::Values => table(values(&report.tags)),
-        Kind::Comparison => table(comparison(report, &def.time_zone)),
-        Kind::Counters => table(production::counters(&report.counters)),
-        Kind::Runs => table(production::runs(&report.runs)),
+        Kind::Values => table(values(&report.tags, def)),
+        Kind::Comparison => table(comparison(report, def)),
+        Kind::Counters => table(production::counters(&report.counters, def)),
+        Kind::Runs => table(production::runs(&report.runs, def)),
         Kind::Curves => (!report.charts.is_empty()).then(|| Content::Charts(report.charts.clone())),
         Kind::Batches => table(production::batches(&report.batches)),
         Kind::ControlRuns => table(control_runs::table(&report.control_runs, &report.run_parts)),
@@ -157,7 +157,7 @@ fn handover(report: &ShiftReport) -> Table {
     let columns = [Column::time("time"), Column::text("by"), Column::text("action"), Column::text("note")];
     Table::new(columns).with(report.actions.iter().filter(of).map(|action| {
         let note = Cell::text(action.note.as_deref().unwrap_or(""));
-        vec![Cell::Time(action.at), Cell::text(&action.by), Cell::text(&action.action), note]
+        vec![Cell::Time(action.at), Cell::text(&action.by), Cell::text(recorded_action(&action.action)), note]
     }))
 }
 
@@ -170,9 +170,15 @@ fn mean(tag: &TagFigures) -> Cell {
     Cell::number(tag.mean, tag.decimals.saturating_add(1))
 }
 
-fn values(tags: &[TagFigures]) -> Table {
+/// What a tag is, beside its name.
+fn label(def: &PlantDef, tag: &str) -> Cell {
+    Cell::text(def.tag_named(tag).map_or("", |tag| &def.tag(tag).label))
+}
+
+fn values(tags: &[TagFigures], def: &PlantDef) -> Table {
     let columns = [
         Column::text("tag"),
+        Column::text("label"),
         Column::text("unit"),
         Column::number("first"),
         Column::number("min"),
@@ -187,6 +193,7 @@ fn values(tags: &[TagFigures]) -> Table {
         let value = |value: Option<Exact>| Cell::number(value, tag.decimals);
         vec![
             Cell::text(&tag.tag),
+            label(def, &tag.tag),
             Cell::text(&tag.unit),
             value(tag.first),
             value(tag.min),
@@ -201,28 +208,34 @@ fn values(tags: &[TagFigures]) -> Table {
 }
 
 /// Means, and differences of counters, beside those of the periods compared with.
-fn comparison(report: &ShiftReport, zone: &TimeZone) -> Table {
-    let mut table =
-        Table::new([Column::text("tag"), Column::text("unit"), Column::text("figure"), Column::number("this period")]);
+fn comparison(report: &ShiftReport, def: &PlantDef) -> Table {
+    let mut table = Table::new([
+        Column::text("tag"),
+        Column::text("label"),
+        Column::text("unit"),
+        Column::text("figure"),
+        Column::number("this period"),
+    ]);
     for Compared { period, .. } in &report.compared {
-        let (id, heading) = (period.name.to_string(), plain(&name(period, zone)));
+        let (id, heading) = (period.name.to_string(), plain(&self::name(period, &def.time_zone)));
         table.columns.push(Column { id: id.clone(), heading, kind: ColumnKind::Number });
         table.columns.push(Column { id: format!("change from {id}"), ..Column::number("change") });
     }
     if report.compared.is_empty() {
         return table;
     }
-    table.rows = report.tags.iter().map(|tag| compared_row(tag, &report.compared)).collect();
+    table.rows = report.tags.iter().map(|tag| compared_row(tag, &report.compared, def)).collect();
     table
 }
 
-fn compared_row(tag: &TagFigures, compared: &[Compared]) -> Vec<Cell> {
+fn compared_row(tag: &TagFigures, compared: &[Compared], def: &PlantDef) -> Vec<Cell> {
     let counts = tag.difference.is_some();
     let figure = |tag: &TagFigures| if counts { tag.difference } else { tag.mean };
     let cell =
         |value: Option<Exact>| Cell::number(value, if counts { tag.decimals } else { tag.decimals.saturating_add(1) });
     let word = if counts { t!("difference") } else { t!("mean") };
-    let mut row = vec![Cell::text(&tag.tag), Cell::text(&tag.unit), Cell::text(word), cell(figure(tag))];
+    let [name, unit] = [&tag.tag, &tag.unit].map(Cell::text);
+    let mut row = vec![name, label(def, &tag.tag), unit, Cell::text(word), cell(figure(tag))];
     for Compared { tags, .. } in compared {
         // Where the device chose another unit then, nothing is compared.
         let before = tags.iter().find(|other| other.tag == tag.tag && other.unit == tag.unit).and_then(figure);
@@ -243,7 +256,7 @@ fn gaps(report: &ShiftReport) -> Table {
     ];
     let row = |from: Timestamp, to: Timestamp, what: &str, why: &str| {
         let lasted = Cell::number(Some(to.duration_since(from).as_secs_f64() / 60.0), 1);
-        vec![Cell::Time(from), Cell::Time(to), lasted, Cell::text(what), Cell::text(why)]
+        vec![Cell::Time(from), Cell::Time(to), lasted, Cell::text(what), Cell::text(recorded(why))]
     };
     let unreadable =
         report.unreadable.iter().map(|Gap { from, to, why }| row(*from, *to, t!("not readable, not counted"), why));
@@ -282,11 +295,11 @@ fn actions(actions: &[ActionRecord]) -> Table {
         vec![
             Cell::Time(action.at),
             Cell::text(&action.by),
-            Cell::text(&action.action),
+            Cell::text(recorded_action(&action.action)),
             Cell::text(&action.target),
             text(&action.old),
             text(&action.new),
-            Cell::text(&action.outcome),
+            Cell::text(recorded(&action.outcome)),
             text(&action.note),
         ]
     }))

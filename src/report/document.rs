@@ -2,6 +2,8 @@
 //!
 //! What it says is decided once, in [`content`](super::content); a format only sets it.
 
+use std::ops::Range;
+
 use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 
 use super::chart::Chart;
@@ -281,13 +283,29 @@ impl Table {
         self
     }
 
-    /// Without the columns that are empty in every row, as a page has little room.
+    /// Its first `n` columns, and the first of all beside the others.
+    pub fn split(&self, n: usize) -> [Table; 2] {
+        let repeated = usize::from(1 < n);
+        let of = |columns: &[Range<usize>]| {
+            let row = |row: &Vec<Cell>| columns.iter().flat_map(|range| row[range.clone()].to_vec()).collect();
+            let headings = columns.iter().flat_map(|range| self.columns[range.clone()].to_vec());
+            Table { columns: headings.collect(), rows: self.rows.iter().map(row).collect() }
+        };
+        [of(&[0..n]), of(&[0..repeated, n..self.columns.len()])]
+    }
+
+    /// Without the columns that are empty in every row, and with labels beside their names, as a page has little room.
     pub fn dense(&self) -> Table {
-        let used: Vec<bool> =
-            (0..self.columns.len()).map(|n| self.rows.iter().any(|row| row[n] != Cell::Empty)).collect();
+        let labels = self.columns.iter().position(|column| column.id == "label").filter(|n| 0 < *n);
+        let used: Vec<bool> = (0..self.columns.len())
+            .map(|n| labels != Some(n) && self.rows.iter().any(|row| row[n] != Cell::Empty))
+            .collect();
         let columns = self.columns.iter().zip(&used).filter(|(_, used)| **used).map(|(column, _)| column.clone());
-        let row =
-            |row: &Vec<Cell>| row.iter().zip(&used).filter(|(_, used)| **used).map(|(cell, _)| cell.clone()).collect();
+        let cell = |row: &[Cell], n: usize| match (labels == Some(n + 1), &row[n], row.get(n + 1)) {
+            (true, Cell::Text(name), Some(Cell::Text(label))) => Cell::Text(format!("{name} {label}")),
+            _ => row[n].clone(),
+        };
+        let row = |row: &Vec<Cell>| (0..row.len()).filter(|n| used[*n]).map(|n| cell(row, n)).collect();
         Table { columns: columns.collect(), rows: self.rows.iter().map(row).collect() }
     }
 }

@@ -118,6 +118,77 @@ fn text_keeps_to_80_columns_and_every_number_whole() {
     insta::assert_snapshot!(text.replace(env!("CARGO_PKG_VERSION"), "VERSION"));
 }
 
+/// Wider than a page in every section: long names, labels and numbers.
+#[test]
+fn a_page_of_text_is_never_wider_than_80_columns() {
+    let mut report = shift_report();
+    for tag in &mut report.tags {
+        (tag.first, tag.min, tag.max) = (Some(1e14.into()), Some((-1e14).into()), Some(1e14.into()));
+        (tag.mean, tag.last, tag.decimals) = (Some(123_456_789_012.5.into()), Some(1e14.into()), 6);
+    }
+    report.runs[0].tag =
+        "PLC-1.PUMP-OF-THE-SECOND-STOREY-ON-THE-LEFT-SIDE-BEHIND-THE-DOOR-WITH-A-LONG-NAME-OF-ITS-OWN".into();
+    let compared = report.compared[0].clone();
+    report.compared.extend(std::iter::repeat_n(compared, 5));
+    let mut def = plant("Asia/Bangkok", &THREE);
+    def.tags[0].label = "temperature of the upper tank at the outlet".into();
+    def.title =
+        "Water tank of the second storey, with a title of which no page has ever seen the end in one line".into();
+    def.report.signatures = vec!["the supervisor of the shift that has seen all of this with own eyes".into()];
+    def.report.sections.push(Section::Signatures);
+    for language in Language::all() {
+        let lines = super::text::lines(&document(&report, &def, language.locale()), 80);
+        let long: Vec<&String> =
+            lines.iter().filter(|line| unicode_width::UnicodeWidthStr::width(&***line) > 80).collect();
+        assert_eq!(long, Vec::<&String>::new(), "in {}", language.code());
+        assert_eq!(lines.join(" ").matches("1262.5").count(), 0, "the numbers are others");
+        assert!(lines.join(" ").matches("100000000000000").count() >= 9, "every number is whole");
+    }
+}
+
+#[test]
+fn a_tag_has_its_label_beside_its_name() {
+    let mut def = plant("Asia/Bangkok", &THREE);
+    def.tags[0].label = "tank temperature".into();
+    let made = document(&shift_report(), &def, Locale::ENGLISH);
+    let text = super::text::lines(&made, 200).join("\n");
+    assert_eq!(text.matches("TIC-1.PV tank temperature °C").count(), 2, "values and comparison: {text}");
+    let json = super::format("json").expect("a format").render(&made, &Style::of(&def)).expect("JSON");
+    let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+    assert_eq!(json["values"][0]["label"].as_str(), Some("tank temperature"));
+    assert_eq!(json["values"][1]["label"], serde_json::Value::Null);
+}
+
+#[test]
+fn a_thai_report_has_no_english_words() {
+    let mut report = shift_report();
+    let record = report.actions[0].clone();
+    let done = |action: &str, outcome: &str| crate::plant::record::ActionRecord {
+        action: action.into(),
+        outcome: outcome.into(),
+        ..record.clone()
+    };
+    report.actions = vec![
+        done("write", "verified"),
+        done("write requested", "pending"),
+        done("write", "refused: outside 0.0 … 100.0"),
+        done("write", "not confirmed: read back 60.0"),
+        done("start procedure", "refused: procedure 5 is running"),
+        done("end procedure", "failed: not true within the time limit, step 3 of 9; safe state written"),
+        done("login", "refused: wrong name or password; wait 8 s"),
+        done("disconnect", "done"),
+    ];
+    let made = document(&report, &plant("Asia/Bangkok", &THREE), Language::THAI.locale());
+    let names = "Water tank morning night TIC PLC PM LT PV SV MV ER kWh UTC SHA Asia Bangkok sightglass Tag hash cmd calc A0 \
+                 temperature high check heater level low checksum min";
+    let names: Vec<&str> = names.split_whitespace().collect();
+    let text = super::text::lines(&made, 80).join("\n");
+    let words = text.split(|letter: char| !letter.is_ascii_alphabetic()).filter(|word| 1 < word.len());
+    let english: Vec<&str> =
+        words.filter(|word| !names.contains(word) && !word.bytes().all(|c| b"a5".contains(&c))).collect();
+    assert_eq!(english, Vec::<&str>::new(), "{text}");
+}
+
 #[test]
 fn the_plant_file_chooses_sections_title_and_signatures() {
     let mut def = plant("Asia/Bangkok", &THREE);

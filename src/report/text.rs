@@ -34,14 +34,12 @@ impl ReportFormat for Text {
     }
 }
 
-/// The report as lines of at most `width` columns, unless numbers alone take more; a missing figure is `–`.
+/// The report as lines of at most `width` columns; a missing figure is `–`.
 pub fn lines(document: &Document, width: usize) -> Vec<String> {
     document.locale.within(|| {
-        let mut lines = Vec::new();
-        lines.extend((!document.logo.is_empty()).then(|| document.logo.clone()));
-        lines.push(document.title.clone());
-        lines.push(document.heading.clone());
-        lines.push(document.times_line());
+        let head = [&document.logo, &document.title, &document.heading, &document.times_line()];
+        let head = head.into_iter().filter(|line| !line.is_empty());
+        let mut lines: Vec<String> = head.flat_map(|line| wrapped(line, width)).collect();
         for section in &document.sections {
             section_lines(document, section, width, &mut lines);
         }
@@ -55,13 +53,14 @@ fn section_lines(document: &Document, section: &Section, width: usize, lines: &m
         Content::Table(table) => table_lines(document, &table.dense(), width),
         Content::Lines(paragraphs) => paragraphs.iter().flat_map(|line| wrapped(line, width)).collect(),
         Content::Signatures(names) => {
-            names.iter().flat_map(|name| [String::new(), format!("{name} {}", "_".repeat(30))]).collect()
+            let line = |name: &String| wrapped(&format!("{name} {}", "_".repeat(30)), width);
+            names.iter().flat_map(|name| std::iter::once(String::new()).chain(line(name))).collect()
         }
         Content::Charts(_) => return,
     };
     lines.push(String::new());
-    lines.push(section.title.clone());
-    lines.push("-".repeat(section.title.width()));
+    lines.extend(wrapped(&section.title, width));
+    lines.push("-".repeat(section.title.width().min(width)));
     lines.extend(body);
 }
 
@@ -84,6 +83,12 @@ fn table_lines(document: &Document, table: &Table, width: usize) -> Vec<String> 
     let rows: Vec<Vec<String>> = table.rows.iter().map(words).collect();
     let headings: Vec<String> = table.columns.iter().map(|column| column.heading.clone()).collect();
     let widths = widths(table, &headings, &rows, width);
+    let fit = (0..widths.len()).take_while(|n| widths[..=*n].iter().sum::<usize>() + n <= width).count();
+    if fit < widths.len() && 1 < widths.len() {
+        // What is too wide goes on below, under its first column.
+        let [above, below] = table.split(fit.max(1)).map(|table| table_lines(document, &table, width));
+        return above.into_iter().chain([String::new()]).chain(below).collect();
+    }
     let rule = widths.iter().map(|width| "-".repeat(*width)).collect::<Vec<_>>().join(" ");
     let mut lines = row_lines(table, &headings, &widths);
     lines.push(rule);

@@ -207,7 +207,10 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::plant::simulate::Simulate;
+    use crate::plant::{
+        simulate::Simulate,
+        tag::{Access, Table, TagDef},
+    };
 
     const L1: LineId = LineId(0);
 
@@ -235,6 +238,30 @@ mod tests {
                 assert_eq!(simulator.respond(L1, 1, &request), Some(request.to_vec()));
                 simulator.advance(Duration::from_secs(1));
                 assert_eq!(simulator.rig().map(|rig| rig.state().sv_c), Some(sv_c), "P-DP {start}");
+            }
+        }
+    }
+
+    /// What a technician asks for with one key, `u`.
+    #[test]
+    fn a_simulated_device_has_every_register_of_its_profile() {
+        for name in ["tank", "lab", "inverter"] {
+            let def = crate::profile::load(std::path::Path::new(name), &crate::profile::Search::shipped());
+            let def = def.expect("a shipped plant");
+            let mut simulator = Simulator::new(&def).expect("a known simulation");
+            let readable = |tag: &&TagDef| tag.calculation.is_none() && tag.access != Access::Write;
+            for tag in def.tags.iter().filter(readable) {
+                let device = def.device(tag.device);
+                let code = match tag.point.table {
+                    Table::Coil => 1,
+                    Table::Discrete => 2,
+                    Table::Holding => 3,
+                    Table::Input => 4,
+                };
+                let [high, low] = tag.point.address.to_be_bytes();
+                let count = if tag.point.table.is_bits() { 1 } else { tag.point.len() };
+                let answer = simulator.respond(device.line, device.unit, &[code, high, low, 0, count as u8]);
+                assert!(answer.as_ref().is_some_and(|answer| answer[0] == code), "{name}: {} {answer:?}", tag.name);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! What the station says in words of its own is English, because it stands in the audit log and in logs too; here a terminal
 //! reads it in its language: answers to requests, and why a line is not connected.
 
-use super::{fill, translation};
+use super::{fill, patterns, translate, translation};
 
 /// Answers to requests by their texts in `access` and `plant`, with names for what differs. A test finds each of them there.
 fn words() -> &'static [&'static str] {
@@ -92,20 +92,110 @@ fn line_words() -> &'static [&'static str] {
     ]
 }
 
+/// What actions are called on record, and parts of their outcomes.
+fn action_words() -> &'static [&'static str] {
+    &[
+        "write",
+        "write requested",
+        "unlock",
+        "refresh",
+        "connect",
+        "disconnect",
+        "configure",
+        "save settings",
+        "test",
+        "stop test",
+        "read sets",
+        "save set",
+        "restore set",
+        "stop restore",
+        "start procedure",
+        "abort procedure",
+        "end procedure",
+        "counter",
+        "correct counter",
+        "hand over",
+        "take over",
+        "acknowledge",
+        "silence",
+        "reset",
+        "shelve",
+        "unshelve",
+        "out of service",
+        "in service",
+        "step done",
+        "step undone",
+        "login",
+        "logout",
+        "lock terminal",
+        "unlock terminal",
+        "add user",
+        "change password",
+        "set role",
+        "disable user",
+        "enable user",
+        "delete user",
+        "reset password",
+        "export",
+        "back up history",
+        "restore history",
+        "import samples",
+        "request from outside",
+        "seal audit log",
+        "plant file",
+        "users file",
+        "audit log",
+        "too many requests",
+        "start station",
+        "stop station",
+        "reload",
+        "safe state written",
+        "safe state NOT complete",
+        "step {step} of {steps}",
+        "{count} requests",
+    ]
+}
+
 /// An answer of the station in the language of this thread, as it is where it is none of the known ones.
 pub fn said(answer: &str) -> String {
     let known = |pattern: &&'static str| Some((translation(pattern)?, values(pattern, answer)?));
     let found = words().iter().chain(line_words()).find_map(known);
-    found.map_or_else(
-        || answer.to_owned(),
-        |(translated, values)| {
-            // A reason may stand within another.
-            let values: Vec<_> = values.into_iter().map(|(name, value)| (name, said(value))).collect();
-            let values: Vec<(&str, &dyn std::fmt::Display)> =
-                values.iter().map(|(name, value)| (*name, value as &dyn std::fmt::Display)).collect();
-            fill(translated, &values)
-        },
-    )
+    // A reason may stand within another.
+    found.map_or_else(|| answer.to_owned(), |(translated, values)| filled(translated, values, said))
+}
+
+/// What an action is called on record, in the language of this thread.
+pub fn recorded_action(action: &str) -> &str {
+    if action_words().contains(&action) { translate(action) } else { action }
+}
+
+/// Between the parts of what is on record.
+const MARKS: [&str; 3] = ["; ", ": ", ", "];
+
+/// What is on record, an outcome or a reason, in the language of this thread; as it is where it is nothing known.
+/// Of an outcome each part is read by itself: `failed: not true within the time limit, step 3 of 9; safe state written`.
+pub fn recorded(text: &str) -> String {
+    if let Some(translated) = translation(text) {
+        return translated.to_owned();
+    }
+    let is_part = |value: &str| MARKS.iter().all(|mark| !value.contains(mark));
+    let known = |pattern: &&'static str| {
+        let values = values(pattern, text).filter(|values| values.iter().all(|(_, value)| is_part(value)));
+        Some((translation(pattern)?, values?))
+    };
+    if let Some((translated, values)) = patterns().iter().find_map(known) {
+        return filled(translated, values, recorded);
+    }
+    let parts = MARKS.into_iter().find_map(|mark| Some((text.split_once(mark)?, mark)));
+    parts.map_or_else(|| text.to_owned(), |((one, other), mark)| recorded(one) + mark + &recorded(other))
+}
+
+/// A translated pattern with its values, each translated by itself.
+fn filled(pattern: &str, values: Vec<(&str, &str)>, inner: fn(&str) -> String) -> String {
+    let values: Vec<_> = values.into_iter().map(|(name, value)| (name, inner(value))).collect();
+    let values: Vec<(&str, &dyn std::fmt::Display)> =
+        values.iter().map(|(name, value)| (*name, value as &dyn std::fmt::Display)).collect();
+    fill(pattern, &values)
 }
 
 /// What stands in the places of a pattern; `None` if the text does not fit it.

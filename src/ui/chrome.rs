@@ -186,25 +186,9 @@ pub fn last_command_label(cx: &ViewContext, pending: &LastCommand) -> (String, S
             None => (t!("{what}  sent …", what), theme.normal()),
         };
     };
-    let (words, trouble) = match (&status.command.kind, &status.outcome) {
-        // The line has taken it; what comes of it stands on the bus tab.
-        (CommandKind::Test(..), Outcome::Verified) => (t!("started").to_owned(), false),
-        (CommandKind::StopTest(_), Outcome::Verified) => (t!("done").to_owned(), false),
-        // Whether they are the right ones only the devices can tell.
-        (CommandKind::Configure(_), Outcome::Verified) => (t!("in use").to_owned(), false),
-        (CommandKind::SaveSettings(_), Outcome::Verified) => (t!("saved to plant file").to_owned(), false),
-        // The line has been asked to; only the device tells whether it answers.
-        (CommandKind::Refresh(_), Outcome::Verified) => (t!("requested").to_owned(), false),
-        // Nothing was written that could be read back.
-        (
-            CommandKind::Alarm(_)
-            | CommandKind::CorrectCounter { .. }
-            | CommandKind::HandOver
-            | CommandKind::TakeOver
-            | CommandKind::Connect(..),
-            Outcome::Verified,
-        ) => (t!("done").to_owned(), false),
-        (_, outcome) => outcome_words(outcome),
+    let (words, trouble) = match &status.outcome {
+        Outcome::Verified => (status.outcome_text(), false),
+        outcome => outcome_words(outcome),
     };
     let at = clock(status.at, &cx.def().time_zone);
     let (words, trouble) = match status.recorded || status.is_pending() {

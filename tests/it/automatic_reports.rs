@@ -190,3 +190,23 @@ fn reports_that_find_no_room_are_made_once_there_is_some() {
         check_whole(&place.reports, &place.names());
     }
 }
+
+#[test]
+fn a_report_without_a_station_is_called_changed_if_it_was() {
+    let place = Place::new();
+    let history = ["--history", "tank.duckdb"];
+    let day = format!("day@{}", place.first);
+    let args = ["report", "tank.toml", "--period", &day, "--format", "text", "--out", "reports/own.txt"];
+    fs::create_dir_all(place.folder.path().join("reports")).expect("a folder");
+    let made = place.command(&[&args[..], &history].concat()).output().expect("it runs");
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let (is_verified, said) = place.verified("own.txt", &history);
+    assert!(!is_verified && said.contains("no station has recorded it") && said.contains("agrees with"), "{said}");
+    assert!(!said.contains("is not what was written"), "{said}");
+    let file = place.folder.path().join("reports/own.txt");
+    let text = fs::read_to_string(&file).expect("the report");
+    fs::write(&file, text + "a line\n").expect("written");
+    assert!(place.verified("own.txt", &history).1.contains("is not what was written"));
+    fs::remove_file(place.folder.path().join("reports/own.txt.sha256")).expect("it was there");
+    assert!(place.verified("own.txt", &history).1.contains("has no checksum"));
+}

@@ -112,7 +112,7 @@ async fn every_command_is_permitted_or_refused_as_the_table_says() {
             if row.is_action || !row.lets(person) {
                 let line = guarded.written(written, &said, |entry| &*entry.action == row.action).await;
                 assert!(is_by(&line, person), "{said}: {line:?}");
-                assert_eq!(*line.outcome, status.outcome.to_string(), "{said}");
+                assert_eq!(*line.outcome, status.outcome_text(), "{said}");
                 assert!(line.from.contains(&format!("process {}", std::process::id())), "{}", line.from);
             }
         }

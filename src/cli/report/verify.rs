@@ -22,8 +22,8 @@ use crate::{
 
 /// What the help says of it.
 pub const ABOUT: &str = "Compares a report with its checksum (FILE.sha256), the record of automatic reports and the audit log. Exit code 0 \
-    if all agree; 1 if the file was changed or was never written by this plant; 5 if what is there agrees, but the checksum is missing or \
-    the audit log may not be read";
+    if all agree; 1 if the file was changed, or has neither a checksum nor a record; 5 if what is there agrees, but the checksum is missing, \
+    the audit log may not be read, or has no entry of a report that was made without the station";
 
 /// Entries of the audit log about one file that are listed.
 const ENTRIES_MAX: usize = 20;
@@ -46,6 +46,8 @@ enum Compared {
     Agrees(String),
     Differs(String),
     Missing(String),
+    /// Nothing is known of it there, as of a report that was made without the station.
+    Unrecorded(String),
 }
 
 /// Compares, and says each result.
@@ -62,7 +64,10 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let results = [("checksum", of_checksum(&args.file, &sha)), ("record", record), ("audit log", log)];
     say(&format!("{}: SHA-256 {sha}", args.file.display()));
     for (what, result) in &results {
-        let (Compared::Agrees(words) | Compared::Differs(words) | Compared::Missing(words)) = result;
+        let (Compared::Agrees(words)
+        | Compared::Differs(words)
+        | Compared::Missing(words)
+        | Compared::Unrecorded(words)) = result;
         say(&format!("{what:9}  {words}"));
     }
     let [(_, checksum), (_, record), (_, log)] = &results;
@@ -71,10 +76,18 @@ pub fn main(args: Args) -> Result<(), CliError> {
     if results.iter().any(|(_, result)| matches!(result, Compared::Differs(_))) {
         return Err(CliError::Failed(format!("{file} is not what was written")));
     }
-    match (agrees(record) || agrees(log), agrees(checksum)) {
-        (true, true) => Ok(()),
-        (true, false) => Err(CliError::NotVerified(format!("{file} is what was written, but its checksum is missing"))),
-        (false, _) => Err(CliError::NotVerified(format!("{file} could not be compared with the audit log"))),
+    match (agrees(record) || agrees(log), log, agrees(checksum)) {
+        (true, _, true) => Ok(()),
+        (true, _, false) => {
+            Err(CliError::NotVerified(format!("{file} is what was written, but its checksum is missing")))
+        }
+        (false, Compared::Unrecorded(_), true) => Err(CliError::NotVerified(format!(
+            "{file} is as its checksum has it, but no station has recorded it: nothing else says that it was not changed"
+        ))),
+        (false, Compared::Unrecorded(_), false) => Err(CliError::Failed(format!(
+            "{file} is nothing that a station of this plant has recorded, and has no checksum"
+        ))),
+        (false, _, _) => Err(CliError::NotVerified(format!("{file} could not be compared with the audit log"))),
     }
 }
 
@@ -119,7 +132,9 @@ async fn of_log(source: &Source, sha: &str) -> Compared {
                 let entry = action.chain_hash.map_or_else(String::new, |entry| format!(", entry {}", entry.number));
                 Compared::Agrees(format!("exported by {} at {:.0} as {}{entry}", action.by, action.at, action.target))
             }
-            None => Compared::Differs("NO ENTRY: no station has recorded a file with this content; a report made without the station has none".to_owned()),
+            None => Compared::Unrecorded(
+                "NO ENTRY: it was made without the station, or changed, or made by another plant".to_owned(),
+            ),
         },
         Ok(_) => Compared::Missing("NOT READ: the station answered another query".to_owned()),
         Err(error) => Compared::Missing(format!("NOT READ: {error}")),

@@ -7,8 +7,8 @@ use std::ops::Range;
 use crate::{
     history::tiers::Tier,
     plant::{
-        command::Outcome,
-        def::ParquetVersion,
+        command::{CommandKind, Outcome},
+        def::{ParquetVersion, ProcedureId},
         procedure,
         record::{AlarmEvent, NOT_PROCESS_ACTIONS},
     },
@@ -233,9 +233,11 @@ pub fn unchained(limit: usize) -> String {
 /// The last record of a procedure: its start, what is written before its end, or its end; a refused start is none.
 pub fn latest_procedure() -> String {
     format!(
-        "SELECT {ACTION} FROM operator_action WHERE (action = '{}' AND outcome = '{}') OR action IN ('{}', '{}')
+        "SELECT {ACTION} FROM operator_action WHERE (action = '{}' AND outcome IN ('{}', '{}')) OR action IN ('{}', '{}')
          ORDER BY rowid DESC LIMIT 1",
         procedure::START,
+        CommandKind::StartProcedure(ProcedureId(0)).label(),
+        // So it was called before.
         Outcome::Verified.label(),
         procedure::WRITE_SAFE_STATE,
         procedure::END

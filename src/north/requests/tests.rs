@@ -83,6 +83,25 @@ fn a_request_that_expires_while_the_list_is_written_is_not_sent() {
 }
 
 #[test]
+fn a_value_with_more_decimals_than_its_tag_is_refused() {
+    let passed_on = |value: &str| {
+        let mut requests = requests(Ok(RequestLog::default()));
+        let decision = requests.on_received(&fixture::shared(), &message(&json("a", value)), now(0));
+        let Decision::PassOn(request) = decision else { panic!("{decision:?}") };
+        let mut snapshot = Snapshot::blank(fixture::shared());
+        snapshot.decimals[fixture::SV.index()] = 1;
+        request.command(&snapshot, TERMINAL, now(1)).map_err(|why| why.to_string()).map(|command| command.kind)
+    };
+    let write = |value: f64| Ok(CommandKind::Write { tag: fixture::SV, value: value.into() });
+    for (value, expect) in [("50.5", 50.5), ("50.50", 50.5), ("50.000", 50.0), ("5.05e1", 50.5), ("1e2", 100.0)] {
+        assert_eq!(passed_on(value), write(expect), "{value}");
+    }
+    for value in ["50.55", "0.01", "5e-2", "1e-30"] {
+        assert_eq!(passed_on(value), Err("at most 1 decimal".to_owned()), "{value}");
+    }
+}
+
+#[test]
 fn a_request_for_a_listening_line_is_refused_by_the_plant() {
     let mut def = fixture::plant();
     def.lines[0].listens = true;

@@ -42,6 +42,9 @@ pub enum Refusal {
         /// Highest permitted.
         max: String,
     },
+    /// The device would round it, to this.
+    #[error("{}", t!("the device would store {what}", what = .0))]
+    Resolution(String),
     /// A bound or the decimals are not known, so the write cannot be checked.
     #[error("{}", t!("{what} is unknown", what = .0))]
     Unknown(String),

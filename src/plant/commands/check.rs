@@ -88,6 +88,11 @@ impl CommandTracker {
             let text = |bound: Option<Exact>, none: &str| bound.map_or(none.into(), |bound| digits(bound, shown));
             return refuse(Refusal::OutOfRange { min: text(bounds.0, "−∞"), max: text(bounds.1, "∞") });
         };
+        // What makes safe is written as near as it can be; else only what was asked for is written.
+        let held = scale::to_value(def, raw, decimals);
+        if limits == Limits::All && !urgent && !scale::is_held(value, held) {
+            return refuse(Refusal::Resolution(value_text(image, def, held)));
+        }
         // What was read before the write under way says nothing about the time after it.
         if !is_busy && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
             return Err(Outcome::Unchanged);

@@ -60,7 +60,7 @@ pub(super) fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImag
         target: target.into(),
         old: old.map(Into::into),
         new: new.map(Into::into),
-        outcome: status.outcome.to_string().into(),
+        outcome: status.outcome_text().into(),
         note: status.command.note.clone(),
         chain_hash: None,
     }

@@ -127,8 +127,8 @@ mod tests {
             let found = actions(plant.on_command(CommandStatus::new(command, "anna", at(1)), at(1)).records);
             found.into_iter().map(|(_, _, outcome)| outcome).collect::<String>()
         };
-        assert_eq!(correct(PV, 12.5, Some("new meter")), "verified");
-        assert_eq!(correct(PV, -2.0, Some("read by hand")), "verified");
+        assert_eq!(correct(PV, 12.5, Some("new meter")), "done");
+        assert_eq!(correct(PV, -2.0, Some("read by hand")), "done");
         assert_eq!(correct(PV, 12.5, None), "refused: a reason is required");
         assert_eq!(correct(PV, 12.5, Some(" ")), "refused: a reason is required");
         assert_eq!(correct(PV, 0.0, Some("no")), "refused: not an amount");

@@ -49,6 +49,9 @@ pub enum Problem {
     /// Outside the limits that the device would then have.
     #[error("{}", t!("{tag} {value} is outside {min} … {max}", tag = .tag, value = .value, min = .min, max = .max))]
     OutOfRange { tag: String, value: Exact, min: String, max: String },
+    /// The device would round it, to this.
+    #[error("{}", t!("{tag} {value}: the device would store {held}", tag = .tag, value = .value, held = .held))]
+    Resolution { tag: String, value: Exact, held: Exact },
     /// Not one of the values of an enumeration.
     #[error("{}", t!("{tag} has no value {value}", tag = .tag, value = .value))]
     NotAChoice { tag: String, value: Exact },
@@ -171,8 +174,10 @@ fn unfit(
     let Some(decimals) = decimals else {
         return Some(Problem::Unknown(t!("the decimals of {tag}", tag = tag.short)));
     };
-    if scale::raw_within(tag, change.new, decimals, bounds).is_some() {
-        return None;
+    if let Some(raw) = scale::raw_within(tag, change.new, decimals, bounds) {
+        let held = scale::to_value(tag, raw, decimals);
+        let (tag, value) = (tag.short.clone(), change.new);
+        return (!scale::is_held(value, held)).then_some(Problem::Resolution { tag, value, held });
     }
     let text = |bound: Option<Exact>, none: &str| bound.map_or(none.to_owned(), |bound| bound.to_string());
     let (min, max) = (text(bounds.0, "−∞"), text(bounds.1, "∞"));

@@ -88,6 +88,7 @@ fn what_cannot_be_written_is_reported_before_anything_is() {
     };
     check(&with("SV", 101.), &["SV 101 is outside 0 … 100"]);
     check(&with("SV-H", 600.), &["SV-H 600 is outside 0 … 500"]);
+    check(&with("SV", 60.4), &["SV 60.4: the device would store 60"]);
     check(&with("CTRL", 7.), &["CTRL has no value 7"]);
     check(&with("RUN", 1.), &["RUN is not a setting of this device"]);
     check(&with("NOPE", 1.), &["NOPE is not a setting of this device"]);

@@ -192,10 +192,14 @@ mod tests {
         let mut plant = plant();
         let record = actions(&try_out(&mut plant, 1, baud(19_200)));
         let new = "RTU /dev/null 19200 8N1";
-        assert_eq!(record, [("anna".into(), "configure".into(), new.into(), "verified".into())]);
+        assert_eq!(record, [("anna".into(), "configure".into(), new.into(), "in use".into())]);
         let effects = command(&mut plant, 2, CommandKind::StopTest(L1));
         let record = actions(&plant.on_delivered(L1, &effects.bus[0].1));
-        assert_eq!(record, [("anna".into(), "stop test".into(), String::new(), "verified".into())]);
+        assert_eq!(record, [("anna".into(), "stop test".into(), String::new(), "done".into())]);
+        let test = CommandKind::Test(L1, crate::plant::diagnostics::Diagnostic::Send(vec![1, 3, 0, 0]));
+        let effects = command(&mut plant, 3, test);
+        let record = actions(&plant.on_delivered(L1, &effects.bus[0].1));
+        assert_eq!((record.len(), &*record[0].3), (1, "started"), "nothing was read back");
     }
 
     #[test]
@@ -222,7 +226,7 @@ mod tests {
         assert_eq!(actions(&effects), [], "not before it is done");
         assert!(before(&plant).is_some());
         let saved = plant.on_saved(id, &baud(19_200), Ok(()));
-        let action = ("anna".to_owned(), "save settings".to_owned(), String::new(), "verified".to_owned());
+        let action = ("anna".to_owned(), "save settings".to_owned(), String::new(), "saved to plant file".to_owned());
         assert_eq!(actions(&saved), [action]);
         assert_eq!(before(&plant), None);
     }

@@ -58,7 +58,7 @@ fn two_devices_of_a_profile_may_have_tags_of_their_own() {
     let id = crate::plant::def::TagId(def.tags.len() as u16);
     let name = "PLC-2.RECIPE".to_owned();
     def.tags.push(TagDef { id, device: second, name, short: "RECIPE".into(), in_sets: true, unit: "l".into(), ..base });
-    let all = |_| Some(3.0.into());
+    let all = |_| Some(1.0.into());
     let set = parameter_set::capture(&def, second, "winter", "anna".into(), Timestamp::UNIX_EPOCH, &all);
     assert_eq!(set.values.len(), 1);
     let text = text_of_set(&set, &def);
@@ -97,6 +97,8 @@ fn a_spoiled_file_tells_line_found_and_expected() {
         &format!("{head}SV = \"hot\"\n"),
         &["winter.toml:6:6: `hot` is not a state of TIC-1.SV", "expected a number"],
     );
+    check(&format!("{head}I = 12.54\n"), &["winter.toml:6:5: TIC-1.I cannot hold 12.54", "can hold: 12.5"]);
+    check(&format!("{head}I = 70000\n"), &["winter.toml:6:5: 70000 does not fit the register of TIC-1.I"]);
     check(&format!("{head}SW = 70\n"), &["winter.toml:6:1: unknown setting `SW`", "did you mean `SV`?"]);
     check(
         &format!("{head}FIX = 1\nAT = 1\n"),

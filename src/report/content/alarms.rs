@@ -34,7 +34,7 @@ pub(super) fn suppressed(alarms: &[SuppressedSummary]) -> Table {
         vec![
             Cell::text(translate(alarm.priority.word())),
             Cell::text(&alarm.subject),
-            Cell::text(&alarm.message),
+            Cell::text(translate(&alarm.message)),
             Cell::number(Some(alarm.raised as f64), 0),
             minutes(alarm.active),
         ]
@@ -64,7 +64,7 @@ pub(super) fn bad_actors(alarms: &[BadActor]) -> Table {
     let columns = [Column::text("kind"), Column::text("subject"), Column::text("alarm"), Column::number("raised")];
     Table::new(columns).with(alarms.iter().map(|alarm| {
         let raised = Cell::number(alarm.raised.map(|raised| raised as f64), 0);
-        vec![Cell::text(translate(alarm.kind)), Cell::text(&alarm.subject), Cell::text(&alarm.alarm), raised]
+        vec![Cell::text(translate(alarm.kind)), Cell::text(&alarm.subject), Cell::text(translate(&alarm.alarm)), raised]
     }))
 }
 
@@ -86,7 +86,7 @@ pub(super) fn alarms(alarms: &[AlarmRecord]) -> Table {
             Cell::Time(alarm.at),
             Cell::text(translate(alarm.priority.word())),
             Cell::text(&alarm.subject),
-            Cell::text(&alarm.message),
+            Cell::text(translate(&alarm.message)),
             Cell::text(translate(alarm.event.word())),
             Cell::shortest(alarm.value),
             Cell::shortest(alarm.limit),

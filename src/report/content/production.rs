@@ -2,9 +2,9 @@
 
 use std::{sync::Arc, time::Duration};
 
-use super::minutes;
+use super::{label, minutes};
 use crate::{
-    plant::counter::CounterEvent,
+    plant::{counter::CounterEvent, def::PlantDef},
     report::{
         RunFigures,
         batch::{self, BatchReport},
@@ -17,10 +17,11 @@ use crate::{
 };
 
 /// What counters did beside counting.
-pub fn counters(rows: &[CounterRow]) -> Table {
+pub fn counters(rows: &[CounterRow], def: &PlantDef) -> Table {
     let columns = [
         Column::time("time"),
         Column::text("tag"),
+        Column::text("label"),
         Column::text("event"),
         Column::number("old"),
         Column::number("new"),
@@ -33,18 +34,23 @@ pub fn counters(rows: &[CounterRow]) -> Table {
         let is_read = step.event != CounterEvent::Corrected;
         let [old, new] = [step.old, step.new].map(|shown| if is_read { value(shown) } else { Cell::Empty });
         let event = Cell::text(translate(step.event.word()));
-        let counted = value(step.counted);
-        vec![Cell::Time(step.at), Cell::text(tag), event, old, new, counted, Cell::text(unit), Cell::text(note)]
+        let (counted, [name, unit, note]) = (value(step.counted), [tag, unit, note].map(Cell::text));
+        vec![Cell::Time(step.at), name, label(def, tag), event, old, new, counted, unit, note]
     }))
 }
 
-pub fn runs(runs: &[RunFigures]) -> Table {
-    let columns =
-        [Column::text("actuator"), Column::number("hours on"), Column::number("starts"), Column::number("good %")];
+pub fn runs(runs: &[RunFigures], def: &PlantDef) -> Table {
+    let columns = [
+        Column::text("actuator"),
+        Column::text("label"),
+        Column::number("hours on"),
+        Column::number("starts"),
+        Column::number("good %"),
+    ];
     Table::new(columns).with(runs.iter().map(|run| {
         let hours = run.on.map(|on| on.as_secs_f64() / 3_600.0);
         let good = Cell::number(Some(floor_percent(run.good)), 1);
-        vec![Cell::text(&run.tag), Cell::number(hours, 2), Cell::number(run.starts, 0), good]
+        vec![Cell::text(&run.tag), label(def, &run.tag), Cell::number(hours, 2), Cell::number(run.starts, 0), good]
     }))
 }
 
@@ -76,7 +82,7 @@ pub fn batches(batches: &[BatchReport]) -> Table {
             Cell::Time(batch.from),
             batch.to.map_or(Cell::Empty, Cell::Time),
             minutes(part.batch.lasted),
-            Cell::text(of_part(batch::state(batch), whole.is_some())),
+            Cell::text(of_part(translate(batch::words(batch)), whole.is_some())),
             Cell::number(kwh, 3),
             Cell::number(good.map(floor_percent), 1),
             Cell::number(part.alarms.map(|alarms| alarms as f64), 0),

@@ -80,12 +80,14 @@ static BANKS: [BankLayout; 9] = [
     layout(Kind::Ct, Table::Coil, 6400, 0o41140, 8, false),
 ];
 
-/// V memory that holds words of its own, and whether it may be written. System parameters are left out on purpose.
+/// V memory that holds words of its own, and whether it may be written. Of the system parameters those of port 2 are there, which
+/// the profile names; the others are left out on purpose.
 const AREAS: &[(Range<u16>, bool)] = &[
     (0..0o400, false),
     (0o400..0o700, true),
     (0o1000..0o1200, false),
     (0o1200..0o7600, true),
+    (0o7655..0o7657, false),
     (0o10000..0o20000, true),
 ];
 
@@ -216,7 +218,10 @@ mod tests {
         check(0o700, Err(ExceptionCode::ILLEGAL_ADDRESS));
         check(0o2000, Ok(true));
         check(0o7577, Ok(true));
-        check(0o7655, Err(ExceptionCode::ILLEGAL_ADDRESS));
+        check(0o7654, Err(ExceptionCode::ILLEGAL_ADDRESS));
+        check(0o7655, Ok(false));
+        check(0o7656, Ok(false));
+        check(0o7657, Err(ExceptionCode::ILLEGAL_ADDRESS));
         check(0o17777, Ok(true));
         check(0o20000, Err(ExceptionCode::ILLEGAL_ADDRESS));
         check(0o40400, Ok(false));

@@ -97,7 +97,7 @@ impl Confirm {
         let value = value.into();
         let def = cx.def().tag(tag);
         let rounded = entry::rounded_text(cx.snapshot, tag, value);
-        let value = if rounded.is_some() { cx.snapshot.rounded_to_device(tag, value) } else { value };
+        let value = entry::as_confirmed(cx.snapshot, tag, value);
         let action = ConfirmAction::Command(CommandKind::Write { tag, value });
         let notes = rounded.into_iter().chain(write_notes(def)).collect();
         let confirm = Confirm::new(action, t!("write {name}", name = def.name), notes);

@@ -89,6 +89,7 @@ pub struct Controllers {
     wall: Option<bool>,
     runs: Runs,
     procedures: Procedures,
+    lamps: lamps::Live,
     /// The selected row of the sets.
     set: usize,
     asked_for: Asked,
@@ -236,11 +237,11 @@ impl TabView for Controllers {
             self.page = Page::Device;
         }
         let device = cx.def().devices.get(self.device.index());
-        if let (Page::Runs | Page::Overlay(_), Some(device)) = (&self.page, device) {
-            return self.runs.ask(cx, device, &mut self.asked);
-        }
-        if self.page == Page::Procedures {
-            return self.procedures.ask(cx, &mut self.asked);
+        match (&self.page, device) {
+            (Page::Runs | Page::Overlay(_), Some(device)) => return self.runs.ask(cx, device, &mut self.asked),
+            (Page::Lamps, Some(device)) => return self.lamps.ask(cx, device, &mut self.asked),
+            (Page::Procedures, _) => return self.procedures.ask(cx, &mut self.asked),
+            _ => {}
         }
         let faceplate = device.and_then(|device| device.faceplate.as_ref());
         let tags = match &self.page {
@@ -263,13 +264,15 @@ impl TabView for Controllers {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.trend.query.awaits(number) || self.runs.awaits(number) || self.procedures.awaits(number)
+        let (runs, procedures, lamps) = (&self.runs, &self.procedures, &self.lamps);
+        self.trend.query.awaits(number) || runs.awaits(number) || procedures.awaits(number) || lamps.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.trend.on_answer(cx, number, &answer);
         self.runs.on_answer(cx, number, &answer);
         self.procedures.on_answer(cx, number, &answer);
+        self.lamps.on_answer(cx, number, &answer);
         Vec::new()
     }
 
@@ -311,7 +314,7 @@ impl TabView for Controllers {
                 wall::view(cx, &mut canvas, self.device.index(), &self.trend);
             }
             (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
-            (Page::Lamps, _) => lamps::view(cx, &mut canvas, device),
+            (Page::Lamps, _) => lamps::view(cx, &mut canvas, device, &self.lamps),
             (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
             (Page::Device | Page::Program, _) => {
                 let trend = self.trend.value.as_ref().and_then(|series| series.first());
@@ -348,6 +351,7 @@ impl Controllers {
             wall: None,
             runs,
             procedures,
+            lamps: lamps::Live::default(),
             set: 0,
             asked_for,
             trend,

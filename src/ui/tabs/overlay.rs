@@ -43,6 +43,20 @@ impl Laid {
         Laid { label, from, to, figures: None, is_whole: false }
     }
 
+    fn of_batch(batch: &Batch) -> Laid {
+        Laid::new(batch.label(), batch.from, batch.to)
+    }
+
+    fn of_run((run, figures): (&ControlRun, [String; 5])) -> Laid {
+        let to = (!run.is_running()).then_some(run.until);
+        // What a procedure has measured has its name.
+        let label = match run.cause {
+            RunCause::Procedure => format!("{} {}", run.detail, run.number),
+            RunCause::Setpoint | RunCause::Program | RunCause::Batch => run.label(),
+        };
+        Laid { figures: Some(figures), ..Laid::new(label, run.from, to) }
+    }
+
     fn until(&self, now: Timestamp) -> Timestamp {
         self.to.unwrap_or(now)
     }
@@ -71,22 +85,13 @@ impl Overlay {
     /// Of batches of one rule; `None` where it names no tag that has a curve.
     pub fn of_batches(rule: &BatchDef, batches: impl IntoIterator<Item = Batch>) -> Option<Overlay> {
         let tags = rule.tags.iter().chain(&rule.energy).chain(&rule.phase).copied().collect();
-        let laid = |batch: Batch| Laid::new(batch.label(), batch.from, batch.to);
-        Overlay::new((Tab::Reports, Kind::Batches), batches.into_iter().map(laid), (tags, 0))
+        let laid = batches.into_iter().map(|batch| Laid::of_batch(&batch));
+        Overlay::new((Tab::Reports, Kind::Batches), laid, (tags, 0))
     }
 
     /// Of control runs with their figures; `None` where they have no tag that has a curve.
-    pub fn of_runs(rule: &RunDef, runs: impl Iterator<Item = (ControlRun, [String; 5])>) -> Option<Overlay> {
-        let laid = |(run, figures): (ControlRun, _)| {
-            let to = (!run.is_running()).then_some(run.until);
-            // What a procedure has measured has its name.
-            let label = match run.cause {
-                RunCause::Procedure => format!("{} {}", run.detail, run.number),
-                RunCause::Setpoint | RunCause::Program | RunCause::Batch => run.label(),
-            };
-            Laid { figures: Some(figures), ..Laid::new(label, run.from, to) }
-        };
-        Overlay::new((Tab::Controllers, Kind::Runs), runs.map(laid), (rule.tags.clone(), 0))
+    pub fn of_runs<'a>(rule: &RunDef, runs: impl Iterator<Item = (&'a ControlRun, [String; 5])>) -> Option<Overlay> {
+        Overlay::new((Tab::Controllers, Kind::Runs), runs.map(Laid::of_run), (rule.tags.clone(), 0))
     }
 
     /// Of periods, named by letters; `None` where there is no tag that has a curve.
@@ -102,6 +107,33 @@ impl Overlay {
     ) -> Option<Overlay> {
         let curves = laid.take(CURVES_MAX).map(|laid| (laid, Answered::default())).collect();
         (!tags.is_empty()).then_some(Overlay { tab, kind, curves, tags, tag })
+    }
+
+    /// Does one of them still run, so that its end must be looked for?
+    pub fn is_running(&self) -> bool {
+        self.curves.iter().any(|(laid, _)| laid.to.is_none())
+    }
+
+    /// The batches as they are listed now.
+    pub fn follow_batches<'a>(&mut self, batches: impl Iterator<Item = &'a Batch>) {
+        self.follow(batches.map(Laid::of_batch));
+    }
+
+    /// The control runs as they are listed now, with their figures.
+    pub fn follow_runs<'a>(&mut self, runs: impl Iterator<Item = (&'a ControlRun, [String; 5])>) {
+        self.follow(runs.map(Laid::of_run));
+    }
+
+    /// What runs gets its figures of now, and what has ended meanwhile its end.
+    fn follow(&mut self, listed: impl Iterator<Item = Laid>) {
+        for now in listed {
+            let mut running = self.curves.iter_mut().filter(|(laid, _)| laid.to.is_none());
+            let Some((laid, curve)) = running.find(|(laid, _)| laid.label == now.label) else { continue };
+            if now.to.is_some() {
+                curve.query.want();
+            }
+            *laid = now;
+        }
     }
 
     /// Shows another tag.

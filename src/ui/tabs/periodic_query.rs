@@ -9,6 +9,7 @@ use crate::{
         alarm::PeriodMetrics,
         control_run::ControlRun,
         line_minute::LineMinute,
+        live::LiveReading,
         record::{ActionRecord, AlarmRecord},
     },
     report::{ShiftReport, batch::BatchReport, step_series::HeldValue},
@@ -214,6 +215,7 @@ from_answer! {
     ControlRuns: Vec<ControlRun>;
     Reports: MadeReports;
     Values: Vec<Vec<Option<HeldValue>>>;
+    Registers: LiveReading;
 }
 
 /// Seconds of the operator as plant time, which runs faster in demonstrations.

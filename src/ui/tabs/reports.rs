@@ -170,8 +170,7 @@ impl TabView for Reports {
         self.report.on_answer(cx, number, &answer);
         self.set_preview(cx);
         self.curve.on_answer(cx, number, &answer);
-        self.batches.rows.on_answer(cx, number, &answer);
-        self.batches.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, &answer));
+        self.batches.on_answer(cx, number, &answer);
         self.made.list.on_answer(cx, number, &answer);
         self.made.open.iter_mut().for_each(|open| open.report.on_answer(cx, number, &answer));
         self.ask(cx)

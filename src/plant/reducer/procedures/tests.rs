@@ -131,7 +131,7 @@ fn waiting(plant: &mut Plant) {
 fn step_follows_step_and_the_run_is_measured() {
     let mut plant = plant();
     let started = start(&mut plant);
-    assert_eq!(actions(&started), ["anna start procedure heat verified"]);
+    assert_eq!(actions(&started), ["anna start procedure heat done"]);
     assert_eq!(written(&started), [(SV, 500.0)], "one step after the other");
     assert!(run(&plant).at_work() && plant.on_tick(at(2)).bus.is_empty(), "it waits for the read-back");
     let verified = end(&mut plant, &started, 2, WriteResult::ReadBack);
@@ -304,7 +304,7 @@ fn nothing_is_measured_before_the_history_is_known() {
     );
     assert!(refused.bus.is_empty());
     let unmeasured = command(&mut plant, 2, CommandKind::StartProcedure(OTHER), 2);
-    assert_eq!(actions(&unmeasured)[0], "anna start procedure other verified", "it measures nothing");
+    assert_eq!(actions(&unmeasured)[0], "anna start procedure other done", "it measures nothing");
 }
 
 #[test]

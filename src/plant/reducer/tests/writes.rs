@@ -71,7 +71,7 @@ fn what_will_be_sent_is_blocked_whatever_was_typed() {
     def.logic.interlocks = vec![InterlockDef { tag: RUN, value: 1.0, of: PV, when, message, refuse: true }];
     let mut plant = Plant::new(Arc::new(def), at(0), 1.0);
     plant.on_event(read(0, &[(PV, 700.0), (DP, 1.0), (FAULT, 0.0)]));
-    for (value, refused) in [(1.0, true), (0.6, true), (0.4, false)] {
+    for (value, refused) in [(1.0, true), (0.6, true), (0.0, false)] {
         let effects = plant.on_command(shown(&plant, 1, RUN, value), at(1));
         assert_eq!(effects.bus.is_empty(), refused, "{value}: {:?}", plant.snapshot().commands[0].outcome);
         assert!(!refused || matches!(plant.snapshot().commands[0].outcome, Outcome::Refused(Refusal::Interlock(_))));
@@ -114,6 +114,8 @@ fn action_of(effects: &Effects) -> &ActionRecord {
 fn a_write_is_recorded_with_the_value_that_the_device_holds() {
     let mut plant = in_steps(100.0);
     let effects = plant.on_command(shown(&plant, 1, SV, 72.3), at(1));
+    assert_eq!((&*action_of(&effects).outcome, effects.bus.len()), ("refused: the device would store 72.5 °C", 0));
+    let effects = plant.on_command(shown(&plant, 1, SV, 72.500_000_1), at(1));
     let BusRequest::Write(WriteJob { id, raw, .. }) = effects.bus[0].1 else { panic!("a write was requested") };
     assert_eq!(raw, 145.0, "72.5 °C goes out");
     assert_eq!(
@@ -131,7 +133,8 @@ fn rounding_never_leads_beyond_a_limit() {
     let range = Refusal::OutOfRange { min: "0.0".into(), max: "99.8".into() };
     for (value, sent, outcome) in [
         (99.8, None, Outcome::Refused(range.clone())),
-        (99.7, Some(199.0), Outcome::Pending),
+        (99.7, None, Outcome::Refused(Refusal::Resolution("99.5 °C".into()))),
+        (99.5, Some(199.0), Outcome::Pending),
         (99.9, None, Outcome::Refused(range)),
     ] {
         let mut plant = in_steps(99.8);

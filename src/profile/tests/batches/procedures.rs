@@ -67,6 +67,7 @@ fn a_value_of_another_kind_or_beyond_its_register_is_an_error() {
     let word = "type = \"uint16\"\naccess = \"rw\"\nmax_from = \"DP\"\n";
     let float = "type = \"float32\"\naccess = \"rw\"\nmax_from = \"DP\"\n";
     let scaled = "type = \"int16\"\naccess = \"rw\"\ndecimals_from = \"DP\"\n";
+    let halves = "type = \"int16\"\naccess = \"rw\"\nscale = 0.5\n";
     for (bounds, value, expect) in [
         (word, "true", "`true` is not a state of D1.LEVEL"),
         (word, "1e308", "1e308 does not fit the register of D1.LEVEL"),
@@ -74,11 +75,14 @@ fn a_value_of_another_kind_or_beyond_its_register_is_an_error() {
         (word, "-1", "-1 does not fit the register of D1.LEVEL"),
         (float, "1e308", "1e308 does not fit the register of D1.LEVEL"),
         (scaled, "-40000", "-40000 does not fit the register of D1.LEVEL"),
+        (word, "70.5", "70.5 has more decimals than D1.LEVEL"),
+        (float, "70.125", "70.125 has more decimals than D1.LEVEL"),
+        (halves, "70.3", "D1.LEVEL cannot hold 70.3"),
     ] {
         let text = written(bounds, value).expect_err(value).to_string();
         assert!(text.contains(expect) && text.contains("small.toml:"), "{value}: {text}");
     }
-    for (bounds, value) in [(word, "65535"), (float, "1e38"), (scaled, "-3276.8")] {
+    for (bounds, value) in [(word, "65535"), (word, "7.0"), (float, "1e38"), (scaled, "-3276.8"), (halves, "70.5")] {
         written(bounds, value).unwrap_or_else(|errors| panic!("{value}: {errors}"));
     }
     let flag = with(&SOUP.replacen("value = \"on\"", "value = true", 1)).unwrap();
@@ -104,6 +108,11 @@ fn each_mistake_of_a_procedure_has_its_place_and_name() {
         ("    { begin_measurement = \"D1\" },\n", "", "no measurement has begun"),
         ("    { end_measurement = \"D1\" },\n", "", "this measurement never ends"),
         ("{ hold = \"5min\" }", "{ begin_measurement = \"D1\" }", "the measurement before this one has not ended"),
+        (
+            "    { wait_until = \"D1.T > 60 °C\", limit = \"30min\" },\n    { hold = \"5min\" },\n",
+            "    { wait_until = \"D1.T > 60 °C\", limit = \"4s\" },\n    { hold = \"5s\" },\n",
+            "this measurement is too short to be kept",
+        ),
         ("safe = [{ write = \"D1.MODE\", value = \"off\" }]", "", "procedure soup has no safe state"),
         ("source = \"the cook\", ", "", "a reference needs `source`"),
     ] {

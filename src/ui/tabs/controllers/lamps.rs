@@ -1,12 +1,76 @@
-//! The page of lamps: every bit of a device at a glance, as on the front of a PLC.
+//! The page of lamps: every bit of a device at a glance, as on the front of a PLC. While it is shown it reads them itself.
 
-use crate::plant::tag::{Point, TagDef};
-use crate::ui::tabs::prelude::*;
+use crate::access::right::needs_for_query;
+use crate::plant::{
+    live::{AddressSpan, LiveRead, LiveReading, SPANS_MAX},
+    tag::{Point, Table, TagDef},
+};
+use crate::ui::{rights, tabs::prelude::*};
 
 /// Lamps in a row, as octal and decimal numbering have it.
 const ROW: usize = 8;
 /// A device with fewer bits has no lamps.
 const BITS_MIN: usize = 4;
+/// How often they are read, when an answer counts as lost, and how long a lamp is certain (real time).
+const EVERY_S: f64 = 1.0;
+const TIMEOUT_S: f64 = 20.0;
+const CERTAIN_S: f64 = 5.0;
+
+/// The lamps as they were read for the page.
+#[derive(Debug, Default)]
+pub struct Live {
+    device: Option<DeviceId>,
+    reading: Answered<LiveReading>,
+}
+
+impl Live {
+    /// Reads the lamps when it is time to, where this user may.
+    pub fn ask(&mut self, cx: &ViewContext, device: &DeviceDef, number: &mut u32) -> Vec<UiAction> {
+        if self.device != Some(device.id) {
+            *self = Live { device: Some(device.id), ..Live::default() };
+        }
+        let (line, unit, spans) = (device.line, device.unit, spans(cx, device));
+        let query = Query::Registers(LiveRead { line, unit, spans, not_before: None, relearn: false });
+        let may = !cx.is_past() && !cx.def().listens_on(line) && rights::lacks(cx, needs_for_query(&query)).is_none();
+        let number = (Tab::Controllers, number);
+        let (every, timeout) = (real(cx, EVERY_S), real(cx, TIMEOUT_S));
+        if may { self.reading.ask(cx, number, every, timeout, query).into_iter().collect() } else { Vec::new() }
+    }
+
+    pub fn awaits(&self, number: u32) -> bool {
+        self.reading.query.awaits(number)
+    }
+
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        self.reading.on_answer(cx, number, answer);
+    }
+
+    /// A bit, and when it was read.
+    fn at(&self, cx: &ViewContext, point: Point) -> Option<(bool, Timestamp)> {
+        let parts = self.reading.value.iter().filter(|_| !cx.is_past()).flat_map(|reading| &reading.parts);
+        let mut parts = parts.filter(|part| part.span.table == point.table);
+        parts.find_map(|part| {
+            let place = point.address.checked_sub(part.span.address)?;
+            Some((*part.words.as_ref().ok()?.get(usize::from(place))? != 0, part.at))
+        })
+    }
+}
+
+/// Where the bits of a device stand.
+fn spans(cx: &ViewContext, device: &DeviceDef) -> Vec<AddressSpan> {
+    let mut points: Vec<_> = bits(cx, device).map(|tag| (tag.point.table, tag.point.address)).collect();
+    points.sort_unstable();
+    points.dedup();
+    let mut spans: Vec<AddressSpan> = Vec::new();
+    for (table, address) in points {
+        match spans.last_mut() {
+            Some(span) if span.table == table && span.range().end == u32::from(address) => span.count += 1,
+            Some(_) | None => spans.push(AddressSpan { table, address, count: 1 }),
+        }
+    }
+    spans.truncate(SPANS_MAX);
+    spans
+}
 
 /// One lamp: the tags that stand for the same bit, the profile's first.
 struct Lamp<'a> {
@@ -42,10 +106,18 @@ fn groups<'a>(cx: &ViewContext<'a>, device: &DeviceDef) -> Vec<(&'a str, Vec<Lam
 }
 
 impl Lamp<'_> {
-    /// On or off as the latest good sample has it; `None` if none is good.
-    fn state(&self, cx: &ViewContext) -> Option<bool> {
+    /// On or off as it was read last, and whether that is certain; `None` if nothing good is known.
+    fn state(&self, cx: &ViewContext, live: &Live) -> Option<(bool, bool)> {
         let samples = self.tags.iter().map(|tag| cx.snapshot.sample(tag.id)).filter(|sample| sample.quality.is_good());
-        samples.max_by_key(|sample| sample.at)?.value.map(|value| value != 0.0)
+        let samples = samples.filter_map(|sample| Some((sample.value? != 0.0, sample.at)));
+        let read = self.tags.iter().filter_map(|tag| live.at(cx, tag.point));
+        let (on, at) = samples.chain(read).max_by_key(|(_, at)| *at)?;
+        Some((on, cx.is_past() || cx.now.duration_since(at) <= real(cx, CERTAIN_S)))
+    }
+
+    /// The device itself decides over it, at once again after a write.
+    fn is_taken_back(&self) -> bool {
+        self.tags.iter().all(|tag| tag.point.table == Table::Coil && !tag.writable())
     }
 
     /// `Y0 P-1`: the terminal, and what the plant calls it.
@@ -55,12 +127,12 @@ impl Lamp<'_> {
 }
 
 /// Draws the page.
-pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, live: &Live) {
     let theme = cx.theme;
     let (wide, high) = (canvas.width(), canvas.height());
     let x = canvas.text(1, 0, &device.name, theme.strong());
     canvas.text(x + 2, 0, &fit_words(&device.title, wide.saturating_sub(x + 3)), theme.dim());
-    let (mut y, mut unknown, mut cut) = (1, 0, 0);
+    let (mut y, mut unknown, mut old, mut cut) = (1, 0, 0, 0);
     for (group, lamps) in groups(cx, device) {
         let cell = lamps.iter().map(|lamp| width(&lamp.name())).max().unwrap_or(0) + 4;
         let in_row = usize::from(wide.saturating_sub(2) / cell).clamp(1, ROW);
@@ -69,7 +141,11 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
             cut += lamps.len();
             continue;
         }
-        canvas.text(1, y, group, theme.dim());
+        let x = canvas.text(1, y, group, theme.dim());
+        if lamps.iter().all(Lamp::is_taken_back) {
+            let words = t!("driven by the device: it takes back what is written to them");
+            canvas.text(x + 2, y, &fit_words(words, wide.saturating_sub(x + 3)), theme.normal());
+        }
         y += 1;
         for row in lamps.chunks(in_row) {
             if high.saturating_sub(1) <= y {
@@ -77,12 +153,16 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
                 continue;
             }
             for (n, lamp) in row.iter().enumerate() {
-                let (glyph, style) = match lamp.state(cx) {
-                    Some(true) => (theme.pick("●", "#"), theme.strong()),
-                    Some(false) => (theme.pick("○", "."), theme.normal()),
+                let state = lamp.state(cx, live);
+                let (glyph, style) = match state {
+                    Some((true, true)) => (theme.pick("●", "#"), theme.strong()),
+                    Some((false, true)) => (theme.pick("○", "."), theme.normal()),
+                    Some((true, false)) => (theme.pick("◉", "*"), theme.dim()),
+                    Some((false, false)) => (theme.pick("◌", ","), theme.dim()),
                     None => ("?", theme.trouble()),
                 };
-                unknown += usize::from(glyph == "?");
+                unknown += usize::from(state.is_none());
+                old += usize::from(state.is_some_and(|(_, is_certain)| !is_certain));
                 canvas.text(2 + to_u16(n) * cell, y, &format!("{glyph} {}", lamp.name()), style);
             }
             y += 1;
@@ -90,6 +170,16 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
     }
     let notes = [
         (0 < unknown).then(|| t!("? {unknown} not read yet, or not known now: u reads all", unknown)),
+        (0 < old).then(|| {
+            let (on, off) = (theme.pick("◉", "*"), theme.pick("◌", ","));
+            t!(
+                "{on} {off} {old} read more than {seconds} s ago: they may have changed",
+                on,
+                off,
+                old,
+                seconds = CERTAIN_S
+            )
+        }),
         (0 < cut).then(|| t!("{cut} more: enlarge the screen", cut)),
     ];
     let notes = notes.into_iter().flatten().collect::<Vec<_>>().join("   ");

@@ -109,7 +109,11 @@ impl Procedures {
             (run, figures)
         });
         let laid: Vec<_> = with_figures.collect();
-        if laid.is_empty() { None } else { Overlay::of_runs(rule, laid.into_iter()) }
+        if laid.is_empty() {
+            None
+        } else {
+            Overlay::of_runs(rule, laid.iter().map(|(run, figures)| (run, figures.clone())))
+        }
     }
 
     /// Asks the history when it is time to.

@@ -70,19 +70,21 @@ impl Runs {
             [] => (place..place + UNMARKED).contains(n),
             marked => marked.contains(&run.number),
         });
-        let chosen: Vec<_> = chosen.map(|(_, run)| (run.clone(), figures(run))).collect();
-        self.overlay = Overlay::of_runs(rule, chosen.into_iter()).filter(|_| !self.rows().is_empty());
+        let chosen = chosen.map(|(_, run)| (run, figures(run)));
+        self.overlay = Overlay::of_runs(rule, chosen).filter(|_| !self.rows().is_empty());
     }
 
     /// Asks the history when it is time to.
     pub fn ask(&mut self, cx: &ViewContext, device: &DeviceDef, number: &mut u32) -> Vec<UiAction> {
-        if let Some(overlay) = &mut self.overlay {
-            return overlay.ask(cx, number);
+        let curves = self.overlay.as_mut().map_or(Vec::new(), |overlay| overlay.ask(cx, number));
+        if self.overlay.as_ref().is_some_and(|overlay| !overlay.is_running()) {
+            return curves;
         }
         let (to, controller) = (cx.now + SignedDuration::from_secs(1), Some(device.name.clone()));
         let query = Query::ControlRuns { controller, from: to - SPAN, to, limit: ROWS };
         let number = (Tab::Controllers, number);
-        self.rows.ask(cx, number, real(cx, EVERY_S), real(cx, TIMEOUT_S), query).into_iter().collect()
+        let list = self.rows.ask(cx, number, real(cx, EVERY_S), real(cx, TIMEOUT_S), query);
+        curves.into_iter().chain(list).collect()
     }
 
     pub fn awaits(&self, number: u32) -> bool {
@@ -90,8 +92,13 @@ impl Runs {
     }
 
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        let is_list = self.rows.query.awaits(number);
         self.rows.on_answer(cx, number, answer);
-        self.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, answer));
+        if let Some(overlay) = &mut self.overlay {
+            overlay.on_answer(cx, number, answer);
+            let listed = self.rows.value.iter().flatten().filter(|_| is_list);
+            overlay.follow_runs(listed.map(|run| (run, figures(run))));
+        }
     }
 
     /// Rows of the list on a tab of this height: the rest is about the selected run.

@@ -135,9 +135,20 @@ impl Batches {
 
     /// Asks the history when it is time to.
     pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
-        match &mut self.overlay {
-            Some(overlay) => overlay.ask(cx, number),
-            None => self.ask_list(cx, number).into_iter().collect(),
+        let curves = self.overlay.as_mut().map_or(Vec::new(), |overlay| overlay.ask(cx, number));
+        let is_listed = self.overlay.as_ref().is_none_or(Overlay::is_running);
+        let list = if is_listed { self.ask_list(cx, number) } else { None };
+        curves.into_iter().chain(list).collect()
+    }
+
+    /// Takes an answer to one of its queries.
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        let is_list = self.rows.query.awaits(number);
+        self.rows.on_answer(cx, number, answer);
+        if let Some(overlay) = &mut self.overlay {
+            overlay.on_answer(cx, number, answer);
+            let listed = self.rows.value.iter().flatten().filter(|_| is_list);
+            overlay.follow_batches(listed.map(|report| &report.batch));
         }
     }
 

@@ -97,7 +97,7 @@ fn an_abort_writes_what_is_missing_at_once() {
     back_in_vain(&mut plant, 59);
     let aborted = command(&mut plant, 2, CommandKind::AbortProcedure(HEAT), 60);
     assert_eq!(written(&aborted), [(SV, 0.0)]);
-    assert_eq!(actions(&aborted), ["anna abort procedure heat verified"]);
+    assert_eq!(actions(&aborted), ["anna abort procedure heat done"]);
     assert!(run(&plant).at_work());
     end(&mut plant, &aborted, 61, NOT_SENT);
     assert!(alarm(&mut plant, 62).is_some());
@@ -123,7 +123,7 @@ fn a_person_who_writes_something_else_ends_it() {
     let (left, details, mut plant) = by_hand(30.0);
     assert!(left[0].ends_with("safe state NOT complete, left as it is by an operator"), "{left:?}");
     assert_eq!((details, back(&mut plant, 4_000).bus.len()), (None, 0));
-    let (same, details, mut plant) = by_hand(0.04);
+    let (same, details, mut plant) = by_hand(0.0);
     assert!(same.is_empty(), "{same:?}");
     assert!(details.is_some(), "it is not known yet to be reached");
     read(&mut plant, 4_000, &[(SV, 0.0), (DP, 1.0), (PV, 400.0), (FAULT, 0.0)]);
@@ -209,4 +209,15 @@ fn a_plant_file_that_is_reloaded_keeps_it() {
     plant.redefine(&Arc::new(def), 2, at(60));
     assert!(alarm(&mut plant, 61).is_some());
     assert_eq!(written(&back(&mut plant, 62)), [(SV, 0.0)]);
+}
+
+#[test]
+fn what_the_device_would_round_is_no_step_but_is_safe() {
+    let mut def = def();
+    def.procedures[0].steps[0] = ProcedureStep::Write { tag: SV, value: 50.04 };
+    def.procedures[0].safe = vec![(SV, 10.04)];
+    let mut plant = plant_of(def);
+    let started = start(&mut plant);
+    assert_eq!(actions(&started)[1], "anna write TIC-1.SV refused: the device would store 50.0 °C");
+    assert_eq!(written(&started), [(SV, 100.0)], "the safe state at once");
 }

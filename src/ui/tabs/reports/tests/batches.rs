@@ -62,6 +62,44 @@ fn without_marks_the_selected_batch_and_those_before_it() {
 }
 
 #[test]
+fn the_overlay_of_a_running_batch_ends_with_it() {
+    let fixture = with_rule();
+    let mut stand = Stand::of(&fixture, Theme::FULL, 80, 24);
+    stand.press("b");
+    stand.answer(true);
+    stand.press("o");
+    stand.answer(true);
+    let snapshot = fixture.snapshot();
+    let later = |stand: &mut Stand, minutes: i64| {
+        let at = snapshot.at + SignedDuration::from_mins(minutes);
+        stand.send(Msg::Snapshot(Arc::new(Snapshot { at, ..(*snapshot).clone() })));
+    };
+    later(&mut stand, 15);
+    let end = snapshot.at + SignedDuration::from_mins(10);
+    for (id, query) in std::mem::take(&mut stand.asked) {
+        let answer = match query {
+            Query::Batches { .. } => {
+                let mut batches = batches();
+                batches[0].batch.to = Some(end);
+                Answer::Batches(batches)
+            }
+            Query::Series { tags, from, to, buckets } => curve(tags[0], (from, to), buckets),
+            other => panic!("{other:?}"),
+        };
+        stand.send(Msg::Answer(id, Ok(answer)));
+    }
+    let begin = batches()[0].batch.from;
+    assert_eq!(curves(&stand).iter().map(|(_, from, to)| (*from, *to)).collect::<Vec<_>>(), [(begin, end)]);
+    stand.answer(true);
+    let lasted = format!("{:.1}", end.duration_since(begin).as_secs_f64() / 60.0);
+    let shown = stand.screen();
+    let row = shown.lines().find(|line| line.contains("hot-water-19")).unwrap_or_default();
+    assert!(row.contains(&lasted), "it lasted {lasted} min: {row}");
+    later(&mut stand, 60);
+    assert_eq!(stand.asked, Vec::new(), "all have ended: nothing is asked any more");
+}
+
+#[test]
 fn the_curves_of_a_running_batch_reach_the_present() {
     let fixture = with_rule();
     let mut stand = Stand::of(&fixture, Theme::FULL, 80, 24);
