@@ -286,12 +286,12 @@ impl Table {
     /// Its first `n` columns, and the first of all beside the others.
     pub fn split(&self, n: usize) -> [Table; 2] {
         let repeated = usize::from(1 < n);
-        let of = |columns: &[Range<usize>]| {
+        let of = |columns: [Range<usize>; 2]| {
             let row = |row: &Vec<Cell>| columns.iter().flat_map(|range| row[range.clone()].to_vec()).collect();
             let headings = columns.iter().flat_map(|range| self.columns[range.clone()].to_vec());
             Table { columns: headings.collect(), rows: self.rows.iter().map(row).collect() }
         };
-        [of(&[0..n]), of(&[0..repeated, n..self.columns.len()])]
+        [of([0..0, 0..n]), of([0..repeated, n..self.columns.len()])]
     }
 
     /// Without the columns that are empty in every row, and with labels beside their names, as a page has little room.

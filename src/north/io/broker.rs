@@ -270,7 +270,7 @@ mod tests {
 
     #[test]
     fn certificates_that_are_none_are_named_with_their_file() {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("ca.pem");
         let begin = "-----BEGIN CERTIFICATE-----\nAAAA\n";
         for (content, expect) in [
@@ -279,7 +279,7 @@ mod tests {
             (begin, "expected PEM, found number 1 damaged"),
             (&format!("{begin}-----END CERTIFICATE-----\n"), "expected PEM, found number 1 damaged"),
         ] {
-            std::fs::write(&path, content).unwrap();
+            std::fs::write(&path, content).expect("written");
             let refused = tls(&TlsRoots::File(path.clone())).err();
             assert_eq!(refused, Some(format!("the certificates in {}: {expect}", path.display())), "{content}");
         }

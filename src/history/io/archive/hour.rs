@@ -126,7 +126,9 @@ impl Store {
             let others = self.sorted((tier, rests), &others)?;
             written.extend(self.write_file((tier, rests), file.from..file.to, &others, "")?);
         }
-        for hour in (formed.start..formed.end).step_by(HOUR as usize).map(|hour| hour..hour + HOUR) {
+        let hours =
+            std::iter::successors(Some(formed.start), |hour| Some(hour + HOUR).filter(|next| *next < formed.end));
+        for hour in hours.map(|hour| hour..hour + HOUR) {
             if overlapping(replaced, &hour).is_empty() {
                 let rests = self.any_rests(tier, &hour)?;
                 let rows = sql::formed(tier, &hour, rests);
