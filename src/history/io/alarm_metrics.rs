@@ -84,20 +84,27 @@ impl Store {
     pub(super) fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
         let standing =
             self.whole_list(&sql::standing_at(&Epochs::All.before()), params![utc(at), ROWS_MAX + 1], alarm)?;
-        self.without_lost(standing, at)
+        self.without_lost(standing, &Epochs::All, at)
     }
 
     /// Without the alarms of which nothing is heard any more because a plant file took them away: earlier versions stored no
     /// end of them.
-    fn without_lost(&self, mut raised: Vec<AlarmRecord>, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
+    fn without_lost(
+        &self,
+        mut raised: Vec<AlarmRecord>,
+        epochs: &Epochs,
+        at: Timestamp,
+    ) -> Result<Vec<AlarmRecord>, HistoryError> {
         let known: HashSet<(&str, &str)> = self.def.alarms.iter().map(|alarm| name_of(&self.def, alarm)).collect();
         let is_known = |event: &AlarmRecord| known.contains(&(&*event.subject, &*event.message));
         if raised.iter().all(is_known) {
             return Ok(raised);
         }
         let named = |row: &duckdb::Row| Ok((shared(row, 0)?, shared(row, 1)?));
-        let later: HashSet<(Arc<str>, Arc<str>)> =
-            self.whole_list(sql::NAMED_SINCE, params![utc(at), ROWS_MAX + 1], named)?.into_iter().collect();
+        let later: HashSet<(Arc<str>, Arc<str>)> = self
+            .whole_list(&sql::named_since(&epochs.before()), params![utc(at), ROWS_MAX + 1], named)?
+            .into_iter()
+            .collect();
         raised.retain(|event| is_known(event) || later.contains(&(event.subject.clone(), event.message.clone())));
         Ok(raised)
     }
@@ -115,7 +122,7 @@ impl Store {
             let from = began.and_then(instant).map_or(begin, |began| began.max(begin));
             let until = ended.and_then(instant).map_or(end, |ended| ended.min(end));
             let before = |sql: &str| self.whole_list(sql, params![utc(from), ROWS_MAX + 1], alarm);
-            let mut active = self.without_lost(before(&sql::active_at(&epochs.before()))?, from)?;
+            let mut active = self.without_lost(before(&sql::active_at(&epochs.before()))?, &epochs, from)?;
             let mut suppressing = before(&sql::suppressing_at(&epochs.before()))?;
             // By another setting of the clock.
             active.iter_mut().chain(&mut suppressing).for_each(|event| event.at = event.at.min(from));

@@ -182,7 +182,9 @@ pub fn suppressing_at(before: &str) -> String {
 }
 
 /// The alarms that have an event at an instant or later, by their names.
-pub const NAMED_SINCE: &str = "SELECT DISTINCT subject, message FROM alarm_journal WHERE utc >= ? LIMIT ?";
+pub fn named_since(before: &str) -> String {
+    format!("SELECT DISTINCT subject, message FROM alarm_journal WHERE NOT ({before}) LIMIT ?")
+}
 
 fn words(is: impl Fn(AlarmEvent) -> bool) -> String {
     let words = AlarmEvent::ALL.into_iter().filter(|event| is(*event)).map(|event| format!("'{}'", event.word()));
