@@ -170,7 +170,7 @@ pub fn recorded_action(action: &str) -> &str {
 }
 
 /// Between the parts of what is on record.
-const MARKS: [&str; 3] = ["; ", ": ", ", "];
+const MARKS: [&str; 3] = [": ", "; ", ", "];
 
 /// What is on record, an outcome or a reason, in the language of this thread; as it is where it is nothing known.
 /// Of an outcome each part is read by itself: `failed: not true within the time limit, step 3 of 9; safe state written`.
