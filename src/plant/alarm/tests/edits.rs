@@ -181,7 +181,7 @@ impl Station {
         let value = f64::from(self.value) / 2.5;
         let found = self.manager.evaluate(at(self.now), |alarm| match alarm.subject {
             Subject::Tag(RUN) => Facts { value: Some(f64::from(self.value % 2).into()), ..Facts::default() },
-            _ => Facts { value: Some(value.into()), ill: Some(self.value % 3 == 0), ..Facts::default() },
+            _ => Facts { value: Some(value.into()), ill: Some(self.value.is_multiple_of(3)), ..Facts::default() },
         });
         self.record(found);
     }
