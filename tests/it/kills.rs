@@ -353,11 +353,11 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
         let all = entries(&place.audit_log());
         assert_eq!(all.len() as u64, whole.entries, "round {round}");
         let lived = &all[before..];
-        let writes = reported.writes.iter().map(|note| ("write", note));
-        for (action, note) in writes.chain(reported.acknowledged.iter().map(|note| ("acknowledge", note))) {
+        let writes = reported.writes.iter().map(|note| ["write", note, "verified"]);
+        for [action, note, outcome] in writes.chain(reported.acknowledged.iter().map(|n| ["acknowledge", n, "done"])) {
             let line = lived.iter().find(|line| &*line.action == action && line.note.as_deref() == Some(note));
             assert!(
-                line.is_some_and(|line| &*line.outcome == "verified"),
+                line.is_some_and(|line| &*line.outcome == outcome),
                 "round {round}: `{note}` is not in the audit log: {line:?}"
             );
         }

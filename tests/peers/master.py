@@ -126,7 +126,7 @@ def ask_what_every_master_can(master):
     print("interlocks", master.holding(DL06, 0o2003, 1))
     master.write_one(DL06, 0o2004, 0x0065)
     print("fill", [f"{word:x}" for word in master.holding(DL06, 0o2004, 1)])
-    print("no such V memory", master.holding(DL06, 0o7655, 1))
+    print("no such V memory", master.holding(DL06, 0o7660, 1))
     print("inputs, outputs, relays as words", [len(master.holding(DL06, first, 2)) for first in (0o40400, 0o40500, 0o40600)])
     print("a relay in its word", master.holding(DL06, 0o40602, 1)[0] & 0b11111)
 

@@ -1,6 +1,7 @@
 //! The queries in SQL. Times are UTC; local time is Rust's business.
 
 mod migrations;
+mod standing;
 
 use std::ops::Range;
 
@@ -10,11 +11,12 @@ use crate::{
         command::{CommandKind, Outcome},
         def::{ParquetVersion, ProcedureId},
         procedure,
-        record::{AlarmEvent, NOT_PROCESS_ACTIONS},
+        record::NOT_PROCESS_ACTIONS,
     },
 };
 
 pub use migrations::MIGRATIONS;
+pub use standing::{active_at, named_since, standing_at, suppressing_at};
 
 /// The epoch of samples that no station recorded.
 pub const IMPORTED: u16 = u16::MAX;
@@ -139,56 +141,6 @@ pub const OLDEST: &str = "ORDER BY coalesce(epoch, 0), utc, rowid LIMIT ?";
 /// Alarm events in a span, of the epochs of a condition.
 pub fn journal(epochs: &str, order: &str) -> String {
     format!("SELECT {} FROM alarm_journal WHERE utc >= ? AND utc < ?{epochs} {order}", EVENT_COLUMNS.join(", "))
-}
-
-/// The raising events of the alarms that were active at an instant, also of those that were suppressed.
-pub fn active_at(before: &str) -> String {
-    raised_at(before, |_| false, |event| event.active() == Some(true))
-}
-
-/// The raising events of the alarms that were active at an instant and have not been suppressed since.
-pub fn standing_at(before: &str) -> String {
-    let annunciated = |event| matches!(event, AlarmEvent::Raised | AlarmEvent::CarriedOver);
-    raised_at(before, |event| event.ended_by().is_some(), annunciated)
-}
-
-/// The alarms whose latest event before an instant is one of these. Events that raise or end an alarm count, and `others`.
-fn raised_at(before: &str, others: impl Fn(AlarmEvent) -> bool, is: impl Fn(AlarmEvent) -> bool) -> String {
-    let columns = EVENT_COLUMNS.join(", ");
-    let (counts, is) = (words(|event| event.active().is_some() || others(event)), words(is));
-    format!(
-        "SELECT {columns} FROM (
-            SELECT *, rowid AS place FROM alarm_journal WHERE {before} AND event IN ({counts})
-            QUALIFY row_number() OVER (PARTITION BY subject, message ORDER BY epoch DESC, utc DESC, rowid DESC) = 1)
-         WHERE event IN ({is}) ORDER BY utc, place LIMIT ?"
-    )
-}
-
-/// The events that suppressed an alarm at an instant, each for itself.
-pub fn suppressing_at(before: &str) -> String {
-    let columns = EVENT_COLUMNS.join(", ");
-    let pair = |event: AlarmEvent| Some(format!("('{}', '{}')", event.word(), event.ended_by()?.word()));
-    let pairs: Vec<String> = AlarmEvent::ALL.into_iter().filter_map(pair).collect();
-    let (pairs, removed) = (pairs.join(", "), AlarmEvent::Removed.word());
-    format!(
-        "SELECT {columns} FROM (
-            SELECT alarm_journal.*, alarm_journal.rowid AS place, suppresses
-            FROM alarm_journal, (VALUES {pairs}) AS pair(suppresses, ends)
-            WHERE {before} AND event IN (suppresses, ends, '{removed}')
-            QUALIFY row_number()
-                OVER (PARTITION BY subject, message, suppresses ORDER BY epoch DESC, utc DESC, alarm_journal.rowid DESC) = 1)
-         WHERE event = suppresses ORDER BY utc, place LIMIT ?"
-    )
-}
-
-/// The alarms that have an event at an instant or later, by their names.
-pub fn named_since(before: &str) -> String {
-    format!("SELECT DISTINCT subject, message FROM alarm_journal WHERE NOT ({before}) LIMIT ?")
-}
-
-fn words(is: impl Fn(AlarmEvent) -> bool) -> String {
-    let words = AlarmEvent::ALL.into_iter().filter(|event| is(*event)).map(|event| format!("'{}'", event.word()));
-    words.collect::<Vec<_>>().join(", ")
 }
 
 /// Of each alarm the last event of every kind (and step) before an instant, as written: all that its state depends on.

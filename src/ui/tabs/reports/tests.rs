@@ -375,16 +375,6 @@ fn no_size_is_too_small_to_survive() {
 }
 
 #[test]
-fn why_goes_through_the_values_of_the_report() {
-    let mut stand = Stand::new(Theme::FULL, 80, 24);
-    stand.press("w");
-    assert!(stand.model.modal.is_none(), "there is no report yet");
-    stand.answer(true);
-    stand.press("w");
-    assert!(stand.screen().contains("why TIC-1.PV"), "{}", stand.screen());
-}
-
-#[test]
 fn a_clock_that_is_set_back_does_not_keep_a_report_waiting() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     let later = |by: i64, seconds: i64| {

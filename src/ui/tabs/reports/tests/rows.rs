@@ -1,4 +1,4 @@
-//! The rows of the record: pages, filter, jump and file.
+//! The rows of a report and of its record: pages, filter, jump and file.
 
 use super::*;
 use crate::report::RecordRow;
@@ -65,4 +65,14 @@ fn the_rows_are_written_as_they_are_recorded() {
     let text = String::from_utf8(bytes).expect("text");
     assert!(path.display().to_string().ends_with(".record.csv"), "{}", path.display());
     assert_eq!(text.lines().count(), 121, "{text}");
+}
+
+#[test]
+fn why_goes_through_the_values_of_the_report() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("w");
+    assert!(stand.model.modal.is_none(), "there is no report yet");
+    stand.answer(true);
+    stand.press("w");
+    assert!(stand.screen().contains("why TIC-1.PV"), "{}", stand.screen());
 }
