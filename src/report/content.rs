@@ -170,15 +170,15 @@ fn mean(tag: &TagFigures) -> Cell {
     Cell::number(tag.mean, tag.decimals.saturating_add(1))
 }
 
-/// What a tag is, beside its name.
+/// What a tag is: on pages beside its name, in files behind all other columns, so that who counts them counts as before.
 fn label(def: &PlantDef, tag: &str) -> Cell {
-    Cell::text(def.tag_named(tag).map_or("", |tag| &def.tag(tag).label))
+    let tag = def.tag_named(tag).map(|tag| def.tag(tag)).filter(|tag| tag.label != tag.short);
+    Cell::text(tag.map_or("", |tag| &tag.label))
 }
 
 fn values(tags: &[TagFigures], def: &PlantDef) -> Table {
     let columns = [
         Column::text("tag"),
-        Column::text("label"),
         Column::text("unit"),
         Column::number("first"),
         Column::number("min"),
@@ -188,12 +188,12 @@ fn values(tags: &[TagFigures], def: &PlantDef) -> Table {
         Column::number("difference"),
         Column::number("minutes in alarm"),
         Column::number("good %"),
+        Column::text("label"),
     ];
     Table::new(columns).with(tags.iter().map(|tag| {
         let value = |value: Option<Exact>| Cell::number(value, tag.decimals);
         vec![
             Cell::text(&tag.tag),
-            label(def, &tag.tag),
             Cell::text(&tag.unit),
             value(tag.first),
             value(tag.min),
@@ -203,24 +203,21 @@ fn values(tags: &[TagFigures], def: &PlantDef) -> Table {
             value(tag.difference),
             minutes(tag.in_alarm),
             Cell::number(Some(floor_percent(tag.good)), 1),
+            label(def, &tag.tag),
         ]
     }))
 }
 
 /// Means, and differences of counters, beside those of the periods compared with.
 fn comparison(report: &ShiftReport, def: &PlantDef) -> Table {
-    let mut table = Table::new([
-        Column::text("tag"),
-        Column::text("label"),
-        Column::text("unit"),
-        Column::text("figure"),
-        Column::number("this period"),
-    ]);
+    let mut table =
+        Table::new([Column::text("tag"), Column::text("unit"), Column::text("figure"), Column::number("this period")]);
     for Compared { period, .. } in &report.compared {
         let (id, heading) = (period.name.to_string(), plain(&self::name(period, &def.time_zone)));
         table.columns.push(Column { id: id.clone(), heading, kind: ColumnKind::Number });
         table.columns.push(Column { id: format!("change from {id}"), ..Column::number("change") });
     }
+    table.columns.push(Column::text("label"));
     if report.compared.is_empty() {
         return table;
     }
@@ -235,13 +232,14 @@ fn compared_row(tag: &TagFigures, compared: &[Compared], def: &PlantDef) -> Vec<
         |value: Option<Exact>| Cell::number(value, if counts { tag.decimals } else { tag.decimals.saturating_add(1) });
     let word = if counts { t!("difference") } else { t!("mean") };
     let [name, unit] = [&tag.tag, &tag.unit].map(Cell::text);
-    let mut row = vec![name, label(def, &tag.tag), unit, Cell::text(word), cell(figure(tag))];
+    let mut row = vec![name, unit, Cell::text(word), cell(figure(tag))];
     for Compared { tags, .. } in compared {
         // Where the device chose another unit then, nothing is compared.
         let before = tags.iter().find(|other| other.tag == tag.tag && other.unit == tag.unit).and_then(figure);
         let change = figure(tag).zip(before).map(|(now, before)| now - before);
         row.extend([cell(before), cell(change)]);
     }
+    row.push(label(def, &tag.tag));
     row
 }
 

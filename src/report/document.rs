@@ -296,13 +296,16 @@ impl Table {
 
     /// Without the columns that are empty in every row, and with labels beside their names, as a page has little room.
     pub fn dense(&self) -> Table {
-        let labels = self.columns.iter().position(|column| column.id == "label").filter(|n| 0 < *n);
+        let named = |id: &str| self.columns.iter().position(|column| column.id == id);
+        let labels = named("label").zip(named("tag").or_else(|| named("actuator")));
+        let is_label = |n: usize| labels.is_some_and(|(label, _)| label == n);
         let used: Vec<bool> = (0..self.columns.len())
-            .map(|n| labels != Some(n) && self.rows.iter().any(|row| row[n] != Cell::Empty))
+            .map(|n| !is_label(n) && self.rows.iter().any(|row| row[n] != Cell::Empty))
             .collect();
         let columns = self.columns.iter().zip(&used).filter(|(_, used)| **used).map(|(column, _)| column.clone());
-        let cell = |row: &[Cell], n: usize| match (labels == Some(n + 1), &row[n], row.get(n + 1)) {
-            (true, Cell::Text(name), Some(Cell::Text(label))) => Cell::Text(format!("{name} {label}")),
+        let cell = |row: &[Cell], n: usize| match (&row[n], labels.filter(|(_, name)| *name == n).map(|at| &row[at.0]))
+        {
+            (Cell::Text(name), Some(Cell::Text(label))) => Cell::Text(format!("{name} {label}")),
             _ => row[n].clone(),
         };
         let row = |row: &Vec<Cell>| (0..row.len()).filter(|n| used[*n]).map(|n| cell(row, n)).collect();

@@ -21,13 +21,13 @@ pub fn counters(rows: &[CounterRow], def: &PlantDef) -> Table {
     let columns = [
         Column::time("time"),
         Column::text("tag"),
-        Column::text("label"),
         Column::text("event"),
         Column::number("old"),
         Column::number("new"),
         Column::number("counted"),
         Column::text("unit"),
         Column::text("note"),
+        Column::text("label"),
     ];
     Table::new(columns).with(rows.iter().map(|CounterRow { tag, unit, decimals, step, note }| {
         let value = |value| Cell::number(Some(value), *decimals);
@@ -35,22 +35,22 @@ pub fn counters(rows: &[CounterRow], def: &PlantDef) -> Table {
         let [old, new] = [step.old, step.new].map(|shown| if is_read { value(shown) } else { Cell::Empty });
         let event = Cell::text(translate(step.event.word()));
         let (counted, [name, unit, note]) = (value(step.counted), [tag, unit, note].map(Cell::text));
-        vec![Cell::Time(step.at), name, label(def, tag), event, old, new, counted, unit, note]
+        vec![Cell::Time(step.at), name, event, old, new, counted, unit, note, label(def, tag)]
     }))
 }
 
 pub fn runs(runs: &[RunFigures], def: &PlantDef) -> Table {
     let columns = [
         Column::text("actuator"),
-        Column::text("label"),
         Column::number("hours on"),
         Column::number("starts"),
         Column::number("good %"),
+        Column::text("label"),
     ];
     Table::new(columns).with(runs.iter().map(|run| {
         let hours = run.on.map(|on| on.as_secs_f64() / 3_600.0);
         let good = Cell::number(Some(floor_percent(run.good)), 1);
-        vec![Cell::text(&run.tag), label(def, &run.tag), Cell::number(hours, 2), Cell::number(run.starts, 0), good]
+        vec![Cell::text(&run.tag), Cell::number(hours, 2), Cell::number(run.starts, 0), good, label(def, &run.tag)]
     }))
 }
 

@@ -37,26 +37,26 @@ for tag in ("TIC-1.PV", "PLC-1.HEATER.KWH"):
 # CSV: strict, equally wide, the columns in their order; the header may be in any language.
 table = list(csv.reader(open(the(".csv"), newline="", encoding="utf-8"), strict=True))
 assert len({len(row) for row in table}) == 1, "rows of different lengths"
-lines = {row[0]: row for row in table if row[0] in figures and row[2] in ("°C", "kWh")}
+lines = {row[0]: row for row in table if row[0] in figures and row[1] in ("°C", "kWh")}
 assert set(lines) == set(figures), lines.keys()
 for tag, (first, low, mean, high, last, counted, good) in figures.items():
     row = lines[tag]
     counter = tag.endswith("KWH")
     expected = [first, low, None if counter else mean, high, last, counted if counter else None]
-    for found, wanted in zip(row[3:9], expected):
+    for found, wanted in zip(row[2:8], expected):
         if wanted is None:
             assert found == "", (tag, row)
         else:
             step = 10.0 ** -len(found.partition(".")[2])
             assert abs(float(found) - wanted) <= step * 0.51 + 1e-9, (tag, found, wanted)
-    assert abs(float(row[10]) - good) <= 0.11, (row, good)
+    assert abs(float(row[9]) - good) <= 0.11, (row, good)
 assert not any(cell[:1] in "=+@" and cell for row in table for cell in row), "a cell that runs"
 
 # JSON has the same figures.
 values = {row["tag"]: row for row in json.load(open(the(".json")))["values"]}
 names = ["first", "min", "mean", "max", "last", "difference", "minutes in alarm", "good %"]
 for tag, row in lines.items():
-    for name, cell in zip(names, row[3:11]):
+    for name, cell in zip(names, row[2:10]):
         found = values[tag][name]
         assert (found is None) if cell == "" else abs(found - float(cell)) < 1e-9, (tag, name, found, cell)
 
@@ -64,7 +64,7 @@ for tag, row in lines.items():
 file = pyarrow.parquet.ParquetFile(the(".parquet"))
 values = {row["tag"]: row for row in file.read().to_pylist()}
 for tag, row in lines.items():
-    for name, cell in zip(names, row[3:11]):
+    for name, cell in zip(names, row[2:10]):
         found = values[tag][name]
         assert (found is None) if cell == "" else abs(found - float(cell)) < 1e-9, (tag, name, found, cell)
 keys = file.metadata.metadata
@@ -74,9 +74,9 @@ assert (end - begin).total_seconds() == seconds and keys[b"program"].startswith(
 # XLSX: numbers are numbers, dates are dates, nothing is a formula; what a cell shows is what the CSV has.
 book = openpyxl.load_workbook(the(".xlsx"))
 assert not any(cell.data_type == "f" for sheet in book for row in sheet.iter_rows() for cell in row), "a formula"
-found = {row[0].value: row for sheet in book for row in sheet.iter_rows() if row[0].value in figures and row[2].value in ("°C", "kWh")}
+found = {row[0].value: row for sheet in book for row in sheet.iter_rows() if row[0].value in figures and row[1].value in ("°C", "kWh")}
 for tag, row in lines.items():
-    for cell, text in zip(found[tag][3:11], row[3:11]):
+    for cell, text in zip(found[tag][2:10], row[2:10]):
         assert (cell.value is None) if text == "" else abs(cell.value - float(text)) < 1e-9, (tag, cell.value, text)
         if text:
             decimals = len(text.partition(".")[2])
@@ -88,7 +88,7 @@ assert {"=1+2", "@anna", "+temperature high"} <= texts
 assert sum(len(sheet._charts) for sheet in book) >= 1
 
 
-# HTML and DOCX: every cell of the row of a tag, whose label stands beside its name.
+# HTML and DOCX: every cell of the row of a tag.
 class Rows(html.parser.HTMLParser):
     def __init__(self):
         super().__init__()
@@ -117,11 +117,14 @@ word = [[cell.text for cell in row.cells] for table in docx.Document(the(".docx"
 text = [line.split() for line in open(the(".txt"), encoding="utf-8")]
 printed = subprocess.run(["pdftotext", "-layout", the(".pdf"), "-"], capture_output=True, text=True, check=True).stdout
 pages = [line.split() for line in printed.splitlines()]
+# The label of a tag stands beside its name.
+for rows in (page.rows, word):
+    for tag, row in lines.items():
+        assert any(other and other[0] == f"{tag} {row[10]}" for other in rows), (tag, row)
 for rows in (page.rows, word, text, pages):
     for tag, row in lines.items():
-        unit = row[2]
+        unit = row[1]
         [of_tag] = [other for other in rows if other and other[0].split()[:1] == [tag] and unit in other and len(other) > 6]
-        assert " ".join(of_tag[: of_tag.index(unit)]).startswith(f"{tag} {row[1].split()[0]}"), (of_tag, row)
         shown = [cell for cell in of_tag[of_tag.index(unit) + 1 :] if cell not in ("", "–")]
-        assert shown == [cell for cell in row[3:11] if cell], (tag, of_tag, row)
+        assert shown == [cell for cell in row[2:10] if cell], (tag, of_tag, row)
 print("figures agree:", sum(len(row) for row in lines.values()), "cells in eight formats")
