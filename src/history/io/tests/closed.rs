@@ -113,7 +113,7 @@ fn a_value_that_reaches_into_an_hour_without_samples_stays() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 4, ..ProptestConfig::default() })]
     #[test]
     fn a_period_has_the_same_figures_whatever_the_archive_did(
         happenings in proptest::collection::vec(happening(), 3..14),
@@ -122,11 +122,11 @@ proptest! {
         let (store, plain) = (lived(&db, &happenings, true), lived(&plain, &happenings, false));
         store.append(&[good(PV, HOURS * HOUR_S, 1.0)]).unwrap();
         plain.append(&[good(PV, HOURS * HOUR_S, 1.0)]).unwrap();
-        for (until, what) in [(0, "as it was"), (HOURS, "hours"), (HOURS + 2, "a day"), (LATER, "a month")] {
+        for (round, until, what) in [(0, 0, "as it was"), (1, HOURS + 2, "a day"), (2, LATER, "a month")] {
             archive_all(&store, until);
             assert_same(&store, &plain, HOURS, what);
-            // Every hour by itself, as it is closed.
-            for hour in 0..HOURS {
+            // Every third hour by itself, as it is closed.
+            for hour in (round..HOURS).step_by(3) {
                 let [got, expect] = [&store, &plain].map(|store| report(store, hour * HOUR_S, (hour + 1) * HOUR_S).tags);
                 let figures = |tags: &[crate::report::TagFigures]| {
                     tags.iter().map(|tag| (tag.min, tag.max, tag.last, (tag.good * 1e9).round())).collect::<Vec<_>>()

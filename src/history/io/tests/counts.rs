@@ -264,7 +264,7 @@ fn a_correction_counts_in_the_period_in_which_it_is_entered() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 3, ..ProptestConfig::default() })]
     #[test]
     fn any_history_of_a_counter_adds_up(fates in proptest::collection::vec(prop_oneof![
         60 => Just(Fate::Read),
