@@ -112,6 +112,7 @@ fn action_words() -> &'static [&'static str] {
         "start procedure",
         "abort procedure",
         "end procedure",
+        "write safe state",
         "counter",
         "correct counter",
         "hand over",

@@ -1,9 +1,12 @@
 //! A safe state that was not reached: it is written once the device is back, and the alarm says what is missing until then.
 
 use super::*;
-use crate::plant::{
-    reducer::tests::recorded,
-    tag::{Bound, Decimals},
+use crate::{
+    plant::{
+        reducer::tests::recorded,
+        tag::{Bound, Decimals},
+    },
+    text::{Language, recorded_action},
 };
 
 const NOT_SENT: fn(Exact) -> WriteResult = |_| WriteResult::NotSent(Fault::NotConnected);
@@ -171,6 +174,8 @@ fn a_station_killed_while_it_is_written_leaves_it_to_the_next() {
         assert!(written(&last_words).contains(&(SV, 0.0)), "{why}");
         let latest = recorded(&last_words).find(|action| &*action.action == procedure::WRITE_SAFE_STATE).expect(why);
         assert!(latest.outcome.starts_with(why), "{latest:?}");
+        let thai = Language::THAI.locale().within(|| recorded_action(&latest.action).to_owned());
+        assert_ne!(thai, *latest.action, "a report says it in its own language");
         let mut next = plant_of(with_alarm());
         let records = next.restore_procedures(Some(latest));
         let recorded = actions(&Effects { records, ..Effects::default() });
