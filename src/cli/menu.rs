@@ -66,7 +66,7 @@ pub fn without_station() -> Result<Option<Vec<String>>, CliError> {
     choices.extend(plants(Path::new(".")));
     choices.extend(devices());
     choices.extend(networks());
-    choices.push(Choice::new("a new plant file, from queries and what answers", &["new"]));
+    choices.push(Choice::new("a new plant file, from your answers and the devices found", &["new"]));
     say("no station runs here");
     ask("what shall be shown? a number, HOST[:TCPPORT] or /dev/…", &choices).map(Some)
 }

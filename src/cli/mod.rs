@@ -98,7 +98,7 @@ enum Command {
     Demo(demo::Args),
     /// Show the registers of any device, live: a port, or HOST[:TCPPORT]; or a log of them: FILE.csv
     Open(open::Args),
-    /// Write a plant file by answering queries: lines, units, recognised devices, tags, alarms, shifts
+    /// Write a plant file by answering questions: lines, units, recognised devices, tags, alarms, shifts
     New(new::Args),
     /// Run the station without a terminal: poll, evaluate alarms, record the history
     Run(run::Args),

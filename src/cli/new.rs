@@ -1,4 +1,4 @@
-//! `sightglass new`: a plant file from queries and from what is found on the lines, checked by loading it.
+//! `sightglass new`: a plant file from answers and from what is found on the lines, checked by loading it.
 
 use std::{
     collections::BTreeMap,
@@ -63,7 +63,7 @@ struct FoundUnit {
 /// Asks, looks, and writes the plant file.
 pub fn main(args: &Args) -> Result<(), CliError> {
     if !menu::is_asked() {
-        let words = "`sightglass new` asks queries: run it in a terminal; `sightglass profiles tank` prints a plant file \
+        let words = "`sightglass new` asks questions: run it in a terminal; `sightglass profiles tank` prints a plant file \
                      to start from";
         return Err(CliError::Usage(words.to_owned()));
     }
@@ -86,7 +86,7 @@ fn free(text: &str) -> Result<PathBuf, String> {
 }
 
 async fn wizard(path: PathBuf) -> Result<(), CliError> {
-    say("Enter takes what stands in [ ]. Nothing is written before the last query; Ctrl-C leaves.");
+    say("Enter takes what stands in [ ]. Nothing is written before the last question; Ctrl-C leaves.");
     let profiles = open::own_profiles(path.parent().unwrap_or(Path::new("")));
     let known = profiles.recognisable();
     let title = ask("title", "Plant").await?;

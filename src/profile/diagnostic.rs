@@ -30,7 +30,7 @@ pub struct Errors {
     severity: Severity,
 }
 
-/// Draws the errors with file, line, column, the text in query and a caret.
+/// Draws the errors with file, line, column, the text in question and a caret.
 /// `color` is for a terminal; without it the text is fit for a log or a pipe.
 pub fn render(errors: &Errors, color: bool) -> String {
     let theme = if color { GraphicalTheme::unicode() } else { GraphicalTheme::unicode_nocolor() };

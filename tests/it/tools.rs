@@ -178,7 +178,7 @@ fn a_network_is_scanned_only_after_a_yes() {
 #[test]
 fn a_new_plant_is_not_asked_for_without_a_terminal() {
     let (code, said) = run(&["new"]);
-    assert!(code == Some(2) && said.contains("asks queries: run it in a terminal"), "{code:?} {said}");
+    assert!(code == Some(2) && said.contains("asks questions: run it in a terminal"), "{code:?} {said}");
 }
 
 #[test]

@@ -18,7 +18,7 @@ use crate::{
 /// Asks, connects to every host, shows who answers, and offers to open one.
 pub fn main(network: Network, line: &LineDef, yes: bool) -> Result<(), CliError> {
     if !yes && !menu::is_asked() {
-        let words = "a scan of a network connects to every host of it: --yes does so without a query";
+        let words = "a scan of a network connects to every host of it: --yes does so without asking";
         return Err(CliError::Usage(words.to_owned()));
     }
     let opened = in_runtime(async {

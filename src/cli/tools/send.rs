@@ -34,7 +34,7 @@ pub struct Args {
     /// Send it although something is wrong with it, or every unit would obey it
     #[arg(long)]
     force: bool,
-    /// Send without a query what may change something
+    /// Send without asking, even if it may change something
     #[arg(long)]
     yes: bool,
 }

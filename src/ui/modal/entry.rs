@@ -82,7 +82,7 @@ impl Entry {
         } else if let Some(c) = strange(event) {
             self.reject(c);
         } else if self.line.on_key(event) {
-            // What was left out is notes until the line is empty again.
+            // What was left out stays noted until the line is empty again.
             self.problem.take_if(|_| !self.line.missed());
         }
         Next::Stay(Modal::Entry(self))

@@ -64,7 +64,7 @@ impl Line {
             }
             KeyCode::Char('a') if ctrl => self.cursor = 0,
             KeyCode::Char('e') if ctrl => self.cursor = self.text.len(),
-            // Over a slow line a lone Esc and a digit arrive as Alt with that digit: it is not taken, and that is notes.
+            // Over a slow line a lone Esc and a digit arrive as Alt with that digit: it is not taken, and that is noted.
             KeyCode::Char(_) if event.modifiers.contains(KeyModifiers::ALT) => self.missed = true,
             KeyCode::Char(c) if !ctrl => self.insert(c),
             KeyCode::Backspace if self.cursor > 0 => {

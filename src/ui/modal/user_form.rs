@@ -60,7 +60,7 @@ pub struct UserForm {
     waiting: bool,
     /// The number of that request; 0 before it has one.
     number: u32,
-    /// Why the last Enter led to nothing, and at which tick that was notes.
+    /// Why the last Enter led to nothing, and at which tick that was said.
     problem: Option<(String, u32)>,
     /// The window that waits below, with all that was typed in it.
     below: Option<Box<Modal>>,

@@ -20,7 +20,7 @@ impl UserForm {
         }
     }
 
-    /// The keys of the moment; Esc is notes by whoever shows the form.
+    /// The keys of the moment; Esc is added by whoever shows the form.
     pub fn hints(&self) -> Vec<Hint> {
         let mut hints = vec![Hint::in_window("⏎", self.verb())];
         if self.form.rows() > 1 {
