@@ -14,6 +14,10 @@ pub struct Facts {
     pub unacknowledged: Vec<String>,
     /// How many samples were stored before an instant.
     pub stored: Vec<(Timestamp, usize)>,
+    /// Procedures that were started on record, and have not ended; of the last life only.
+    pub procedures: Vec<String>,
+    /// Users who were added on record, with their passwords.
+    pub users: BTreeMap<String, String>,
     /// The figures of an hour, as they were first shown.
     pub figures: BTreeMap<Timestamp, String>,
 }
@@ -35,11 +39,22 @@ impl Facts {
             let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
             let two = || rest.split_once(' ').unwrap();
             match word {
-                "life" => facts.unacknowledged.clear(),
+                "life" => {
+                    facts.unacknowledged.clear();
+                    facts.procedures.clear();
+                }
                 "recorded" => facts.acknowledged.push(rest.to_owned()),
                 "unacknowledged" => {
                     facts.unacknowledged = rest.split(',').filter(|name| !name.is_empty()).map(str::to_owned).collect()
                 }
+                "procedure" => match rest.split_once("at work ") {
+                    Some((_, name)) => facts.procedures.push(name.to_owned()),
+                    None => facts.procedures.clear(),
+                },
+                "user" => match two() {
+                    (user, "?") => drop(facts.users.remove(user)),
+                    (user, password) => drop(facts.users.insert(user.to_owned(), password.to_owned())),
+                },
                 "stored" => facts.stored.push((two().0.parse().unwrap(), two().1.parse().unwrap())),
                 "figures" => drop(facts.figures.entry(two().0.parse().unwrap()).or_insert(two().1.to_owned())),
                 _ => {}

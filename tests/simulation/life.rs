@@ -22,9 +22,10 @@ use sightglass::{
     },
     plant::{
         PlantDef, Snapshot,
-        alarm::{AlarmCommand, AlarmState},
-        command::{Command, CommandId, CommandKind},
-        def::{AlarmId, TagId},
+        alarm::AlarmState,
+        command::{CommandId, CommandKind},
+        def::{AlarmId, ProcedureId, TagId},
+        procedure::ProcedureState,
         sample::{Quality, Sample},
         station::StationFault,
         tag::Poll,
@@ -32,7 +33,7 @@ use sightglass::{
     profile::{self, Search},
     report::{self, FORMATS, Period, Style},
     sim::{io::SimulatorHandle, simulator::Simulator},
-    station::{self, Request, Session, io::Station},
+    station::{self, Session, io::Station},
 };
 use tokio::sync::oneshot;
 
@@ -40,6 +41,7 @@ use crate::{
     dice::Dice,
     facts::{Facts, say, wrong},
     lines::connectors,
+    operator::{Operator, Supervisor},
 };
 
 /// So long after the start the alarms are restored, and the history completed from the log.
@@ -106,7 +108,11 @@ impl Life {
             Err(why) => return wrong(format!("starts: {why}")),
         };
         let session = station.session("anna");
-        let operator = tokio::spawn(operate(session.clone(), def.clone(), self.name.clone(), self.dice, self.is_last));
+        let operator = Operator::new(&session, &def, &self.name, self.dice, self.is_last);
+        let operator = tokio::spawn(operator.operate(SETTLED));
+        let backups = self.folder.join("backups").join(&self.name);
+        let supervisor = Supervisor::new(station.session("boss"), station.session("terminal"), self.dice, backups);
+        let supervisor = tokio::spawn(supervisor.administer(self.facts.users.clone(), SETTLED));
         let lasts = SETTLED + Duration::from_millis(self.dice.below(if self.is_last { 20_000 } else { 60_000 }));
         let mut watch = Watch::new(&def, session.clone(), simulator.clone(), clock);
         watch.until(SETTLED).await;
@@ -119,6 +125,7 @@ impl Life {
         self.count(&session, clock).await;
         watch.until(lasts + Duration::from_secs(5)).await;
         operator.abort();
+        supervisor.abort();
         say("compared", watch.compared);
         if !self.is_last && self.dice.chance(0.6) {
             // As a kill between two operations on the disk.
@@ -140,6 +147,12 @@ impl Life {
         }
         if self.clock_is_set || snapshot.history.damaged.is_some() {
             return;
+        }
+        for name in &self.facts.procedures {
+            let run = def.procedures.iter().zip(&snapshot.procedures).find(|(def, _)| *def.name == **name);
+            if run.is_none_or(|(_, run)| run.as_deref().is_none_or(|run| run.state == ProcedureState::Running)) {
+                wrong(format!("procedures: {name} was at work when the station ended, which is forgotten"));
+            }
         }
         let hour = base.as_second() / 3600 * 3600;
         for from in [hour - 3600, hour - 7200] {
@@ -240,7 +253,7 @@ fn notes(all: impl Iterator<Item = String>) -> BTreeMap<String, u32> {
     counted
 }
 
-async fn ask(session: &Session, query: Query) -> Option<Answer> {
+pub async fn ask(session: &Session, query: Query) -> Option<Answer> {
     let (reply, answer) = oneshot::channel();
     session.ask(QueryRequest { query, reply }).ok()?;
     answer.await.ok()?.ok()
@@ -264,6 +277,8 @@ struct Watch {
     truth: VecDeque<(Timestamp, BTreeMap<TagId, f64>)>,
     unacknowledged: Vec<String>,
     recorded: Vec<CommandId>,
+    /// The one at work.
+    procedure: Option<ProcedureId>,
     /// Good values that were compared with what was true.
     compared: u64,
 }
@@ -272,7 +287,7 @@ impl Watch {
     fn new(def: &Arc<PlantDef>, session: Session, simulator: SimulatorHandle, clock: Clock) -> Watch {
         let (def, began) = (def.clone(), clock.now());
         let (truth, unacknowledged, recorded) = (VecDeque::new(), Vec::new(), Vec::new());
-        Watch { def, session, simulator, clock, began, truth, unacknowledged, recorded, compared: 0 }
+        Watch { def, session, simulator, clock, began, truth, unacknowledged, recorded, procedure: None, compared: 0 }
     }
 
     async fn until(&mut self, passed: Duration) {
@@ -311,7 +326,16 @@ impl Watch {
                 if let Some(note) = &status.command.note {
                     say("recorded", note);
                 }
+                if let CommandKind::StartProcedure(id) = status.command.kind {
+                    say("procedure", format!("at work {}", self.def.procedures[id.index()].name));
+                    self.procedure = Some(id);
+                }
             }
+        }
+        if let Some(id) =
+            self.procedure.take_if(|id| snapshot.procedure_at_work().is_none_or(|(at_work, _)| at_work != *id))
+        {
+            say("procedure", format!("ended {}", self.def.procedures[id.index()].name));
         }
         let old = snapshot.at - SignedDuration::from_secs(5);
         let waits = |state| matches!(state, AlarmState::Unacknowledged | AlarmState::ReturnedToNormal);
@@ -333,61 +357,4 @@ impl Watch {
         let grain = 10f64.powi(-i32::from(decimals)) * 1.5;
         low <= high && !(low - grain..=high + grain).contains(&value)
     }
-}
-
-/// What an operator does until the station ends.
-async fn operate(session: Session, def: Arc<PlantDef>, name: String, mut dice: Dice, is_last: bool) {
-    let setpoint = def.tag_named("TIC-1.SV").unwrap();
-    tokio::time::sleep(SETTLED).await;
-    for number in 1.. {
-        tokio::time::sleep(Duration::from_millis(dice.below(if is_last { 4_000 } else { 6_000 }))).await;
-        let snapshot = session.snapshots.borrow().clone();
-        let some = |dice: &mut Dice| def.alarms[dice.place(def.alarms.len())].id;
-        let alarm = match dice.below(if is_last { 4 } else { 16 }) {
-            0..4 => {
-                let value = (40 + dice.below(40)) as f64;
-                send(&session, number, &name, CommandKind::Write { tag: setpoint, value: value.into() });
-                continue;
-            }
-            4..6 => AlarmCommand::AcknowledgeAll { alarms: None, seen: snapshot.annunciations },
-            6 => AlarmCommand::Silence,
-            7 => AlarmCommand::Shelve { alarms: [some(&mut dice)].into(), lasts: Duration::from_secs(600) },
-            8 => AlarmCommand::Unshelve(some(&mut dice)),
-            9 => {
-                send(&session, number, &name, CommandKind::HandOver);
-                continue;
-            }
-            10 => {
-                send(&session, number, &name, CommandKind::Refresh(def.devices[0].id));
-                continue;
-            }
-            11 => {
-                send(&session, number, &name, CommandKind::Connect(def.lines[0].id, dice.chance(0.7)));
-                continue;
-            }
-            12 => {
-                let to = snapshot.at;
-                let from = to - SignedDuration::from_secs(3600);
-                let tags = def.tags.iter().take(8).map(|tag| tag.id).collect();
-                let _ = ask(&session, Query::Series { tags, from, to, buckets: 100 }).await;
-                continue;
-            }
-            _ => continue,
-        };
-        if !matches!(alarm, AlarmCommand::Silence) {
-            // Whether it is done may not be known when the station ends.
-            say("unacknowledged", "");
-        }
-        send(&session, number, &name, CommandKind::Alarm(alarm));
-    }
-}
-
-fn send(session: &Session, number: u32, name: &str, kind: CommandKind) {
-    let id = CommandId { terminal: session.terminal, number };
-    let snapshot = session.snapshots.borrow().clone();
-    // A read is no action, and stands in no log.
-    let note = (!matches!(kind, CommandKind::Refresh(_))).then(|| format!("{name}n{number}").into());
-    let command = Command { note, ..Command::on(&snapshot, id, kind) };
-    // A station that is too busy refuses it.
-    let _ = session.send(Request::Command(command, None));
 }

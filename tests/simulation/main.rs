@@ -17,6 +17,7 @@ mod dice;
 mod facts;
 mod life;
 mod lines;
+mod operator;
 
 use std::{
     env,
