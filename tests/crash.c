@@ -5,7 +5,7 @@
  *   CRASH_SHADOW  copies and the log of operations  CRASH_FULL  "FROM-TO": writes fail with ENOSPC from one operation to another
  *   CRASH_TORN    1: power is lost, so the last write may reach the disk in part; a kill lets it end
  *
- * The log has a line per operation that matters to what a loss of power may forget:
+ * The log has a line per operation that matters to what a loss of power may forget, its words apart by a tab:
  *   sync PATH COPY, folder PATH, create PATH, rename FROM TO COPY-OF-OLD, remove PATH COPY
  */
 #define _GNU_SOURCE
@@ -135,8 +135,8 @@ PWRITE(pwrite64)
         struct stat stat;                                                                                                  \
         int done = next(fd);                                                                                               \
         if (done == 0 && fstat(fd, &stat) == 0) {                                                                          \
-            if (S_ISDIR(stat.st_mode)) note("folder %s\n", path);                                                          \
-            else { copy(path, kept); note("sync %s %s\n", path, kept); }                                                   \
+            if (S_ISDIR(stat.st_mode)) note("folder\t%s\n", path);                                                          \
+            else { copy(path, kept); note("sync\t%s\t%s\n", path, kept); }                                                   \
         }                                                                                                                  \
         pthread_mutex_unlock(&lock);                                                                                       \
         return done;                                                                                                       \
@@ -162,7 +162,7 @@ int rename(const char *from, const char *to) {
     char kept[32];
     copy(to, kept);
     int done = next(from, to);
-    if (done == 0) note("rename %s %s %s\n", from, to, kept);
+    if (done == 0) note("rename\t%s\t%s\t%s\n", from, to, kept);
     pthread_mutex_unlock(&lock);
     return done;
 }
@@ -174,7 +174,7 @@ static int removed(const char *path, int (*next)(const char *)) {
     char kept[32];
     copy(path, kept);
     int done = next(path);
-    if (done == 0) note("remove %s %s\n", path, kept);
+    if (done == 0) note("remove\t%s\t%s\n", path, kept);
     pthread_mutex_unlock(&lock);
     return done;
 }
@@ -193,7 +193,7 @@ static int opened(int at, const char *path, int flags, mode_t mode) {
     int new = (flags & O_CREAT) && below(path) && access(path, F_OK) != 0;
     if (new) { pthread_mutex_lock(&lock); step(); pthread_mutex_unlock(&lock); }
     int fd = syscall(SYS_openat, at, path, flags | O_LARGEFILE, mode);
-    if (new && fd >= 0) note("create %s\n", path);
+    if (new && fd >= 0) note("create\t%s\n", path);
     return fd;
 }
 

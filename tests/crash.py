@@ -138,7 +138,7 @@ def lose_power(station, dice):
     """Forgets some of what the station did not sync, as the log of its operations tells."""
     synced, renames, removed, created = {}, [], [], set()
     for line in (station.shadow / "log").read_text().splitlines():
-        word, *rest = line.split(" ")
+        word, *rest = line.split("\t")
         if word == "sync":
             synced[rest[0]] = rest[1]
             created.discard(rest[0])  # file systems keep the name of a new file with its content
