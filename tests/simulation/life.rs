@@ -181,6 +181,8 @@ impl Life {
     }
 
     async fn end(&self, station: Station, last: &Snapshot, def: &Arc<PlantDef>) {
+        // A station that stops aborts it into its safe state.
+        say("procedure", "ended");
         if tokio::time::timeout(STOP_MAX, station.stop()).await.is_err() {
             return wrong("stops: not within 30 s");
         }
