@@ -62,16 +62,6 @@ pub struct MimicRect {
     pub height: u16,
 }
 
-impl MimicRect {
-    /// Does `other` lie inside?
-    pub fn contains(&self, other: &MimicRect) -> bool {
-        self.x <= other.x
-            && self.y <= other.y
-            && other.x.saturating_add(other.width) <= self.x.saturating_add(self.width)
-            && other.y.saturating_add(other.height) <= self.y.saturating_add(self.height)
-    }
-}
-
 /// One element of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum MimicItem {

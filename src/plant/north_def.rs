@@ -15,13 +15,6 @@ pub struct NorthDef {
     pub mqtt: Option<MqttDef>,
 }
 
-impl NorthDef {
-    /// Is anything sent at all?
-    pub fn is_used(&self) -> bool {
-        self.mqtt.is_some()
-    }
-}
-
 /// An MQTT broker and what it gets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MqttDef {

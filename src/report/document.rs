@@ -118,8 +118,6 @@ pub enum Content {
     Table(Table),
     /// Curves; formats without pictures leave them out.
     Charts(Vec<Chart>),
-    /// Paragraphs.
-    Lines(Vec<String>),
     /// Lines to sign on, each with what it is for; only on paper.
     Signatures(Vec<String>),
 }

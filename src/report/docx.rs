@@ -91,7 +91,6 @@ impl Body {
             Content::Charts(charts) => {
                 charts.iter().for_each(|chart| self.picture(&chart.drawing(&document.zone, CHART)));
             }
-            Content::Lines(lines) => lines.iter().for_each(|line| self.paragraph("", line)),
             Content::Signatures(names) => {
                 names.iter().for_each(|name| self.paragraph("Signature", &format!("{name}  {}", "_".repeat(40))));
             }

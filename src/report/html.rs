@@ -85,7 +85,6 @@ fn body(page: &mut String, document: &Document, section: &Section) {
                 add(page, format_args!("<p>{}</p>\n", String::from_utf8_lossy(&svg)));
             }
         }
-        Content::Lines(lines) => lines.iter().for_each(|line| add(page, format_args!("<p>{}</p>\n", escaped(line)))),
         Content::Signatures(names) => {
             names.iter().for_each(|name| add(page, format_args!("<p class=\"sign\">{}</p>\n", escaped(name))));
         }

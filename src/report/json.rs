@@ -36,7 +36,6 @@ impl ReportFormat for Json {
                     Value::Object(facts.iter().map(fact).collect())
                 }
                 Content::Table(table) => rows(document, table),
-                Content::Lines(lines) => json!(lines),
                 Content::Charts(_) | Content::Signatures(_) => continue,
             };
             all.insert(section.kind.word().into(), content);

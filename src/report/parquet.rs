@@ -49,7 +49,7 @@ impl ReportFormat for Parquet {
     fn tables(&self, document: &Document, _style: &Style) -> Result<Vec<(&'static str, Vec<u8>)>, String> {
         let tables = document.sections.iter().filter_map(|section| match &section.content {
             Content::Table(table) => Some((section.kind.word(), table)),
-            Content::Facts(_) | Content::Charts(_) | Content::Lines(_) | Content::Signatures(_) => None,
+            Content::Facts(_) | Content::Charts(_) | Content::Signatures(_) => None,
         });
         let file = |(word, rows): (&'static str, &Table)| {
             table(document, rows).map(|bytes| (word, bytes)).map_err(|error| error.to_string())
@@ -179,7 +179,7 @@ fn about(document: &Document) -> Vec<KeyValue> {
     };
     let facts = document.sections.iter().flat_map(|section| match &section.content {
         Content::Facts(facts) => facts.as_slice(),
-        Content::Table(_) | Content::Charts(_) | Content::Lines(_) | Content::Signatures(_) => &[],
+        Content::Table(_) | Content::Charts(_) | Content::Signatures(_) => &[],
     });
     let fact = |Fact { id, cell, .. }: &Fact| KeyValue::new((*id).to_owned(), word(cell));
     let heading = KeyValue::new("heading".to_owned(), document.heading.clone());

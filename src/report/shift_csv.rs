@@ -80,7 +80,6 @@ fn rows_of(document: &Document, section: &Section, dialect: CsvDialect) -> Optio
             rows.iter_mut().for_each(|row| row.resize(3, String::new()));
             Some(rows)
         }
-        Content::Lines(lines) => Some(lines.iter().map(|line| vec![text(line)]).collect()),
         Content::Charts(_) | Content::Signatures(_) => None,
     })
 }

@@ -53,7 +53,7 @@ fn a_language_changes_words_and_no_figure() {
         let document = document(&shift_report(), &plant("Asia/Bangkok", &THREE), locale);
         let tables = document.sections.into_iter().filter_map(|section| match section.content {
             Content::Table(table) => Some(table.rows),
-            Content::Facts(_) | Content::Charts(_) | Content::Lines(_) | Content::Signatures(_) => None,
+            Content::Facts(_) | Content::Charts(_) | Content::Signatures(_) => None,
         });
         let numbers = |row: Vec<Cell>| row.into_iter().filter(|cell| !matches!(cell, Cell::Text(_))).collect();
         tables.flatten().map(numbers).collect()

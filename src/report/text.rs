@@ -51,7 +51,6 @@ fn section_lines(document: &Document, section: &Section, width: usize, lines: &m
     let body: Vec<String> = match &section.content {
         Content::Facts(facts) => fact_lines(document, facts, width),
         Content::Table(table) => table_lines(document, &table.dense(), width),
-        Content::Lines(paragraphs) => paragraphs.iter().flat_map(|line| wrapped(line, width)).collect(),
         Content::Signatures(names) => {
             let line = |name: &String| wrapped(&format!("{name} {}", "_".repeat(30)), width);
             names.iter().flat_map(|name| std::iter::once(String::new()).chain(line(name))).collect()

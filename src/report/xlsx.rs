@@ -60,7 +60,7 @@ fn workbook(document: &Document, style: &Style) -> Result<Vec<u8>, XlsxError> {
         match &section.content {
             Content::Table(rows) => table(named(book.add_worksheet(), &section.title)?, document, rows)?,
             Content::Charts(charts) => curves(&mut book, document, &section.title, charts)?,
-            Content::Facts(_) | Content::Lines(_) | Content::Signatures(_) => {}
+            Content::Facts(_) | Content::Signatures(_) => {}
         }
     }
     for sheet in book.worksheets_mut() {

@@ -132,7 +132,7 @@ impl<M: Metrics> Layout<'_, M> {
             Content::Charts(charts) => {
                 charts.first().map_or(0.0, |chart| self.scaled(&chart.drawing(&self.document.zone, CHART)).1)
             }
-            Content::Facts(_) | Content::Table(_) | Content::Lines(_) | Content::Signatures(_) => 50.0,
+            Content::Facts(_) | Content::Table(_) | Content::Signatures(_) => 50.0,
         };
         self.need(30.0 + first);
         self.y += 12.0;
@@ -141,7 +141,6 @@ impl<M: Metrics> Layout<'_, M> {
         match &section.content {
             Content::Facts(facts) => self.facts(facts),
             Content::Table(table) => self.table(&table.dense()),
-            Content::Lines(lines) => lines.iter().for_each(|line| self.line(line, 9.0, false)),
             Content::Signatures(names) => names.iter().for_each(|name| self.signature(name)),
             Content::Charts(charts) => {
                 for chart in charts {

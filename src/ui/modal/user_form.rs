@@ -149,11 +149,6 @@ impl UserForm {
         None
     }
 
-    /// The password that was typed for a login.
-    pub fn password(&self) -> Secret {
-        self.form.secret(1)
-    }
-
     /// The station's answer; `true` if the form has done its work.
     pub fn answered(&mut self, cx: &ViewContext, answer: Result<(), String>) -> bool {
         (self.waiting, self.number) = (false, 0);
