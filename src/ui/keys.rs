@@ -291,6 +291,7 @@ impl Chord {
 mod tests {
     use super::*;
     use crate::ui::{
+        fixture::{Fixture, with_cx},
         global::{self, GlobalKey},
         replay,
         tabs::Tab,
@@ -313,6 +314,36 @@ mod tests {
         for (page, chords) in Tab::ALL.iter().flat_map(|tab| tab.chords()) {
             assert_no_clash(page, chords);
         }
+    }
+
+    #[test]
+    fn a_key_is_listed_and_heard_as_it_is_offered() {
+        type Row = Key<u32>;
+        const TABLE: &[Row] = &[
+            Row::change(char('f'), "footer", "", |pressed, _| *pressed += 1),
+            Row::change(char('h'), "help", "", |pressed, _| *pressed += 1).when(|_, _| Offer::Help),
+            Row::change(char('u'), "unlisted", "", |pressed, _| *pressed += 1).when(|_, _| Offer::Unlisted),
+            Row::change(char('n'), "none", "", |pressed, _| *pressed += 1).when(|_, _| Offer::Absent),
+            Row::elsewhere(char('e'), "elsewhere", "").needs(Role::Technician),
+            Row::change(char('w'), "writes", "", |pressed, _| *pressed += 1).writes(|_, _| Some(Role::Supervisor)),
+        ];
+        let (keys, mut pressed) = (Keys::of(&[TABLE]), 0);
+        with_cx(&Fixture::normal().snapshot(), |cx| {
+            let listed = |reads_only| {
+                let hints = keys.hints(&0, cx, reads_only).into_iter();
+                hints.map(|hint| (hint.key, hint.label, hint.needs)).collect::<Vec<_>>()
+            };
+            let row = |key: &str, label: &str, needs| (key.to_owned(), label.to_owned(), needs);
+            let read = [row("f", "footer", None), row("h", "", None), row("e", "elsewhere", Some(Role::Technician))];
+            assert_eq!(listed(true), read);
+            assert_eq!(listed(false), [&read[..], &[row("w", "writes", Some(Role::Supervisor))]].concat());
+            for (letter, count) in [('f', 1), ('h', 2), ('u', 3), ('n', 3), ('e', 3), ('w', 4), ('x', 4)] {
+                let before = pressed;
+                let heard = keys.press(&mut pressed, cx, char(letter).event(), |_, _| vec![UiAction::Leave]);
+                assert_eq!((pressed, heard), (count, (before != count).then(|| vec![UiAction::Leave])), "{letter}");
+            }
+        });
+        assert_eq!(keys.chords().len(), 5, "a key of every tab clashes with none of them");
     }
 
     #[test]
