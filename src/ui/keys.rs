@@ -1,33 +1,186 @@
-//! Keys are tables: dispatch, footer and help are read from the same rows.
+//! Keys are tables: dispatch, footer, help, palette and the check for clashes read the same rows.
 
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
-use super::tabs::Tab;
+use super::{UiAction, ViewContext};
 use crate::{plant::role::Role, t, text::translate};
 
-/// One row of a key table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Key<A: 'static> {
-    /// What is pressed.
-    pub chord: Chord,
-    /// Its name in the footer; empty keeps it out of the footer (the help still has it).
-    pub label: &'static str,
-    /// What it does, for the help.
-    pub help: &'static str,
-    /// What it means.
-    pub action: A,
-    /// The least role that may press it; `None` where every user may.
-    pub needs: Option<Role>,
+/// A key of the page `P`, one row of its table: what is pressed, how it is called, who may, when it is offered, what it does.
+pub struct Key<P: 'static> {
+    chord: Chord,
+    label: &'static str,
+    help: &'static str,
+    needs: Option<Role>,
+    writes: Option<Writes<P>>,
+    when: When<P>,
+    run: Run<P>,
 }
 
-impl<A: Copy> Key<A> {
-    /// A key for every user.
-    pub const fn new(chord: Chord, label: &'static str, help: &'static str, action: A) -> Key<A> {
-        Key { chord, label, help, action, needs: None }
+type Writes<P> = fn(&P, &ViewContext) -> Option<Role>;
+type When<P> = fn(&P, &ViewContext) -> Offer;
+
+enum Run<P> {
+    Act(fn(&mut P, &ViewContext) -> Vec<UiAction>),
+    Change(fn(&mut P, &ViewContext)),
+    /// A key of every tab: it is only listed here.
+    Elsewhere,
+}
+
+/// Where a key is offered at a moment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Offer {
+    /// In the footer and in the help.
+    Footer,
+    /// In the help: what it acts on is missing, as it says when it is pressed.
+    Help,
+    /// Nowhere, but it answers when it is pressed.
+    Unlisted,
+    /// It is no key now.
+    Absent,
+}
+
+impl Offer {
+    /// In the footer only where there is what it acts on.
+    pub fn footer_if(there: bool) -> Offer {
+        if there { Offer::Footer } else { Offer::Help }
+    }
+    /// No key at all elsewhere.
+    pub fn only_if(there: bool) -> Offer {
+        if there { Offer::Footer } else { Offer::Absent }
+    }
+}
+
+impl<P> Key<P> {
+    /// A key that answers what the terminal is to do; an empty label keeps it out of the footer.
+    pub const fn new(
+        chord: Chord,
+        label: &'static str,
+        help: &'static str,
+        run: fn(&mut P, &ViewContext) -> Vec<UiAction>,
+    ) -> Key<P> {
+        Key::of(chord, label, help, Run::Act(run))
+    }
+    /// A key that only changes the page.
+    pub const fn change(
+        chord: Chord,
+        label: &'static str,
+        help: &'static str,
+        run: fn(&mut P, &ViewContext),
+    ) -> Key<P> {
+        Key::of(chord, label, help, Run::Change(run))
+    }
+    /// A key of every tab that is looked for here.
+    pub const fn elsewhere(chord: Chord, label: &'static str, help: &'static str) -> Key<P> {
+        Key::of(chord, label, help, Run::Elsewhere)
+    }
+    const fn of(chord: Chord, label: &'static str, help: &'static str, run: Run<P>) -> Key<P> {
+        Key { chord, label, help, needs: None, writes: None, when: |_, _| Offer::Footer, run }
     }
     /// The same for users of at least this role.
-    pub const fn needs(self, role: Role) -> Key<A> {
-        Key { needs: Some(role), ..self }
+    pub const fn needs(mut self, role: Role) -> Key<P> {
+        self.needs = Some(role);
+        self
+    }
+    /// The same of a key that writes: the least role that may write what it would now, if it would write.
+    pub const fn writes(mut self, role: Writes<P>) -> Key<P> {
+        self.writes = Some(role);
+        self
+    }
+    /// The same where it is not always offered.
+    pub const fn when(mut self, when: When<P>) -> Key<P> {
+        self.when = when;
+        self
+    }
+
+    /// Its row of footer and help; `None` where it is not listed. Where `reads_only`, keys that write are not.
+    fn hint(&self, page: &P, cx: &ViewContext, reads_only: bool) -> Option<Hint> {
+        let role = self.writes.and_then(|writes| writes(page, cx));
+        let label = match (self.when)(page, cx) {
+            Offer::Footer => self.label,
+            Offer::Help => "",
+            Offer::Unlisted | Offer::Absent => return None,
+        };
+        let hint = Hint::of(self.chord, label, self.help);
+        (!reads_only || role.is_none()).then_some(Hint { needs: role.or(self.needs), ..hint })
+    }
+}
+
+/// The keys of a page at a moment, in the order of the footer.
+pub struct Keys<P: 'static>(Vec<Part<P>>);
+
+enum Part<P: 'static> {
+    Rows(&'static [Key<P>]),
+    Below(&'static Below<P>),
+}
+
+/// Keys that are no rows of a table: of a form that is typed into, of a page with a state of its own, of the plant file.
+pub struct Below<P> {
+    /// For footer and help.
+    pub hints: fn(&P, &ViewContext) -> Vec<Hint>,
+    /// `None` where it is none of them.
+    pub press: fn(&mut P, &ViewContext, KeyEvent) -> Option<Vec<UiAction>>,
+}
+
+impl<P> Keys<P> {
+    /// Those of these tables.
+    pub fn of(tables: &[&'static [Key<P>]]) -> Keys<P> {
+        Keys(tables.iter().copied().map(Part::Rows).collect())
+    }
+    /// Those that are no rows.
+    pub fn below(below: &'static Below<P>) -> Keys<P> {
+        Keys(vec![Part::Below(below)])
+    }
+    /// These and others.
+    pub fn and(mut self, others: Keys<P>) -> Keys<P> {
+        self.0.extend(others.0);
+        self
+    }
+
+    /// The rows of footer and help.
+    pub fn hints(&self, page: &P, cx: &ViewContext, reads_only: bool) -> Vec<Hint> {
+        let hints = |part: &Part<P>| match part {
+            Part::Rows(rows) => rows.iter().filter_map(|key| key.hint(page, cx, reads_only)).collect(),
+            Part::Below(below) => (below.hints)(page, cx),
+        };
+        self.0.iter().flat_map(hints).collect()
+    }
+
+    /// Does what the key of the table does that was pressed, then `after` where it leaves the terminal nothing to do;
+    /// `None` where it is none of them.
+    pub fn press(
+        &self,
+        page: &mut P,
+        cx: &ViewContext,
+        event: KeyEvent,
+        after: fn(&mut P, &ViewContext) -> Vec<UiAction>,
+    ) -> Option<Vec<UiAction>> {
+        for part in &self.0 {
+            let rows = match part {
+                Part::Rows(rows) => rows,
+                Part::Below(below) => match (below.press)(page, cx, event) {
+                    Some(actions) => return Some(actions),
+                    None => continue,
+                },
+            };
+            let is_meant = |key: &&Key<P>| key.chord.is(event) && (key.when)(page, cx) != Offer::Absent;
+            let actions = match rows.iter().find(is_meant).map(|key| &key.run) {
+                Some(Run::Act(run)) => run(page, cx),
+                Some(Run::Change(run)) => {
+                    run(page, cx);
+                    Vec::new()
+                }
+                Some(Run::Elsewhere) | None => continue,
+            };
+            return Some(if actions.is_empty() { after(page, cx) } else { actions });
+        }
+        None
+    }
+
+    /// Their chords, for the test that no key means two things.
+    #[cfg(test)]
+    pub fn chords(&self) -> Vec<Chord> {
+        let rows = self.0.iter().flat_map(|part| if let Part::Rows(rows) = part { *rows } else { &[] });
+        rows.filter(|key| !matches!(key.run, Run::Elsewhere)).map(|key| key.chord).collect()
     }
 }
 
@@ -72,6 +225,10 @@ impl Hint {
         };
         Hint { key, label: label.into(), help: help.into(), needs: None, chord }
     }
+    /// That of a row of a table.
+    pub(super) fn of(chord: Chord, label: &'static str, help: &'static str) -> Hint {
+        Hint { chord: Some(chord), ..Hint::new(chord.name(), translate(label), translate(help)) }
+    }
     /// A hint of a window, which the help does not list.
     pub(crate) fn in_window(key: impl Into<String>, label: impl Into<String>) -> Hint {
         Hint::new(key, label, "")
@@ -81,9 +238,6 @@ impl Hint {
         Hint { needs: Some(role), ..self }
     }
 }
-
-/// The modifier of Ctrl keys.
-pub const CONTROL: KeyModifiers = KeyModifiers::CONTROL;
 
 /// A letter or sign as a chord.
 pub const fn char(c: char) -> Chord {
@@ -96,35 +250,6 @@ pub const fn ctrl(c: char) -> Chord {
 /// Any other key.
 pub const fn code(code: KeyCode) -> Chord {
     Chord { code, ctrl: false }
-}
-
-/// The action of the row that fits what was pressed.
-pub fn find<A: Copy>(table: &[Key<A>], event: KeyEvent) -> Option<A> {
-    table.iter().find(|key| key.chord.is(event)).map(|key| key.action)
-}
-
-/// The chords of a table, for the test that no key means two things.
-#[cfg(test)]
-pub fn chords_of<A>(table: &[Key<A>]) -> Vec<Chord> {
-    table.iter().map(|key| key.chord).collect()
-}
-
-/// Takes the keys out of the footer whose actions lack what they need; the help has them all the same.
-pub fn hide<A: PartialEq>(table: &mut [Key<A>], lacking: &[(A, bool)]) {
-    let is_hidden = |action: &A| lacking.iter().any(|(of, lacks)| *lacks && of == action);
-    table.iter_mut().filter(|key| is_hidden(&key.action)).for_each(|key| key.label = "");
-}
-
-/// The rows of a table for footer and help.
-pub fn hints<A>(table: &[Key<A>]) -> Vec<Hint> {
-    table
-        .iter()
-        .map(|key| Hint {
-            needs: key.needs,
-            chord: Some(key.chord),
-            ..Hint::new(key.chord.name(), translate(key.label), translate(key.help))
-        })
-        .collect()
 }
 
 impl Chord {
@@ -162,104 +287,22 @@ impl Chord {
     }
 }
 
-/// What the keys of every tab mean.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Global {
-    /// Show a tab.
-    Show(Tab),
-    /// Show the next tab.
-    Next,
-    /// Show the one before.
-    Previous,
-    /// List the keys.
-    Help,
-    /// Ask, then leave.
-    Quit,
-    /// Acknowledge the selected or most urgent alarm.
-    Acknowledge,
-    /// Ask, then acknowledge all.
-    AcknowledgeAll,
-    /// End the sound of the alarms that sound now.
-    Silence,
-    /// Save the screen as text and as a picture.
-    Dump,
-    /// Choose theme, characters, pictures, motion, bell, mouse and language.
-    Settings,
-    /// Copy what is selected.
-    Copy,
-    /// Redraw the screen.
-    Redraw,
-    /// Take the outcome of the last command off the screen.
-    Dismiss,
-    /// Show a past instant of the plant.
-    Replay,
-    /// Show a past instant on one page.
-    EventPage,
-    /// List the bookmarks.
-    Bookmarks,
-    /// Go to anything by its name.
-    Palette,
-    /// The tab before.
-    Back,
-    /// The tab after it again.
-    Forward,
-    /// Lock this terminal at once.
-    Lock,
-    /// Show all texts in the next language.
-    Language,
-}
-
-/// Keys of every tab: first the number keys, which show one.
-pub fn global() -> Vec<Key<Global>> {
-    let mut shown: Vec<_> =
-        Tab::ALL.iter().map(|tab| Key::new(tab.key(), "", tab.help(), Global::Show(*tab))).collect();
-    shown.rotate_left(1);
-    shown.into_iter().chain(GLOBAL.iter().copied()).collect()
-}
-
-/// The other keys of every tab.
-const GLOBAL: &[Key<Global>] = &[
-    Key::new(code(KeyCode::Tab), "", "next tab", Global::Next),
-    Key::new(code(KeyCode::BackTab), "", "previous tab", Global::Previous),
-    Key::new(char('a'), "", "acknowledge the selected or most urgent alarm", Global::Acknowledge),
-    Key::new(char('A'), "", "acknowledge all alarms (asks first)", Global::AcknowledgeAll),
-    Key::new(code(KeyCode::Esc), "", "close a window; dismiss a message; previous page", Global::Dismiss),
-    Key::new(char(':'), "go to", "go to any tab, device, tag, alarm, key or past time by its name", Global::Palette),
-    Key::new(ctrl('p'), "", "go to anything by its name", Global::Palette),
-    Key::new(char('['), "", "back to the tab before", Global::Back),
-    Key::new(char(']'), "", "forward again", Global::Forward),
-    Key::new(char('@'), "", "replay: the plant as it was at a past time", Global::Replay),
-    Key::new(char('!'), "", "event page: mimic, curves, journal, frames, people at one past time", Global::EventPage),
-    Key::new(char('\''), "", "bookmarks: past times that were kept under a name", Global::Bookmarks),
-    Key::new(ctrl('k'), "", "lock this terminal; works in every window", Global::Lock),
-    Key::new(char('L'), "", "change the language of the screens", Global::Language),
-    Key::new(ctrl('t'), "", "change the language, in every window too", Global::Language),
-    Key::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", Global::Silence),
-    Key::new(char('P'), "", "save this screen as text, SVG and PNG in the folder of the reports", Global::Dump),
-    Key::new(
-        code(KeyCode::F(2)),
-        "",
-        "settings: theme, characters, pictures, motion, bell, mouse, language",
-        Global::Settings,
-    ),
-    Key::new(char('y'), "", "copy what is selected, with its unit, quality and time", Global::Copy),
-    Key::new(ctrl('l'), "", "redraw the screen", Global::Redraw),
-    Key::new(ctrl('c'), "", "quit (asks first)", Global::Quit),
-    Key::new(char('q'), "quit", "quit (asks first, and lists what stops)", Global::Quit),
-    Key::new(char('?'), "help", "all keys", Global::Help),
-];
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ui::replay;
+    use crate::ui::{
+        fixture::{Fixture, with_cx},
+        global::{self, GlobalKey},
+        replay,
+        tabs::Tab,
+    };
 
     fn assert_no_clash(name: &str, chords: Vec<Chord>) {
+        let chords_of = |table: &[GlobalKey]| table.iter().map(|key| key.chord()).collect::<Vec<_>>();
         // These mean the same in the past: a time is asked for, a step is made, and Esc leads back.
-        let replayed = chords_of(replay::KEYS)
-            .into_iter()
-            .filter(|chord| ![char('@'), char('['), char(']'), code(KeyCode::Esc)].contains(chord));
-        let all: Vec<Chord> = chords.into_iter().chain(chords_of(&global())).chain(replayed).collect();
+        let same = [char('@'), char('['), char(']'), code(KeyCode::Esc)];
+        let replayed = chords_of(replay::KEYS).into_iter().filter(|chord| !same.contains(chord));
+        let all: Vec<Chord> = chords.into_iter().chain(chords_of(&global::keys())).chain(replayed).collect();
         for (n, chord) in all.iter().enumerate() {
             assert!(!all[..n].contains(chord), "{name}: {} means two things", chord.name());
         }
@@ -274,12 +317,40 @@ mod tests {
     }
 
     #[test]
+    fn a_key_is_listed_and_heard_as_it_is_offered() {
+        type Row = Key<u32>;
+        const TABLE: &[Row] = &[
+            Row::change(char('f'), "footer", "", |pressed, _| *pressed += 1),
+            Row::change(char('h'), "help", "", |pressed, _| *pressed += 1).when(|_, _| Offer::Help),
+            Row::change(char('u'), "unlisted", "", |pressed, _| *pressed += 1).when(|_, _| Offer::Unlisted),
+            Row::change(char('n'), "none", "", |pressed, _| *pressed += 1).when(|_, _| Offer::Absent),
+            Row::elsewhere(char('e'), "elsewhere", "").needs(Role::Technician),
+            Row::change(char('w'), "writes", "", |pressed, _| *pressed += 1).writes(|_, _| Some(Role::Supervisor)),
+        ];
+        let (keys, mut pressed) = (Keys::of(&[TABLE]), 0);
+        with_cx(&Fixture::normal().snapshot(), |cx| {
+            let listed = |reads_only| {
+                let hints = keys.hints(&0, cx, reads_only).into_iter();
+                hints.map(|hint| (hint.key, hint.label, hint.needs)).collect::<Vec<_>>()
+            };
+            let row = |key: &str, label: &str, needs| (key.to_owned(), label.to_owned(), needs);
+            let read = [row("f", "footer", None), row("h", "", None), row("e", "elsewhere", Some(Role::Technician))];
+            assert_eq!(listed(true), read);
+            assert_eq!(listed(false), [&read[..], &[row("w", "writes", Some(Role::Supervisor))]].concat());
+            for (letter, count) in [('f', 1), ('h', 2), ('u', 3), ('n', 3), ('e', 3), ('w', 4), ('x', 4)] {
+                let before = pressed;
+                let heard = keys.press(&mut pressed, cx, char(letter).event(), |_, _| vec![UiAction::Leave]);
+                assert_eq!((pressed, heard), (count, (before != count).then(|| vec![UiAction::Leave])), "{letter}");
+            }
+        });
+        assert_eq!(keys.chords().len(), 5, "a key of every tab clashes with none of them");
+    }
+
+    #[test]
     fn a_split_escape_sequence_is_no_key() {
-        let alt_a = KeyEvent::new(KeyCode::Char('a'), KeyModifiers::ALT);
-        assert_eq!(find(&global(), alt_a), None);
-        let shifted = KeyEvent::new(KeyCode::Char('A'), KeyModifiers::SHIFT);
-        assert_eq!(find(&global(), shifted), Some(Global::AcknowledgeAll));
-        let ctrl_a = KeyEvent::new(KeyCode::Char('a'), KeyModifiers::CONTROL);
-        assert_eq!(find(&global(), ctrl_a), None);
+        let found = |modifiers| global::find(&global::keys(), KeyEvent::new(KeyCode::Char('A'), modifiers));
+        assert!(found(KeyModifiers::ALT).is_none());
+        assert_eq!(found(KeyModifiers::SHIFT).map(GlobalKey::chord), Some(char('A')));
+        assert!(found(KeyModifiers::CONTROL).is_none());
     }
 }

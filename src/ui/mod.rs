@@ -8,6 +8,7 @@ pub(crate) mod chrome;
 pub(crate) mod last_frame;
 pub(crate) mod extension;
 pub(crate) mod glyph_filter;
+pub(crate) mod global;
 pub(crate) mod graphics;
 pub(crate) mod io;
 pub(crate) mod interlock;
@@ -47,17 +48,16 @@ use ratatui::{Frame, layout::Rect};
 use crate::{
     access::SessionStatus,
     history::{Answer, HistoryError},
-    plant::{alarm::AlarmCommand, command::CommandKind, sample::Cause, snapshot::Snapshot},
+    plant::{sample::Cause, snapshot::Snapshot},
     t,
     text::Locale,
 };
 use extension::Extension;
 use graphics::Picture;
-use keys::Global;
 pub use last_command::LastCommand;
 use last_frame::LastFrame;
 use layout::Size;
-use modal::{Confirm, Modal, Palette, Target, palette};
+use modal::{Confirm, Modal, Target, palette};
 pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
 use preferences::{Bell, Preferences, PreferencesFile};
 use replay::Replay;
@@ -65,7 +65,7 @@ use screen_dump::ScreenDump;
 pub(crate) use screen_dump::text as text_of;
 use session_lock::SessionLock;
 pub use tabs::mimic::preview;
-use tabs::{Tab, Tabs, alarms::actions};
+use tabs::{Tab, Tabs};
 use theme::Theme;
 pub(crate) use tour::Tour;
 use tour::TourEvent;

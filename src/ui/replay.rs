@@ -3,6 +3,7 @@
 //! What stands above the tab, header and banner, stays that of the present.
 
 mod instant;
+mod keys;
 mod page;
 mod refusal;
 mod search;
@@ -11,10 +12,7 @@ use std::{collections::VecDeque, sync::Arc};
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{
-    Effect, QueryId, ViewContext,
-    keys::{Key, char, code},
-};
+use super::{Effect, QueryId, ViewContext};
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::{
@@ -25,37 +23,16 @@ use crate::{
     },
     t,
 };
-use crossterm::event::KeyCode;
 pub use instant::{Asked, Place, ask_instant, ask_name, instant, stamp, typed};
+pub use keys::KEYS;
 pub use page::EventPage;
 pub(super) use refusal::{gives_command, refuse_commands, refused};
-use search::{Search, Searched};
+use search::Search;
 
 /// Half a second of playing is so many times as long in the plant; 0 is paused.
 const SPEEDS: [i32; 5] = [0, 1, 10, 60, 600];
 /// Snapshots that are fetched ahead while playing.
 const PREFETCH_MAX: usize = 3;
-
-/// What a key means while the past is shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// The next or previous alarm event or action of an operator.
-    Event(Direction),
-    /// So many seconds on.
-    Step(i64),
-    /// Play, faster with each press, then pause.
-    Play,
-    /// The next begin or end of a batch, or the previous one.
-    Batch(Direction),
-    /// The next stored value of a curve, or the previous one.
-    Sample(Direction),
-    /// Keep the instant under a name.
-    Bookmark,
-    /// Ask for an instant.
-    GoTo,
-    /// Back to the present.
-    Leave,
-}
 
 /// A direction in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,24 +42,6 @@ pub enum Direction {
     /// Towards the present.
     Later,
 }
-
-/// Keys while the past is shown; they come before those of the tab.
-pub const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Esc), "present", "back to the present", Action::Leave),
-    Key::new(char('['), "", "previous alarm event or action of an operator", Action::Event(Direction::Earlier)),
-    Key::new(char(']'), "event", "next alarm event or action of an operator", Action::Event(Direction::Later)),
-    Key::new(char('<'), "", "a minute earlier", Action::Step(-60)),
-    Key::new(char('>'), "minute", "a minute later", Action::Step(60)),
-    Key::new(char(','), "", "a second earlier; pauses", Action::Step(-1)),
-    Key::new(char('.'), "second", "a second later; pauses", Action::Step(1)),
-    Key::new(char('*'), "play", "play ×1, ×10, ×60, ×600, then pause", Action::Play),
-    Key::new(char('@'), "time", "go to a past time", Action::GoTo),
-    Key::new(char('('), "", "previous stored value of what is drawn", Action::Sample(Direction::Earlier)),
-    Key::new(char(')'), "sample", "next stored value of what is drawn", Action::Sample(Direction::Later)),
-    Key::new(char('{'), "", "previous begin or end of a batch", Action::Batch(Direction::Earlier)),
-    Key::new(char('}'), "batch", "next begin or end of a batch", Action::Batch(Direction::Later)),
-    Key::new(char('#'), "bookmark", "keep this instant under a name", Action::Bookmark),
-];
 
 /// A past instant of the plant.
 #[derive(Debug)]
@@ -284,27 +243,12 @@ impl Replay {
         self.ends = false;
     }
 
-    /// A key, at a present.
-    pub fn on_key(&mut self, action: Action, present: Timestamp) -> Vec<Effect> {
-        let Some(at) = self.shown().map(|shown| shown.at) else { return Vec::new() };
-        match action {
-            Action::Step(seconds) => self.step(SignedDuration::from_secs(seconds), present).into_iter().collect(),
-            Action::Event(direction) => self.search(Searched::Events, direction, at, present),
-            Action::Batch(direction) => self.search(Searched::Batches, direction, at, present),
-            Action::Sample(direction) => self.search_sample(direction, at, present),
-            Action::Play => {
-                self.speed = (self.speed + 1) % SPEEDS.len();
-                (self.requested, self.search, self.sample, self.trouble) = (None, None, None, None);
-                self.forget_prefetched();
-                self.prefetch(present)
-            }
-            // A window asks for it.
-            Action::GoTo | Action::Bookmark => Vec::new(),
-            Action::Leave => {
-                self.leave();
-                Vec::new()
-            }
-        }
+    /// Plays, faster with each call, then pauses.
+    fn play(&mut self, present: Timestamp) -> Vec<Effect> {
+        self.speed = (self.speed + 1) % SPEEDS.len();
+        (self.requested, self.search, self.sample, self.trouble) = (None, None, None, None);
+        self.forget_prefetched();
+        self.prefetch(present)
     }
 
     /// Half a second has passed: the next instant is shown if it has come. At the present the playing stops.

@@ -8,12 +8,13 @@ use crossterm::event::{KeyCode, KeyEvent};
 use super::{
     Effect, Model, QueryId, UiAction,
     context::with_tabs,
-    keys::{self, Global},
+    global::{self, Reach},
+    keys,
     modal::{Modal, Notice, UserForm, user_form::Purpose},
     msg::Scope,
     replay::Replay,
     screen_dump,
-    tabs::{Tab, TabView, Tabs, login},
+    tabs::{Keyed, Tab, Tabs, login},
     visited::Visited,
 };
 use crate::{
@@ -154,11 +155,9 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         let leads = !changing && !is_closed(&session);
         return if leads { vec![UiAction::Show(Tab::home(&model.snapshot.def))] } else { Vec::new() };
     }
-    match keys::find(&keys::global(), event) {
-        Some(global @ (Global::Quit | Global::Redraw)) if event.modifiers.contains(keys::CONTROL) => {
-            super::dispatch::on_global(model, global)
-        }
-        Some(_) | None => with_tabs(model, |tabs, cx| tabs.login.on_key(cx, event)),
+    match global::find(&global::keys(), event).filter(|key| key.reaches(Reach::Typed)) {
+        Some(key) => key.press(model),
+        None => with_tabs(model, |tabs, cx| tabs.login.press(cx, event).unwrap_or_default()),
     }
 }
 

@@ -112,9 +112,10 @@ impl<'a> Visit<'a> for Found {
             syn::Expr::Path(path) => path.path.segments.iter().map(|part| part.ident.to_string()).collect(),
             _ => Vec::new(),
         };
-        let rows =
-            ["row", "echo", "goal", "Key new", "rows words", "rows number", "fact", "Address", "count", "Byte", "Word"];
-        if rows.contains(&name.join(" ").as_str()) || name.first().is_some_and(|name| name == "Column") {
+        let rows = ["row", "echo", "goal", "rows words", "rows number", "fact", "Address", "count", "Byte", "Word"];
+        if rows.contains(&name.join(" ").as_str())
+            || name.first().is_some_and(|name| ["Column", "Key", "GlobalKey"].contains(&name.as_str()))
+        {
             for argument in &call.args {
                 if let syn::Expr::Lit(literal) = argument
                     && let syn::Lit::Str(text) = &literal.lit

@@ -2,7 +2,8 @@
 
 use super::super::{
     Model, ViewContext,
-    keys::{self, Chord, Hint},
+    global::{self, GlobalKey},
+    keys::{Chord, Hint},
     layout::Size,
     rights,
     tabs::Tab,
@@ -31,8 +32,8 @@ impl Footer {
             None => model.tabs.shown().hints(cx),
         };
         let typing = model.tabs.shown == Tab::Login && model.tabs.login.is_typing();
-        let global = if model.modal.is_none() && !typing { keys::global() } else { Vec::new() };
-        let global = keys::hints(&global).into_iter().filter(|hint| !hint.label.is_empty());
+        let global = if model.modal.is_none() && !typing { global::keys() } else { Vec::new() };
+        let global = global.into_iter().map(GlobalKey::hint).filter(|hint| !hint.label.is_empty());
         let mut tail: Vec<Hint> = global.map(shown).collect();
         let lacks = |hint: &Hint| hint.needs.filter(|role| rights::lacks(cx, *role).is_some());
         let (refused, hints): (Vec<Hint>, Vec<Hint>) =

@@ -7,7 +7,8 @@ use crate::{
     plant::time::elapsed,
     t,
     ui::{
-        keys::{self, Hint, code},
+        global::GlobalKey,
+        keys::{Hint, code},
         replay::{self, Event, stamp},
         tabs::alarms::{action_text, event_text},
         widgets::text::age,
@@ -59,6 +60,6 @@ pub(super) fn hints(model: &Model, cx: &ViewContext) -> Vec<Hint> {
     };
     let is_escape = |hint: &Hint| hint.chord.is_some_and(|chord| chord == code(KeyCode::Esc));
     let (escape, own): (Vec<Hint>, Vec<Hint>) = own.into_iter().partition(is_escape);
-    let replay = keys::hints(replay::KEYS).into_iter().filter(|hint| escape.is_empty() || !is_escape(hint));
+    let replay = replay::KEYS.iter().copied().map(GlobalKey::hint).filter(|hint| escape.is_empty() || !is_escape(hint));
     escape.iter().cloned().chain(replay).chain(own).collect()
 }

@@ -7,8 +7,9 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, Target, window};
 use crate::ui::{
-    ViewContext, keys,
-    keys::{Global, Hint},
+    ViewContext,
+    global::{self, GlobalKey},
+    keys::Hint,
     replay,
     tabs::{Tab, Tabs},
     widgets::{
@@ -37,18 +38,17 @@ pub(super) fn on_key(selected: usize, cx: &ViewContext, tabs: &Tabs, event: KeyE
 fn rows(cx: &ViewContext, tabs: &Tabs) -> Vec<Hint> {
     let own = tabs.shown().hints(cx);
     let offered = Tab::offered(cx);
-    let there =
-        keys::global().into_iter().filter(|key| !matches!(key.action, Global::Show(tab) if !offered.contains(&tab)));
-    let global = keys::hints(&there.collect::<Vec<_>>());
+    let there = global::keys().into_iter().filter(|key| key.tab().is_none_or(|tab| offered.contains(&tab)));
     let heading = |text: &str| Hint::new("", text, "");
-    let past = [heading(""), heading(t!("past"))].into_iter().chain(keys::hints(replay::KEYS)).filter(|_| cx.is_past());
+    let replayed = replay::KEYS.iter().copied().map(GlobalKey::hint);
+    let past = [heading(""), heading(t!("past"))].into_iter().chain(replayed).filter(|_| cx.is_past());
     let own = own.into_iter().filter(|hint| !hint.help.is_empty());
     [heading(translate(tabs.shown.title()))]
         .into_iter()
         .chain(own)
         .chain(past)
         .chain([heading(""), heading(t!("every tab"))])
-        .chain(global)
+        .chain(there.map(GlobalKey::hint))
         .collect()
 }
 

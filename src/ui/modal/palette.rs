@@ -20,7 +20,8 @@ use crate::{
     text::{searchable, translate},
     ui::{
         UiAction, ViewContext,
-        keys::{self, Chord, Global},
+        global::{self, GlobalKey},
+        keys::{self, Chord},
         layout::Size,
         modal::reason::subject,
         preferences::Bookmark,
@@ -284,8 +285,9 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     let active = cx.snapshot.alarms.iter().map(|active| alarm(active.id, translate(active.state.word())));
     let is_active = |id: AlarmId| cx.snapshot.alarms.iter().any(|active| active.id == id);
     let others = def.alarms.iter().filter(|def| !is_active(def.id)).map(|def| alarm(def.id, ""));
-    let global = keys::global().into_iter().filter(|key| !matches!(key.action, Global::Show(_) | Global::Palette));
-    let global = keys::hints(&global.collect::<Vec<_>>());
+    let here = [global::PALETTE, global::PALETTE_TOO];
+    let global = global::keys().into_iter().filter(|key| key.tab().is_none() && !here.contains(&key.chord()));
+    let global = global.map(GlobalKey::hint);
     let keys = tab.hints(cx).into_iter().chain(global).filter_map(|hint| {
         let help = if hint.help.is_empty() { &hint.label } else { &hint.help };
         Some(Row::new(Target::Key(hint.chord?), t!("key"), &hint.key, help))

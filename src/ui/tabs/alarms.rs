@@ -23,12 +23,10 @@ mod tests;
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        alarm::AlarmState,
         def::{AlarmClass, AlarmId, Priority, Subject},
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
-        keys::{find, hide, hints},
         layout::Size,
         modal::{Guidance, faceplate::device_text},
     },
@@ -40,7 +38,6 @@ pub(in crate::ui) use handover::NO_CHANGE;
 pub use handover::suppressed_words;
 use journal::Journal;
 pub use journal::{action_text, event_text};
-use keys::Action;
 use metrics::Metrics;
 use recent::Recent;
 
@@ -103,68 +100,6 @@ pub struct Alarms {
 impl TabView for Alarms {
     fn new(_snapshot: &Snapshot) -> Alarms {
         Alarms::default()
-    }
-
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let Some(action) = find(&keys::table(self.page), event) else { return Vec::new() };
-        let alarm = self.selected(cx);
-        match action {
-            Action::Move(motion) => self.step(cx, motion),
-            Action::View(by) => self.turn(by),
-            Action::Bell => return actions::toggle_bell(cx),
-            Action::Fold(folded) => self.fold(cx, folded),
-            Action::Mark => self.mark(cx),
-            Action::Sort => self.sort = self.sort.next(),
-            Action::Priority => self.filter.next_priority(),
-            Action::State => self.filter.next_state(),
-            Action::Area if self.page == Page::Journal => self.journal.next_area(cx),
-            Action::Area => self.filter.next_area(cx.def()),
-            Action::Words => return self.ask_text(),
-            Action::Quiet => self.journal.toggle_quiet(),
-            Action::Shift(by) => self.shift(cx, by),
-            Action::Now => self.shift(cx, 0),
-            Action::Journal => self.turn_to_journal(cx),
-            Action::Note if !self.marked(cx).is_empty() => {
-                return actions::acknowledge_all(cx, self.marked(cx).into_iter(), true);
-            }
-            Action::Note => return alarm.map_or_else(Vec::new, |alarm| actions::note(cx, alarm)),
-            Action::AcknowledgePage => return actions::acknowledge_all(cx, self.seen(cx).into_iter(), false),
-            Action::Shelve => return actions::shelve(cx, &self.meant(cx)),
-            Action::OutOfService => return alarm.map_or_else(Vec::new, |alarm| actions::out_of_service(cx, alarm.id)),
-            Action::PutBack => return self.suppressed(cx).map_or_else(Vec::new, |alarm| actions::put_back(cx, alarm)),
-            Action::Reset => return alarm.map_or_else(Vec::new, |alarm| actions::reset(cx, alarm)),
-            Action::Why | Action::Open | Action::Mimic | Action::Trend | Action::Controller => {
-                return self.go(cx, action);
-            }
-            Action::HandOver => {
-                self.handover.want();
-                return actions::hand_over();
-            }
-            Action::TakeOver if self.handover.is_own(cx) => return actions::own_handover(),
-            Action::TakeOver => {
-                self.handover.want();
-                return actions::take_over(cx);
-            }
-        }
-        self.on_snapshot(cx)
-    }
-
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let alarm = self.selected(cx);
-        let is_kept = |alarm: &SuppressedAlarm| matches!(alarm.state, AlarmState::Shelved | AlarmState::OutOfService);
-        let lacking = [
-            (Action::Reset, !alarm.is_some_and(|alarm| alarm.state.is_latched())),
-            (Action::Fold(false), !self.is_folded(cx, true)),
-            (Action::Fold(true), !self.is_folded(cx, false)),
-            (Action::Area, filter::areas(cx.def()).is_empty()),
-            (Action::PutBack, !self.suppressed(cx).is_some_and(is_kept)),
-        ];
-        let mut keys = keys::table(self.page);
-        hide(&mut keys, &lacking);
-        // Esc leaves the past once it leads nowhere back here.
-        let leads_back = self.page != Page::Active || !self.marked.is_empty() || !self.filter.is_off();
-        let back = (cx.is_past() && leads_back).then(|| Hint::new("Esc", t!("back"), t!("previous page")));
-        [back.into_iter().collect(), keys::everywhere(self.page), hints(&keys)].concat()
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
@@ -256,10 +191,16 @@ impl TabView for Alarms {
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         view::draw(self, cx, frame, area);
     }
+}
+
+impl KeyTable for Alarms {
+    fn keys(&self, _cx: &ViewContext) -> Keys<Alarms> {
+        keys::table(self.page)
+    }
 
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
-        Page::ALL.iter().map(|page| (page.title(), crate::ui::keys::chords_of(&keys::table(*page)))).collect()
+        Page::ALL.map(|page| (page.title(), keys::table(page).chords())).to_vec()
     }
 }
 
@@ -323,6 +264,11 @@ impl Alarms {
     /// The alarm that the keys of the page are about.
     fn target(&self, cx: &ViewContext) -> Option<AlarmId> {
         self.selected(cx).map(|alarm| alarm.id).or_else(|| self.suppressed(cx).map(|suppressed| suppressed.id))
+    }
+
+    /// Does Esc lead back here?
+    fn leads_back(&self) -> bool {
+        self.page != Page::Active || !self.marked.is_empty() || !self.filter.is_off()
     }
 
     fn turn(&mut self, by: isize) {

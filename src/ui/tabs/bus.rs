@@ -22,15 +22,12 @@ pub use frames::around as frames_around;
 pub use request::ask_sweep;
 pub use window::Window;
 
-use self::keys::{Action, table};
 use super::{line_switch, registers::Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{event::LineState, line_minute::LineMinute, line_report::LineReport, snapshot::LineStatus},
     ui::{
-        keys::{find, hide, hints},
         layout::Size,
-        modal::Settings,
         widgets::line_trend::{self, line_trend},
     },
 };
@@ -113,58 +110,6 @@ impl TabView for Bus {
             minutes: Answered::default(),
             registers: Registers::within(snapshot, Tab::Bus),
         }
-    }
-
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        if self.page(cx) == Page::Registers && self.registers.handles(cx, event) {
-            return self.registers.on_key(&below(cx), event);
-        }
-        let action = find(&table(cx, self.page(cx), self.line), event);
-        let (Some(action), Some(at)) = (action, LineView::new(cx, self.line)) else { return Vec::new() };
-        self.frames.dismiss();
-        match action {
-            Action::Turn(_) | Action::Show(_) if cx.is_past() => {}
-            Action::Turn(by) => {
-                let pages = Page::offered(cx);
-                self.show(cx, &at, pages[around(self.page(cx) as usize, by, pages.len())]);
-            }
-            Action::Show(page) => self.show(cx, &at, page),
-            Action::NextLine => self.choose_line(cx, 1),
-            Action::Move(motion) => self.scroll(cx, &at, motion),
-            Action::Open => return self.open(cx, &at),
-            Action::Why => return self.plan.why(cx, &at),
-            Action::Freeze => self.frames.toggle(cx, &at),
-            Action::Filter => return vec![self.frames.ask_filter()],
-            Action::Save => return self.frames.save(cx, &at),
-            Action::Try(tried) => return self.test.open(cx, &at, tried),
-            Action::Again => return test::again(cx, &at),
-            Action::Stop => return test::stop(&at),
-            Action::Retry => return retry(cx, Some(self.line)),
-            Action::Line => return vec![UiAction::Open(Modal::Confirm(line_switch::confirm(cx, self.line)))],
-            Action::Settings => {
-                let kind = CommandKind::Configure(Box::new(at.settings.clone()));
-                let window = Modal::Settings(Box::new(Settings::new(cx, self.line)));
-                return vec![Notice::or(cx, t!("settings of the line"), &kind, window)];
-            }
-        }
-        self.on_snapshot(cx)
-    }
-
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        if self.page(cx) == Page::Registers && self.registers.has_graph() {
-            return self.registers.hints(&below(cx));
-        }
-        let mut keys = table(cx, self.page(cx), self.line);
-        let is_testing = LineView::new(cx, self.line).is_some_and(|at| at.is_testing());
-        hide(&mut keys, &[(Action::Stop, !is_testing)]);
-        if 1 < cx.def().lines.len() {
-            keys.iter_mut().filter(|key| key.action == Action::NextLine).for_each(|key| key.label = "line");
-        }
-        let mut hints = hints(&keys);
-        if self.page(cx) == Page::Registers {
-            hints.extend(self.registers.hints(&below(cx)));
-        }
-        hints
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
@@ -257,12 +202,6 @@ impl TabView for Bus {
             }
         }
     }
-
-    #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
-        let chords = |page: &Page| (page.title(), keys::chords(*page));
-        Page::ALL.iter().map(chords).collect()
-    }
 }
 
 impl Bus {
@@ -295,31 +234,19 @@ impl Bus {
         self.frames.forget();
         self.test.first = None;
         self.minutes = Answered::default();
-        if let Some(at) = LineView::new(cx, self.line) {
-            self.show(cx, &at, self.page);
-        }
+        self.show(cx, self.page);
     }
 
-    fn scroll(&mut self, cx: &ViewContext, at: &LineView, motion: Motion) {
-        let room = self.room(cx);
+    fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
+        let (Some(at), room) = (LineView::new(cx, self.line), self.room(cx)) else { return };
         match (self.page(cx), motion) {
             (Page::Line, Motion::Rows(by)) if 1 < cx.def().lines.len() => self.choose_line(cx, by),
-            (Page::Line, _) => self.scroll.on(motion, line::rows(cx, at, cx.area.width).len(), room - 1),
-            (Page::Plan, _) => self.plan.scroll(at, motion, room),
-            (Page::Frames, _) => self.frames.scroll(cx, at, motion, room),
-            (Page::Test, _) => self.test.scroll(cx, at, motion),
+            (Page::Line, _) => self.scroll.on(motion, line::rows(cx, &at, cx.area.width).len(), room - 1),
+            (Page::Plan, _) => self.plan.scroll(&at, motion, room),
+            (Page::Frames, _) => self.frames.scroll(cx, &at, motion, room),
+            (Page::Test, _) => self.test.scroll(cx, &at, motion),
             // It scrolls by its own keys.
             (Page::Registers, _) => {}
-        }
-    }
-
-    fn open(&mut self, cx: &ViewContext, at: &LineView) -> Vec<UiAction> {
-        match self.page(cx) {
-            Page::Line => Vec::new(),
-            Page::Plan => self.plan.open(at).into_iter().collect(),
-            Page::Frames => self.frames.open(at).into_iter().collect(),
-            Page::Test => self.test.open(cx, at, self.test.selected()),
-            Page::Registers => Vec::new(),
         }
     }
 

@@ -21,24 +21,10 @@ mod wall;
 mod tests;
 
 pub use device::signal_mark;
-pub use keys::Action;
 
-use self::{
-    actions::{notice, write},
-    compare::Compare,
-    keys::page_keys,
-    procedures::Procedures,
-    program::Cell,
-    runs::Runs,
-    sets::Source,
-    table::Table,
-};
+use self::{compare::Compare, procedures::Procedures, program::Cell, runs::Runs, table::Table};
 use crate::ui::tabs::prelude::*;
-use crate::{
-    history::Series,
-    plant::parameter_set,
-    ui::{keys::find, layout::Size},
-};
+use crate::{history::Series, plant::parameter_set, ui::layout::Size};
 
 /// The small trend is asked for again after this time.
 const TREND_EVERY: SignedDuration = SignedDuration::from_secs(10);
@@ -116,80 +102,6 @@ impl TabView for Controllers {
     fn new(snapshot: &Snapshot) -> Controllers {
         let page = if snapshot.def.devices.len() == 1 { Page::Device } else { Page::List };
         Controllers::on_page(page, DeviceId(0), Table::default())
-    }
-
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let Some(action) = find(&page_keys(&self.page), event) else { return Vec::new() };
-        let Some(device) = cx.def().devices.get(self.device.index()) else { return Vec::new() };
-        match action {
-            Action::Guide => {
-                let before = std::mem::replace(&mut self.page, Page::List);
-                self.page = Page::Guide(0, Box::new(before));
-            }
-            Action::Turn(by) => {
-                if let Page::Guide(page, _) = &mut self.page {
-                    *page = page.saturating_add_signed(by).min(guide::count() - 1);
-                }
-            }
-            Action::Device(by) if self.page == Page::Lamps => self.show_lamps(cx, by),
-            Action::Device(by) => self.show(DeviceId(to_u16(around(device.id.index(), by, cx.def().devices.len())))),
-            Action::Move(motion) => self.move_by(cx, device, motion),
-            Action::Wall => self.wall = Some(!self.is_wall(cx)),
-            Action::Column(by) if self.page == Page::List => {
-                let last = cx.def().devices.len().saturating_sub(1);
-                self.device = DeviceId(to_u16(device.id.index().saturating_add_signed(by).min(last)));
-            }
-            Action::Column(by) => self.cell.column = self.cell.column.saturating_add_signed(by).min(2),
-            Action::Open => return self.open_selected(cx, device),
-            Action::Lamps if lamps::has_any(cx, device) => self.page = Page::Lamps,
-            Action::Lamps => return notice(device, t!("this device has no bits to show as lamps")),
-            Action::Program if device.program.is_some() => self.page = Page::Program,
-            Action::Program => return notice(device, t!("this device has no ramp/soak program")),
-            Action::Sets if cx.is_past() => return notice(device, t!("parameter sets are shown in the present only")),
-            Action::Sets => (self.page, self.set) = (Page::Sets, 0),
-            Action::Runs if cx.snapshot.has_runs(device.id) => {
-                (self.page, self.runs) = (Page::Runs, Runs::default());
-            }
-            Action::Runs => return notice(device, t!("this device has no SV and PV")),
-            Action::Procedures if cx.is_past() || cx.def().procedures.is_empty() => {
-                return notice(device, procedures::why_none(cx));
-            }
-            Action::Procedures => self.page = Page::Procedures,
-            Action::Abort => return self.procedures.abort(cx),
-            Action::Trend => return self.runs.trend(cx, device.id).into_iter().collect(),
-            Action::Mark => self.runs.mark(),
-            Action::Overlay => self.swap_overlay(cx, device.id),
-            Action::Tag(by) => self.runs.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by)),
-            Action::Find => {
-                self.asked_for = Asked::Filter;
-                let (title, hint) = (t!("find a parameter"), t!("words in name or meaning; empty shows all"));
-                return open(Modal::Prompt(Prompt::new(title, hint, &self.table.filter.to_string())));
-            }
-            Action::Defaults => self.table.defaults = !self.table.defaults,
-            Action::Save => {
-                self.asked_for = Asked::SetName;
-                let title = t!("save the settings of {name} as a set", name = device.name);
-                return open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")));
-            }
-            Action::All | Action::SwapDirection => return self.in_compare(cx, action),
-            Action::Why
-            | Action::Refresh
-            | Action::Actions
-            | Action::Tune
-            | Action::Run
-            | Action::Line
-            | Action::Settings
-            | Action::Control(_)
-            | Action::Mode
-            | Action::Pattern
-            | Action::Stop
-            | Action::ReadSets => return self.on_device(cx, device, action),
-        }
-        self.on_snapshot(cx)
-    }
-
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        self.page_hints(cx)
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
@@ -326,16 +238,6 @@ impl TabView for Controllers {
             (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
             (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
         }
-    }
-
-    #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
-        let compare = Page::Compare(Compare::new(Source::Set(String::new())));
-        let guide = Page::Guide(0, Box::new(Page::List));
-        let runs = [Page::Runs, Page::Procedures, Page::Overlay(Box::new(Page::Runs))];
-        let pages = [Page::List, Page::Device, Page::Lamps, Page::Program, Page::Sets, compare, guide];
-        let pages = pages.into_iter().chain(runs);
-        pages.map(|page| ("controllers", crate::ui::keys::chords_of(&page_keys(&page)))).collect()
     }
 }
 

@@ -32,42 +32,23 @@ pub struct Faults {
     verdict: bool,
 }
 
-/// What a key does here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Select another row.
-    Move(Motion),
-    /// Select the first row of the next target.
-    NextTarget,
-    /// Inject or clear the fault.
-    Toggle,
-    /// Increase the parameter, or decrease it.
-    Parameter(bool),
-    /// Clear all faults.
-    ClearAll,
-    /// Points or fault.
-    Verdict,
-}
+/// A row of the tables here.
+type Key = crate::ui::keys::Key<Faults>;
 
 /// Keys of this tab.
-const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Up), "", "select the fault above", Action::Move(Motion::Rows(-1))),
-    Key::new(code(KeyCode::Down), "select", "select the fault below", Action::Move(Motion::Rows(1))),
-    Key::new(code(KeyCode::PageDown), "", "select the next line, unit or the process", Action::NextTarget),
-    Key::new(code(KeyCode::Enter), "on/off", "inject or clear the fault", Action::Toggle),
-    Key::new(code(KeyCode::Left), "", "decrease its parameter", Action::Parameter(false)),
-    Key::new(code(KeyCode::Right), "number", "increase its parameter", Action::Parameter(true)),
-    Key::new(char('c'), "clear all", "clear all faults", Action::ClearAll),
-    Key::new(char('v'), "points", "score of the drill, or the fault", Action::Verdict),
+const KEYS: &[Key] = &[
+    Key::change(code(KeyCode::Up), "", "select the fault above", |faults, cx| faults.step(cx, -1)),
+    Key::change(code(KeyCode::Down), "select", "select the fault below", |faults, cx| faults.step(cx, 1)),
+    Key::change(code(KeyCode::PageDown), "", "select the next line, unit or the process", Faults::next_target),
+    Key::new(code(KeyCode::Enter), "on/off", "inject or clear the fault", Faults::toggle),
+    Key::new(code(KeyCode::Left), "", "decrease its parameter", |faults, cx| faults.change_parameter(cx, false)),
+    Key::new(code(KeyCode::Right), "number", "increase its parameter", |faults, cx| faults.change_parameter(cx, true)),
+    Key::new(char('c'), "clear all", "clear all faults", |_, cx| cleared(cx, SimCommand::ClearAll)),
+    Key::change(char('v'), "points", "score of the drill, or the fault", |faults, _| faults.verdict = !faults.verdict)
+        .when(|_, cx| Offer::only_if(extension::state::<Status>(cx).is_some_and(|status| status.scenario.is_some()))),
 ];
 
 impl TabView for Faults {
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let drill = extension::state::<Status>(cx).is_some_and(|status| status.scenario.is_some());
-        let there = KEYS.iter().filter(|key| drill || key.action != Action::Verdict).copied();
-        keys::hints(&there.collect::<Vec<_>>())
-    }
-
     fn fingerprint(&self, cx: &ViewContext) -> Rows {
         let Some(status) = open(cx) else { return Rows::default() };
         let rows = rows(status);
@@ -85,49 +66,59 @@ impl TabView for Faults {
         Faults::default()
     }
 
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default()
-    }
-
     fn is_offered(cx: &ViewContext) -> bool {
         !session_lock::is_closed(cx.session) && open(cx).is_some()
+    }
+}
+
+impl KeyTable for Faults {
+    fn keys(&self, _cx: &ViewContext) -> Keys<Faults> {
+        Keys::of(&[KEYS])
     }
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        vec![("faults", keys::chords_of(KEYS))]
+        vec![("faults", Keys::of(&[KEYS]).chords())]
     }
 }
 
 impl Faults {
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let Some(status) = open(cx) else { return Vec::new() };
+    fn step(&mut self, cx: &ViewContext, by: isize) {
+        let count = open(cx).map_or(0, |status| rows(status).len());
+        self.selected = Motion::Rows(by).to(self.selected.min(count.saturating_sub(1)), count, 1);
+    }
+
+    fn next_target(&mut self, cx: &ViewContext) {
+        let Some((status, target, _)) = self.selected(cx) else { return };
         let rows = rows(status);
-        let Some((target, offered)) = rows.get(self.selected.min(rows.len().saturating_sub(1))).copied() else {
-            return Vec::new();
-        };
-        let fault = self.number(status, target, offered);
-        let active = status.find(target, fault).is_some();
-        match action {
-            Action::Move(motion) => self.selected = motion.to(self.selected, rows.len(), 1),
-            Action::NextTarget => {
-                self.selected =
-                    rows.iter().skip(self.selected).position(|row| row.0 != target).map_or(0, |by| self.selected + by);
+        self.selected += rows.iter().skip(self.selected).position(|row| row.0 != target).unwrap_or(0);
+    }
+
+    fn toggle(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        match self.selected(cx) {
+            Some((status, target, fault)) if status.find(target, fault).is_some() => {
+                cleared(cx, SimCommand::Clear(target, fault))
             }
-            Action::Toggle if active => return cleared(cx, SimCommand::Clear(target, fault)),
-            Action::Toggle => return send(SimCommand::Inject(target, fault)),
-            Action::Parameter(more) => {
-                let other = fault.step(more);
-                self.numbers.insert((target, fault.word()), other);
-                // An active fault changes at once.
-                if active && other != fault {
-                    return send(SimCommand::Inject(target, other));
-                }
-            }
-            Action::ClearAll => return cleared(cx, SimCommand::ClearAll),
-            Action::Verdict => self.verdict = !self.verdict && status.scenario.is_some(),
+            Some((_, target, fault)) => send(SimCommand::Inject(target, fault)),
+            None => Vec::new(),
         }
-        Vec::new()
+    }
+
+    fn change_parameter(&mut self, cx: &ViewContext, more: bool) -> Vec<UiAction> {
+        let Some((status, target, fault)) = self.selected(cx) else { return Vec::new() };
+        let other = fault.step(more);
+        self.numbers.insert((target, fault.word()), other);
+        // An active fault changes at once.
+        let changes = other != fault && status.find(target, fault).is_some();
+        if changes { send(SimCommand::Inject(target, other)) } else { Vec::new() }
+    }
+
+    /// The selected fault and its target.
+    fn selected<'a>(&self, cx: &ViewContext<'a>) -> Option<(&'a Status, FaultTarget, InjectedFault)> {
+        let status = open(cx)?;
+        let rows = rows(status);
+        let (target, offered) = *rows.get(self.selected.min(rows.len().saturating_sub(1)))?;
+        Some((status, target, self.number(status, target, offered)))
     }
 
     /// The fault with its present or chosen parameter.

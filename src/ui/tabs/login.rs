@@ -10,22 +10,25 @@ use crate::{
     ui::modal::user_form::{Purpose, UserForm},
 };
 
-/// What a key means while a user is logged in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Another password for oneself.
-    Password,
-    /// Lock this terminal.
-    Lock,
-    /// Log out.
-    Leave,
-}
+/// A row of the tables here.
+type Key = crate::ui::keys::Key<Login>;
 
-/// Keys of this tab while a user is logged in; a form takes every letter.
-const KEYS: &[Key<Action>] = &[
-    Key::new(char('p'), "password", "change your password", Action::Password),
-    Key::new(char('k'), "lock", "lock this terminal, as Ctrl-K does on every tab", Action::Lock),
-    Key::new(char('o'), "log out", "log out of this terminal", Action::Leave),
+/// Keys of this tab while a user is logged in.
+const KEYS: &[Key] = &[
+    Key::change(char('p'), "password", "change your password", Login::change_password),
+    Key::new(char('k'), "lock", "lock this terminal, as Ctrl-K does on every tab", |login, cx| {
+        login.request(cx, SessionRequest::Lock)
+    }),
+    Key::new(char('o'), "log out", "log out of this terminal", |login, cx| login.request(cx, SessionRequest::Logout)),
+];
+
+/// A form takes every key but those that lead out of it.
+const FORM: Below<Login> =
+    Below { hints: |login, _| login.form.as_ref().map_or(Vec::new(), UserForm::hints), press: Login::on_typed };
+const LEAVE: &[Key] = &[
+    Key::elsewhere(code(KeyCode::Esc), "back", "").when(|login, cx| Offer::only_if(login.leads_back(cx))),
+    Key::elsewhere(code(KeyCode::Esc), "clear", "").when(|login, cx| Offer::only_if(!login.leads_back(cx))),
+    Key::elsewhere(keys::ctrl('c'), "quit", ""),
 ];
 
 /// State of this tab.
@@ -44,28 +47,10 @@ pub struct Login {
 }
 
 impl TabView for Login {
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let Some(form) = &mut self.form else {
-            return keys::find(KEYS, event).map(|action| self.act(cx, action)).unwrap_or_default();
-        };
-        let Some(request) = form.press(cx, event) else { return Vec::new() };
-        if let SessionRequest::Login { password, .. } = &request {
-            self.given = Some(password.clone());
-        }
-        vec![UiAction::SessionRequest(Tab::Login, request)]
-    }
-
     fn on_paste(&mut self, text: &str) {
         if let Some(form) = &mut self.form {
             form.paste(text);
         }
-    }
-
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let Some(form) = &self.form else { return keys::hints(KEYS) };
-        let leads = if self.changing || cx.session.may_view || cx.session.locked { t!("back") } else { t!("clear") };
-        let quit = Hint::new("Ctrl-C", t!("quit"), "");
-        form.hints().into_iter().chain([Hint::new("Esc", leads, ""), quit]).collect()
     }
 
     fn on_request_done(&mut self, cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
@@ -99,28 +84,47 @@ impl TabView for Login {
     fn is_offered(_cx: &ViewContext) -> bool {
         true
     }
+}
+
+impl KeyTable for Login {
+    fn keys(&self, _cx: &ViewContext) -> Keys<Login> {
+        if self.form.is_some() { Keys::below(&FORM).and(Keys::of(&[LEAVE])) } else { Keys::of(&[KEYS]) }
+    }
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        vec![("login", keys::chords_of(KEYS))]
+        vec![("login", Keys::of(&[KEYS]).chords())]
     }
 }
 
 impl Login {
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
+    fn change_password(&mut self, cx: &ViewContext) {
+        if cx.session.who.is_some() {
+            (self.outcome, self.changing) = (None, true);
+            self.fit(cx.session);
+        }
+    }
+
+    fn request(&mut self, cx: &ViewContext, request: SessionRequest) -> Vec<UiAction> {
         if cx.session.who.is_none() {
             return Vec::new();
         }
         self.outcome = None;
-        match action {
-            Action::Password => {
-                self.changing = true;
-                self.fit(cx.session);
-                Vec::new()
-            }
-            Action::Lock => vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)],
-            Action::Leave => vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Logout)],
+        vec![UiAction::SessionRequest(Tab::Login, request)]
+    }
+
+    /// A key of the form.
+    fn on_typed(&mut self, cx: &ViewContext, event: KeyEvent) -> Option<Vec<UiAction>> {
+        let Some(request) = self.form.as_mut()?.press(cx, event) else { return Some(Vec::new()) };
+        if let SessionRequest::Login { password, .. } = &request {
+            self.given = Some(password.clone());
         }
+        Some(vec![UiAction::SessionRequest(Tab::Login, request)])
+    }
+
+    /// Does Esc lead out of the form? Else it is emptied.
+    fn leads_back(&self, cx: &ViewContext) -> bool {
+        self.changing || cx.session.may_view || cx.session.locked
     }
 
     /// Does a form take every key?

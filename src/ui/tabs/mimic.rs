@@ -1,11 +1,11 @@
 //! The mimic tab: the process at a glance, and the few commands that it is driven by.
 
-mod actions;
 mod attention;
 mod cards;
 mod command;
 mod companions;
 mod forecast;
+mod keys;
 mod may_change;
 mod neighbour;
 mod overview;
@@ -18,7 +18,6 @@ mod totals;
 #[cfg(test)]
 mod tests;
 
-pub use actions::{Action, KEYS};
 pub use command::command_of;
 use companions::{Companions, Parts, parts};
 use neighbour::neighbour;
@@ -29,13 +28,10 @@ use shift::Shift;
 
 use crate::ui::tabs::prelude::*;
 use crate::{
-    access::right,
     history::Series,
     plant::def::{MimicItem, Picture},
     ui::{
         layout::Size,
-        rights,
-        tabs::line_switch,
         widgets::mimic::{CanvasScale, bar, list, panel, pipe, tags, title, trend, unit, vessel},
     },
 };
@@ -70,34 +66,8 @@ impl TabView for Mimic {
         Mimic::default()
     }
 
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let commands = cx.def().mimic.commands.iter();
-        let commands = commands.map(|command| {
-            Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label)).needs(
-                match command.value {
-                    Some(value) => {
-                        right::needs(cx.def(), &CommandKind::Write { tag: command.tag, value: value.into() })
-                    }
-                    None => rights::to_write(cx, [command.tag]),
-                },
-            )
-        });
-        let mut table = KEYS.to_vec();
-        let pages = cx.def().mimic.pages.len();
-        keys::hide(
-            &mut table,
-            &[(Action::Page(1), pages < 2), (Action::Overview, pages == 0 || cx.size < Size::Normal)],
-        );
-        commands.chain([Hint::new("←↑↓→", t!("select"), t!("select an item"))]).chain(keys::hints(&table)).collect()
-    }
-
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        let item = self.selected.and_then(|n| self.shown(cx, cx.area).0.items.get(n));
-        let tags = match self.is_overview(cx) {
-            true => self.overview.card(cx).map_or(Vec::new(), |card| card.tags),
-            false => item.map_or(Vec::new(), |item| tags(cx, item)),
-        };
-        tags.into_iter().map(|tag| value::line(cx, tag)).collect()
+        self.selected_tags(cx).into_iter().flatten().map(|tag| value::line(cx, tag)).collect()
     }
 
     fn on_point(&mut self, cx: &ViewContext, at: Position) -> bool {
@@ -184,17 +154,21 @@ impl TabView for Mimic {
             }
         }
     }
+}
 
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        match keys::find(KEYS, event) {
-            Some(action) => self.act(cx, action),
-            None => open(command_of(cx, event)),
-        }
+impl KeyTable for Mimic {
+    fn keys(&self, _cx: &ViewContext) -> Keys<Mimic> {
+        Keys::below(&keys::PLANT).and(Keys::of(&[keys::KEYS]))
+    }
+
+    /// A selection is of the picture that was drawn.
+    fn after_key(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
+        Vec::new()
     }
 
     #[cfg(test)]
-    fn chords() -> keys::PageChords {
-        vec![("mimic", keys::chords_of(KEYS))]
+    fn chords() -> crate::ui::keys::PageChords {
+        vec![("mimic", Keys::of(&[keys::KEYS]).chords())]
     }
 }
 
@@ -243,64 +217,6 @@ impl Mimic {
     pub fn show_page(&mut self, cx: &ViewContext, page: usize) -> Vec<UiAction> {
         self.page = page;
         self.on_snapshot(cx)
-    }
-
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        if self.is_overview(cx) {
-            return self.act_on_overview(cx, action);
-        }
-        let (picture, parts) = self.shown(cx, cx.area);
-        let items = &picture.items;
-        let listed = list::is_shown(cx, picture, parts.picture);
-        match action {
-            Action::Move(dx, dy) if listed => self.selected = list::neighbour(cx, items, self.selected, (dx, dy)),
-            Action::Move(dx, dy) => self.selected = neighbour(items, self.selected, (dx, dy)),
-            Action::Motion => self.still = !self.still,
-            Action::Overview if cx.size < Size::Normal => {}
-            Action::Overview => {
-                self.at_a_glance = true;
-                return self.on_snapshot(cx);
-            }
-            Action::Page(by) => {
-                let pages = cx.def().mimic.pages.len();
-                return if pages > 1 { self.show_page(cx, around(self.page, by, pages)) } else { Vec::new() };
-            }
-            Action::Actuators => return command::actuators(cx),
-            Action::Line => {
-                return line_switch::open(cx, self.selected.and_then(|n| items.get(n)).map(|item| tags(cx, item)));
-            }
-            Action::Why => {
-                self.selected = self.selected.or_else(|| neighbour(items, None, (1, 0)));
-                let item = self.selected.and_then(|n| items.get(n));
-                return Why::open(item.and_then(|item| Why::of_all(cx, tags(cx, item))));
-            }
-            Action::Open => match self.selected.and_then(|n| items.get(n)) {
-                Some(MimicItem::Link { page, .. }) => return self.show_page(cx, *page),
-                item => {
-                    let faceplate = item.and_then(|item| Faceplate::new(title(cx, item), tags(cx, item)));
-                    return open(faceplate.map(Modal::Faceplate));
-                }
-            },
-        }
-        Vec::new()
-    }
-
-    fn act_on_overview(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        match action {
-            Action::Move(dx, dy) => self.overview.on_move(cx, &self.shift, (dx, dy)),
-            Action::Motion | Action::Page(_) => {}
-            Action::Actuators => return command::actuators(cx),
-            Action::Line => return line_switch::open(cx, self.overview.card(cx).map(|card| card.tags)),
-            Action::Overview => {
-                self.at_a_glance = false;
-                return self.on_snapshot(cx);
-            }
-            Action::Why => return Why::open(self.overview.card(cx).and_then(|card| Why::of_all(cx, card.tags))),
-            Action::Open => {
-                return self.overview.card(cx).map(|card| UiAction::ShowDevice(card.device)).into_iter().collect();
-            }
-        }
-        Vec::new()
     }
 
     /// Selects the first item that shows one of these tags, on whatever page; none if the mimic has none of them.

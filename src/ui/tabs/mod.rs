@@ -27,7 +27,7 @@ use ratatui::{
 
 use super::{
     Effect, UiAction, ViewContext,
-    keys::{self, Hint},
+    keys::{self, Hint, Keys},
     last_frame::Rows,
     layout::Size,
     session_lock,
@@ -60,8 +60,8 @@ impl Outgoing {
     }
 }
 
-/// What every tab answers. A new tab is a file with this trait and a row of [`tabs!`].
-pub trait TabView {
+/// What every tab answers. A new tab is a file with this trait and [`KeyTable`], and a row of [`tabs!`].
+pub trait TabView: Keyed {
     /// The tab as it is at the start.
     fn new(snapshot: &Snapshot) -> Self
     where
@@ -74,12 +74,6 @@ pub trait TabView {
     {
         !session_lock::is_closed(cx.session)
     }
-
-    /// A key that no window and no key of every tab has taken; one that is in no table does nothing.
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction>;
-
-    /// The keys of the moment, for footer and help.
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint>;
 
     /// Draws it.
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect);
@@ -150,12 +144,49 @@ pub trait TabView {
     fn on_saved(&mut self, _cx: &ViewContext, _result: Result<PathBuf, String>) -> Vec<UiAction> {
         Vec::new()
     }
+}
+
+/// The keys of a tab.
+pub trait KeyTable: TabView + Sized + 'static {
+    /// Those of the moment.
+    fn keys(&self, cx: &ViewContext) -> Keys<Self>;
 
     /// The chords of each page, for the test that no key means two things.
     #[cfg(test)]
-    fn chords() -> keys::PageChords
-    where
-        Self: Sized;
+    fn chords() -> keys::PageChords;
+
+    /// A key was pressed: what the last one led to has been read.
+    fn before_key(&mut self) {}
+
+    /// A key of the table has changed the tab, which queries what it now shows.
+    fn after_key(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_snapshot(cx)
+    }
+
+    /// Are keys that write not offered?
+    fn reads_only(&self, _cx: &ViewContext) -> bool {
+        false
+    }
+}
+
+/// A tab that is driven by the rows of its tables, and by nothing else.
+pub trait Keyed {
+    /// A key that no window and no key of every tab has taken; `None` where it is none of the tab.
+    fn press(&mut self, cx: &ViewContext, event: KeyEvent) -> Option<Vec<UiAction>>;
+
+    /// The keys of the moment, for footer, help and palette.
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint>;
+}
+
+impl<T: KeyTable> Keyed for T {
+    fn press(&mut self, cx: &ViewContext, event: KeyEvent) -> Option<Vec<UiAction>> {
+        self.before_key();
+        self.keys(cx).press(self, cx, event, T::after_key)
+    }
+
+    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        self.keys(cx).hints(self, cx, self.reads_only(cx))
+    }
 }
 
 /// The table of tabs, in the order of their number keys from 0: name, field, state, title, help.
@@ -186,7 +217,7 @@ macro_rules! tabs {
             /// The chords of each of its pages.
             #[cfg(test)]
             pub fn chords(self) -> keys::PageChords {
-                match self { $(Tab::$tab => <$state>::chords()),+ }
+                match self { $(Tab::$tab => <$state as KeyTable>::chords()),+ }
             }
         }
 

@@ -11,7 +11,7 @@ pub(super) use ratatui::{
 };
 
 pub(super) use super::{
-    Tab, TabView,
+    KeyTable, Keyed, Tab, TabView,
     draw::{self, around, open, row_style},
     periodic_query::{Answered, FromAnswer, PeriodicQuery, real},
     reports::period,
@@ -31,7 +31,7 @@ pub(super) use crate::{
     text::{said, translate},
     ui::{
         UiAction, ViewContext,
-        keys::{self, Hint, Key, char, code},
+        keys::{self, Below, Hint, Keys, Offer, char, code},
         last_frame::Rows,
         modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why},
         widgets::{

@@ -29,14 +29,9 @@ mod tests;
 use std::{collections::BTreeMap, path::PathBuf};
 
 #[cfg(test)]
-pub use self::page::chords_of_page;
+pub use self::keys::chords_of_page;
 pub use self::watch::start::{Start, parse_all as parse_watched};
-use self::{
-    cells::Cells,
-    keys::{Action, table},
-    names::Names,
-    recognise::Recognition,
-};
+use self::{cells::Cells, names::Names, recognise::Recognition};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -44,11 +39,7 @@ use crate::{
         tag::{ByteOrder, Table},
     },
     profile::OwnProfiles,
-    ui::{
-        Effect,
-        keys::{find, hints},
-        tabs::bus,
-    },
+    ui::Effect,
 };
 
 /// An answer that is not there after so long is asked for again: the line has dropped it.
@@ -171,77 +162,6 @@ impl TabView for Registers {
         view::copied(self, cx)
     }
 
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        if self.watch.has_graph() {
-            return match find(&keys::log(cx), event) {
-                Some(_) if !self.watch.is_shown_log() => self.toggle_log(cx),
-                Some(_) | None => self.graph_key(cx, event),
-            };
-        }
-        let Some(action) = find(&table(cx), event) else { return Vec::new() };
-        match action {
-            Action::Move(motion) => self.scroll(cx, motion),
-            Action::Table(by) => {
-                let at = TABLES.iter().position(|table| *table == self.table).unwrap_or(0);
-                self.table = TABLES[around(at, by, TABLES.len())];
-            }
-            Action::Order => self.order = next(&ByteOrder::ALL, self.order),
-            Action::Base => self.base = next(&[Base::Modicon, Base::Zero, Base::One], self.base),
-            Action::Pause => self.paused = !self.paused,
-            Action::Faster => self.change_period(-1),
-            Action::Slower => self.change_period(1),
-            Action::Relearn => self.relearn = true,
-            Action::Watch => {
-                let refused = self.toggle_watch();
-                if !refused.is_empty() {
-                    return refused;
-                }
-            }
-            Action::Graph => {
-                let refused = self.open_graph(cx);
-                if !refused.is_empty() {
-                    return refused;
-                }
-            }
-            Action::Name => return self.ask_name(),
-            Action::Log => return self.toggle_log(cx),
-            Action::Names => self.apply_names(cx),
-            Action::Save => return self.ask_save(),
-            Action::Load => {
-                let hint =
-                    t!("a file: CSV, or columns with address, name, type, scale, unit. Or paste the list into the tab");
-                return self.ask_text(Asking::List, t!("load a register list"), hint);
-            }
-            Action::Write => return self.ask_write(),
-            Action::Add(by) => return self.add(by),
-            Action::Undo => return self.undo(cx),
-            Action::Writes => return vec![self.writing.window(cx, &self.names)],
-            Action::GoTo => {
-                let hint = t!("1002, 0x3EA, 41003, or input:1000");
-                return self.ask_text(Asking::Address, t!("go to address"), hint);
-            }
-            Action::Unit => return self.ask_unit(cx),
-            Action::Compare => return self.toggle_comparison(),
-            Action::Sweep => return bus::ask_sweep(cx, self.line, self.unit, self.table),
-            Action::Find => {
-                let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
-                return self.ask_text(Asking::Value, t!("find a value in what was read"), hint);
-            }
-        }
-        self.read_now(cx)
-    }
-
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        if self.watch.is_shown_log() {
-            return hints(&watch::graph::keys());
-        }
-        if self.watch.has_graph() {
-            let back = Hint::new("Esc", t!("back"), t!("back to the registers"));
-            return hints(&watch::graph::keys()).into_iter().chain(hints(&keys::log(cx))).chain([back]).collect();
-        }
-        hints(&table(cx))
-    }
-
     fn back(&mut self, _cx: &ViewContext) -> bool {
         self.watch.close_graph()
     }
@@ -360,15 +280,6 @@ impl TabView for Registers {
 
     fn on_log_failed(&mut self, why: &str) {
         self.watch.on_lost(why);
-    }
-
-    #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
-        let graph = crate::ui::keys::chords_of(&watch::graph::keys()).into_iter();
-        let log = keys::KEYS.iter().copied().filter(|key| key.action == Action::Log).collect::<Vec<_>>();
-        let graph = graph.chain(crate::ui::keys::chords_of(&log)).collect();
-        let all = [&motions!("", Action::Move), keys::KEYS].concat();
-        vec![("registers", crate::ui::keys::chords_of(&all)), ("graph", graph)]
     }
 }
 

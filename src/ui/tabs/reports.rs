@@ -22,70 +22,60 @@ use crate::{
     ui::{tabs::trends::span::View, widgets::chart},
 };
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// The shift so many further on.
-    Shift(isize),
-    /// The running shift.
-    Running,
-    /// Any period.
-    Free,
-    /// Scroll.
-    Move(Motion),
-    /// Write the CSV.
-    Export,
-    /// The next format.
-    Format,
-    /// The other way to write CSV.
-    Dialect,
-    /// The report as it will be written, or its figures again.
-    Preview,
-    /// Ask the history again.
-    Refresh,
-    /// Why the values of the report are what they are now.
-    Why,
-    /// The list of batches.
-    Batches,
-    /// The list of automatic reports.
-    Made,
-    /// The rows of the record.
-    Rows,
-    /// The other columns of the figures.
-    Columns,
-    /// Show or hide what was not annunciated.
-    Quiet,
-    /// The chart of the tag so many rows further on.
-    Tag(isize),
-}
+/// A row of the tables here.
+type Key = crate::ui::keys::Key<Reports>;
 
 /// Keys of this tab.
-const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "earlier", "previous shift", Action::Shift(-1)),
-    Key::new(code(KeyCode::Right), "later", "next shift", Action::Shift(1)),
-    Key::new(char('l'), "running", "current shift", Action::Running),
-    Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
-    Key::new(char('e'), "export", "write the report to a file", Action::Export).needs(Role::Technician),
-    Key::new(char('f'), "format", "next format: CSV, text, HTML, Excel, Word, …", Action::Format),
-    Key::new(char('p'), "preview", "the report as text, as it is written", Action::Preview),
-    Key::new(char('n'), "rows", "date, time, SV, PV and ER, row by row", Action::Rows),
-    Key::new(char(';'), "", "CSV with , and . or with ; and ,", Action::Dialect),
-    Key::new(char('r'), "automatic", "the reports that the station makes by itself", Action::Made),
-    Key::new(char('t'), "tag", "chart of the next tag (110 columns or more)", Action::Tag(1)),
-    Key::new(char('T'), "", "chart of the previous tag", Action::Tag(-1)),
-    Key::new(char('c'), "", "the other columns (narrower than 80)", Action::Columns),
-    Key::new(char('d'), "", "show or hide the alarm events that were not annunciated", Action::Quiet),
-    Key::new(char('u'), "", "refresh the figures", Action::Refresh),
-    Key::new(char('w'), "", "explain its current values", Action::Why),
+const KEYS: &[Key] = &[
+    Key::change(code(KeyCode::Left), "earlier", "previous shift", |reports, cx| reports.step(cx, -1)),
+    Key::change(code(KeyCode::Right), "later", "next shift", |reports, cx| reports.step(cx, 1)),
+    Key::change(char('l'), "running", "current shift", |reports, cx| {
+        reports.show(period::at(cx.def(), cx.now));
+        reports.follow = true;
+    }),
+    Key::new(char('/'), "period", "any period: from-to, a day, a shift", |_, _| {
+        open(Modal::Prompt(Prompt::new(t!("report of a period"), period::FORMS, "")))
+    }),
+    Key::new(char('e'), "export", "write the report to a file", Reports::export).needs(Role::Technician),
+    Key::change(char('f'), "format", "next format: CSV, text, HTML, Excel, Word, …", |reports, _| {
+        let place = report::FORMATS.iter().position(|format| format.name() == reports.format.name());
+        reports.format = report::FORMATS[place.map_or(0, |place| place + 1) % report::FORMATS.len()];
+    }),
+    Key::change(char('p'), "preview", "the report as text, as it is written", |reports, cx| {
+        (reports.preview, reports.scroll) = (reports.preview.is_none().then(Vec::new), Scroll::default());
+        reports.set_preview(cx);
+    }),
+    Key::change(char('n'), "rows", "date, time, SV, PV and ER, row by row", |reports, _| {
+        (reports.rows.shown, reports.export) = (true, Export::Not);
+    }),
+    Key::change(char(';'), "", "CSV with , and . or with ; and ,", |reports, cx| {
+        (reports.dialect, reports.export) = (reports.dialect.toggled(cx.def().report.csv), Export::Not);
+    }),
+    Key::change(char('r'), "automatic", "the reports that the station makes by itself", |reports, _| {
+        (reports.made.shown, reports.export) = (true, Export::Not);
+        reports.made.list.query.want();
+    }),
+    Key::change(char('t'), "tag", "chart of the next tag (110 columns or more)", |reports, _| reports.next_tag(1)),
+    Key::change(char('T'), "", "chart of the previous tag", |reports, _| reports.next_tag(-1)),
+    Key::change(char('c'), "", "the other columns (narrower than 80)", |reports, _| {
+        reports.later_columns = !reports.later_columns;
+    }),
+    Key::change(char('d'), "", "show or hide the alarm events that were not annunciated", |reports, _| {
+        reports.quiet = !reports.quiet;
+    }),
+    Key::change(char('u'), "", "refresh the figures", |reports, _| reports.report.query.want()),
+    Key::new(char('w'), "", "explain its current values", |reports, cx| {
+        let rows = reports.report.value.iter().flat_map(|report| &report.tags);
+        Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()))
+    }),
 ];
 
 /// The key of a plant that makes batches.
-const BATCHES: &[Key<Action>] = &[Key::new(char('b'), "batches", "the list of batches", Action::Batches)];
-
-fn table(cx: &ViewContext) -> Vec<Key<Action>> {
-    let batches = if cx.def().batches.is_empty() { &[] } else { BATCHES };
-    [KEYS, batches, &motions!("", Action::Move)].concat()
-}
+const BATCHES: &[Key] = &[Key::change(char('b'), "batches", "the list of batches", |reports, _| {
+    (reports.batches.shown, reports.export) = (true, Export::Not);
+    reports.batches.rows.query.want();
+})];
+const SCROLL: [Key; 6] = motions!("", Reports::scroll);
 
 /// How often the figures of a running shift are refreshed, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 30.0;
@@ -215,25 +205,6 @@ impl TabView for Reports {
         }
     }
 
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        self.dismiss();
-        if self.made.shown {
-            let Some(action) = keys::find(&self.made.keys(), event) else { return Vec::new() };
-            self.made.act(cx, action);
-            return self.ask(cx);
-        }
-        if self.rows.shown {
-            let action = keys::find(&rows::keys(), event);
-            return action.map(|action| self.act_on_rows(cx, action)).unwrap_or_default();
-        }
-        match (self.batches.shown, &self.batches.overlay) {
-            (true, Some(_)) => keys::find(batches::OVERLAY_KEYS, event).map(|action| self.act_on_overlay(cx, action)),
-            (true, None) => keys::find(&batches::keys(), event).map(|action| self.act_on_batches(cx, action)),
-            (false, _) => keys::find(&table(cx), event).map(|action| self.act(cx, action)),
-        }
-        .unwrap_or_default()
-    }
-
     fn back(&mut self, cx: &ViewContext) -> bool {
         if self.made.shown {
             self.made.shown = self.made.open.take().is_some();
@@ -251,87 +222,56 @@ impl TabView for Reports {
     fn copied(&self, _cx: &ViewContext) -> Vec<String> {
         if self.made.shown { self.made.copied() } else { Vec::new() }
     }
+}
 
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        if self.made.shown {
-            return keys::hints(&self.made.keys());
-        }
-        if self.rows.shown {
-            return keys::hints(&rows::keys());
-        }
-        match (self.batches.shown, &self.batches.overlay) {
-            (true, Some(_)) => keys::hints(batches::OVERLAY_KEYS),
-            (true, None) => keys::hints(&batches::keys()),
-            (false, _) => keys::hints(&table(cx)),
-        }
+impl KeyTable for Reports {
+    fn keys(&self, cx: &ViewContext) -> Keys<Reports> {
+        let tables: &[&'static [Key]] = if self.made.shown {
+            self.made.keys()
+        } else if self.rows.shown {
+            rows::KEYS
+        } else if self.batches.shown {
+            self.batches.keys()
+        } else if cx.def().batches.is_empty() {
+            &[KEYS, &SCROLL]
+        } else {
+            &[KEYS, BATCHES, &SCROLL]
+        };
+        Keys::of(tables)
+    }
+
+    fn before_key(&mut self) {
+        self.dismiss();
     }
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        let report = [KEYS, BATCHES, &motions!("", Action::Move)].concat();
-        let pages =
-            [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(batches::OVERLAY_KEYS))];
-        let made = [("made", keys::chords_of(&made::list_keys())), ("text", keys::chords_of(&made::text_keys()))];
-        let rows = [("rows", keys::chords_of(&rows::keys()))];
-        [("reports", keys::chords_of(&report))].into_iter().chain(rows).chain(pages).chain(made).collect()
+        let pages: [(_, &[&'static [Key]]); 6] = [
+            ("reports", &[KEYS, BATCHES, &SCROLL]),
+            ("rows", rows::KEYS),
+            ("batches", batches::LIST),
+            ("overlay", batches::OVERLAY),
+            ("made", made::LIST),
+            ("text", made::TEXT),
+        ];
+        pages.map(|(name, tables)| (name, Keys::of(tables).chords())).to_vec()
     }
 }
 
 impl Reports {
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        match action {
-            Action::Shift(by) => {
-                if let Some(next) = period::step(cx, self.period.as_ref(), by) {
-                    self.show(Some(next));
-                }
-            }
-            Action::Running => {
-                self.show(period::at(cx.def(), cx.now));
-                self.follow = true;
-            }
-            Action::Free => {
-                return open(Modal::Prompt(Prompt::new(t!("report of a period"), period::FORMS, "")));
-            }
-            Action::Move(motion) => self.scroll(cx, motion),
-            Action::Export => return self.export(cx),
-            Action::Format => {
-                let place = report::FORMATS.iter().position(|format| format.name() == self.format.name());
-                self.format = report::FORMATS[place.map_or(0, |place| place + 1) % report::FORMATS.len()];
-            }
-            Action::Preview => {
-                (self.preview, self.scroll) = (self.preview.is_none().then(Vec::new), Scroll::default());
-                self.set_preview(cx);
-            }
-            Action::Dialect => {
-                self.dialect = self.dialect.toggled(cx.def().report.csv);
-                self.export = Export::Not;
-            }
-            Action::Columns => self.later_columns = !self.later_columns,
-            Action::Quiet => self.quiet = !self.quiet,
-            Action::Refresh => self.report.query.want(),
-            Action::Tag(by) => {
-                let rows = self.report.value.as_ref().map_or(0, |report| report.tags.len());
-                (self.charted, self.curve) = (around(self.charted, by, rows), Answered::default());
-            }
-            Action::Batches => {
-                (self.batches.shown, self.export) = (true, Export::Not);
-                self.batches.rows.query.want();
-            }
-            Action::Made => {
-                (self.made.shown, self.export) = (true, Export::Not);
-                self.made.list.query.want();
-            }
-            Action::Rows => (self.rows.shown, self.export) = (true, Export::Not),
-            Action::Why => {
-                let rows = self.report.value.iter().flat_map(|report| &report.tags);
-                return Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()));
-            }
+    /// Shows the shift so many further on.
+    fn step(&mut self, cx: &ViewContext, by: isize) {
+        if let Some(next) = period::step(cx, self.period.as_ref(), by) {
+            self.show(Some(next));
         }
-        self.ask(cx)
     }
-}
 
-impl Reports {
+    /// The chart is of the tag so many rows further on.
+    fn next_tag(&mut self, by: isize) {
+        let rows = self.report.value.as_ref().map_or(0, |report| report.tags.len());
+        (self.charted, self.curve) = (around(self.charted, by, rows), Answered::default());
+    }
+
     /// Sets the report that is shown as text, if it is wanted.
     fn set_preview(&mut self, cx: &ViewContext) {
         if let (Some(lines), Some(report)) = (&mut self.preview, &self.report.value) {

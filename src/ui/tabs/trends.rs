@@ -29,12 +29,10 @@ use std::{
     path::PathBuf,
 };
 
-pub use self::keys::{Action, KEYS, LIST};
 use self::{
     cursors::Between,
     events::Events,
     export::Export,
-    overlay::OVERLAY,
     pens::PenScale,
     plots::Plot,
     response::Response,
@@ -50,7 +48,6 @@ use crate::{
     },
     ui::{
         graphics::Picture,
-        keys::{find, hide, hints},
         widgets::chart::{self, stroke::Stroke, trace::Trace},
     },
 };
@@ -216,16 +213,6 @@ impl TabView for Trends {
         view::draw(self, cx, frame, area);
     }
 
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        self.export.said = None;
-        if self.overlay.is_some() {
-            return find(OVERLAY, event).map(|action| self.act_on_overlay(cx, action)).unwrap_or_default();
-        }
-        find(if self.values.is_some() { LIST } else { KEYS }, event)
-            .map(|action| self.act(cx, action))
-            .unwrap_or_default()
-    }
-
     fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
         self.recorded(answer)
     }
@@ -243,107 +230,9 @@ impl TabView for Trends {
         }
         Ok(self.ask(cx))
     }
-
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        if self.overlay.is_some() {
-            return hints(OVERLAY);
-        }
-        if self.values.is_some() {
-            // In a replay Esc leads back here before it ends the past.
-            let back = cx.is_past().then(|| Hint::new("Esc", t!("back"), t!("previous page")));
-            return back.into_iter().chain(hints(LIST)).collect();
-        }
-        let keys = KEYS.iter().filter(|key| !cx.is_past() || !key.action.is_of_present());
-        let mut keys: Vec<_> = keys.copied().collect();
-        let lacks = cx.theme.graphics.protocol(cx.preferences.pictures).is_err() || self.plot != Plot::Time;
-        hide(&mut keys, &[(Action::Image, lacks)]);
-        let close = self.pictured.then(|| Hint::new("Esc", t!("close"), t!("close the picture, as every key does")));
-        close.into_iter().chain(hints(&keys)).collect()
-    }
-
-    #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
-        let overlay = ("overlay", crate::ui::keys::chords_of(OVERLAY));
-        [KEYS, LIST].map(|keys| ("trends", crate::ui::keys::chords_of(keys))).into_iter().chain([overlay]).collect()
-    }
 }
 
 impl Trends {
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        match (self.values, action) {
-            (Some((first, row)), Action::Move(motion)) => self.select_value(cx, first, row, motion),
-            (Some((_, row)), Action::Open) => {
-                if let Some(tag) = self.listed(cx).get(row) {
-                    self.open_value(cx, *tag);
-                }
-            }
-            (Some((_, row)), Action::Toggle) => self.pick(cx, row),
-            (_, Action::Find) => return self.ask_filter(),
-            (Some((_, row)), Action::Why) => return Why::open(Why::new(self.listed(cx), row)),
-            (None, Action::Why) => {
-                let pens = self.pens(cx).into_iter().map(|pen| pen.tag).collect();
-                return Why::open(Why::new(pens, self.selected));
-            }
-            (_, Action::Values) => {
-                self.values = if self.values.is_some() { None } else { Some((0, 0)) };
-                self.hours.query.want();
-            }
-            (Some(_), _) => {}
-            (None, Action::Side(by)) if cx.is_past() => return self.replay_by(self.cell(cx), by),
-            (None, Action::Move(Motion::Pages(by))) if cx.is_past() => {
-                return self.replay_by(SignedDuration::from_secs(WINDOWS[self.window]), by);
-            }
-            (None, Action::Live) if cx.is_past() => self.go_to_moment(cx, cx.now),
-            // The instant of the replay is in the view with the cursor on it, and nothing moves.
-            (None, action) if cx.is_past() && action.is_of_present() => {}
-            (None, Action::Side(by)) => self.step(cx, by),
-            (None, Action::Move(Motion::Pages(by))) => self.pan(cx, 4 * by),
-            (None, Action::Move(motion)) => self.selected = motion.to(self.selected, self.pens(cx).len(), 1),
-            (None, Action::Toggle) => self.toggle(cx),
-            (None, Action::Open) => self.zoom_to_cursors(cx),
-            (None, Action::Zoom(by)) => self.zoom(cx, by),
-            (None, Action::Group) => self.next_group(cx),
-            (None, Action::Mode) => self.toggle_mode(),
-            (None, Action::Hold) => self.hold(cx),
-            (None, Action::Revisit(direction)) => self.revisit(direction),
-            (None, Action::Rate) => self.rate = (self.rate + 1) % RATES.len(),
-            (None, Action::Cursor) => {
-                self.cursor = if self.cursor.is_some() { None } else { Some(cx.now) };
-                self.between.clear();
-            }
-            (None, Action::Event(by)) => self.go_to_event(cx, by),
-            (None, Action::CursorB) => self.toggle_cursor_b(cx),
-            (None, Action::Csv) => self.export_csv(cx),
-            (None, Action::Picture) => return self.export_picture(cx),
-            (None, Action::Plot) => self.plot = self.plot.next(),
-            (None, Action::Numbers) => {
-                self.plot = if self.plot == Plot::Numbers { Plot::Time } else { Plot::Numbers };
-            }
-            (None, Action::Image) => return self.show_picture(cx),
-            (None, Action::Stroke) => self.next_stroke(cx),
-            (None, Action::Scale) => return self.ask_scale(cx),
-            (None, Action::Overlay) => return self.ask_overlay(),
-            (None, Action::GoTo) => {
-                self.asking = Asking::Time;
-                let prompt = Prompt::new(t!("Go to a time"), t!("03:12   2026-11-20   2026-11-20 22:00-06:00"), "");
-                return vec![UiAction::Open(Modal::Prompt(prompt))];
-            }
-            (None, Action::Live) => self.go_live(),
-        }
-        self.ask(cx)
-    }
-
-    /// Has the chart drawn as the terminal's own picture, or says why not.
-    fn show_picture(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let why = match cx.theme.graphics.protocol(cx.preferences.pictures) {
-            Ok(_) if self.plot == Plot::Time => None,
-            Ok(_) => Some(t!("Only the chart over time is shown as a picture")),
-            Err(why) => Some(why.words()),
-        };
-        self.pictured = why.is_none();
-        why.map(UiAction::Note).into_iter().collect()
-    }
-
     /// The picture over the chart, while one is wanted.
     pub fn picture(&self, cx: &ViewContext) -> Option<Picture> {
         self.pictured.then(|| picture::on_screen(self, cx)).flatten()

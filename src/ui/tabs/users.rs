@@ -3,7 +3,7 @@
 mod audit;
 mod view;
 
-use audit::{Action as AuditAction, Audit};
+use audit::Audit;
 
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -14,37 +14,33 @@ use crate::{
     },
 };
 
-/// What a key means on the list of users.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Select another row.
-    Move(Motion),
-    /// Add a user.
-    Add,
-    /// Another role.
-    Role,
-    /// Disable, or enable.
-    Disable,
-    /// A new first password.
-    Reset,
-    /// Remove.
-    Delete,
-    /// The list of all that was done.
-    Audit,
-}
+/// A row of the tables here.
+type Key = crate::ui::keys::Key<Users>;
 
+const MOVE: [Key; 6] = motions!("select", Users::select);
 /// Keys of the list of users.
-const LIST: &[Key<Action>] = &[
-    Key::new(char('n'), "new", "add a user", Action::Add),
-    Key::new(char('r'), "role", "another role for the selected user", Action::Role),
-    Key::new(char('d'), "disable", "disable or enable the selected user (clears a lockout)", Action::Disable),
-    Key::new(char('p'), "password", "a new first password for the selected user", Action::Reset),
-    Key::new(char('x'), "delete", "delete the selected user (asks for the name)", Action::Delete),
-    Key::new(char('j'), "audit log", "all operator actions: what, by whom, from where", Action::Audit),
+const LIST: &[Key] = &[
+    Key::new(char('n'), "new", "add a user", Users::add)
+        .when(|_, cx| if cx.session.users.is_empty() { Offer::Unlisted } else { Offer::Footer }),
+    Key::new(char('r'), "role", "another role for the selected user", |users, cx| users.form(cx, UserForm::role_of))
+        .when(has_users),
+    Key::new(char('d'), "disable", "disable or enable the selected user (clears a lockout)", Users::disable)
+        .when(has_users),
+    Key::new(char('p'), "password", "a new first password for the selected user", |users, cx| {
+        users.form(cx, |row| UserForm::new(Purpose::Reset(row.user.clone())))
+    })
+    .when(has_users),
+    Key::new(char('x'), "delete", "delete the selected user (asks for the name)", |users, cx| {
+        users.form(cx, |row| UserForm::new(Purpose::Delete(row.user.clone())))
+    })
+    .when(has_users),
+    Key::change(char('j'), "audit log", "all operator actions: what, by whom, from where", |users, _| {
+        users.audit = Some(Audit::default());
+    }),
 ];
 
-fn list_keys() -> Vec<Key<Action>> {
-    [&motions!("select", Action::Move), LIST].concat()
+fn has_users(_: &Users, cx: &ViewContext) -> Offer {
+    Offer::only_if(!cx.session.users.is_empty())
 }
 
 /// State of this tab.
@@ -59,35 +55,6 @@ pub struct Users {
 }
 
 impl TabView for Users {
-    fn on_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        match &mut self.audit {
-            Some(audit) => match keys::find(&audit::keys(), event) {
-                Some(AuditAction::Back) => {
-                    self.audit = None;
-                    Vec::new()
-                }
-                Some(action) => {
-                    let mut acts = audit.on_key(cx, action);
-                    acts.extend(self.on_snapshot(cx));
-                    acts
-                }
-                None => Vec::new(),
-            },
-            None => keys::find(&list_keys(), event).map(|action| self.act(cx, action)).unwrap_or_default(),
-        }
-    }
-
-    fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        if self.audit.is_some() {
-            return keys::hints(&audit::keys());
-        }
-        let mut keys = list_keys();
-        if cx.session.users.is_empty() {
-            keys.retain(|key| key.action == Action::Audit);
-        }
-        keys::hints(&keys)
-    }
-
     fn back(&mut self, _cx: &ViewContext) -> bool {
         self.audit.take().is_some()
     }
@@ -136,49 +103,57 @@ impl TabView for Users {
         let supervisor = cx.session.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
         !session_lock::is_closed(cx.session) && supervisor
     }
+}
+
+impl KeyTable for Users {
+    fn keys(&self, cx: &ViewContext) -> Keys<Users> {
+        match (&self.audit, cx.session.users.as_slice()) {
+            (Some(_), _) => Keys::of(audit::KEYS),
+            (None, []) => Keys::of(&[LIST]),
+            (None, _) => Keys::of(&[&MOVE, LIST]),
+        }
+    }
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        vec![("users", keys::chords_of(&list_keys())), ("audit", keys::chords_of(&audit::keys()))]
+        vec![("users", Keys::of(&[&MOVE, LIST]).chords()), ("audit", Keys::of(audit::KEYS).chords())]
     }
 }
 
 impl Users {
-    fn act(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let users = &cx.session.users;
-        let place = self.place(cx);
-        let row = users.get(place);
-        let form = match (action, row) {
-            (Action::Move(motion), _) => {
-                let room = usize::from(cx.area.height.saturating_sub(1));
-                self.selected.on(motion, users.iter().map(|row| row.user.clone()), room);
-                None
-            }
-            (Action::Audit, _) => {
-                self.audit = Some(Audit::default());
-                return self.on_snapshot(cx);
-            }
-            // Only a Supervisor sees this page: a station with users has at least one.
-            (Action::Add, None) => {
-                let words = [
-                    t!("This station has no users."),
-                    t!("A demonstration needs no login; a station started with `sightglass run` has users."),
-                ];
-                let notice = Notice::new(t!("add a user"), words.map(str::to_owned).to_vec());
-                return open(Modal::Notice(notice));
-            }
-            (Action::Add, Some(_)) => Some(UserForm::new(Purpose::Add)),
-            (Action::Role, Some(row)) => Some(UserForm::role_of(row)),
-            (Action::Disable, Some(row)) => {
-                let locked_out = row.locked_until.is_some_and(|until| until > cx.now);
-                let disable = !row.disabled && !locked_out;
-                Some(UserForm::new(Purpose::Disable(row.user.clone(), disable)))
-            }
-            (Action::Reset, Some(row)) => Some(UserForm::new(Purpose::Reset(row.user.clone()))),
-            (Action::Delete, Some(row)) => Some(UserForm::new(Purpose::Delete(row.user.clone()))),
-            (Action::Role | Action::Disable | Action::Reset | Action::Delete, None) => None,
-        };
-        open(form.map(|form| Modal::UserForm(Box::new(form))))
+    fn select(&mut self, cx: &ViewContext, motion: Motion) {
+        let room = usize::from(cx.area.height.saturating_sub(1));
+        self.selected.on(motion, cx.session.users.iter().map(|row| row.user.clone()), room);
+    }
+
+    fn add(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        if !cx.session.users.is_empty() {
+            return self.form(cx, |_| UserForm::new(Purpose::Add));
+        }
+        // Only a Supervisor sees this page: a station with users has at least one.
+        let words = [
+            t!("This station has no users."),
+            t!("A demonstration needs no login; a station started with `sightglass run` has users."),
+        ];
+        open(Modal::Notice(Notice::new(t!("add a user"), words.map(str::to_owned).to_vec())))
+    }
+
+    fn disable(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.form(cx, |row| {
+            let locked_out = row.locked_until.is_some_and(|until| until > cx.now);
+            UserForm::new(Purpose::Disable(row.user.clone(), !row.disabled && !locked_out))
+        })
+    }
+
+    /// Opens a form about the selected user.
+    fn form(&self, cx: &ViewContext, form: impl FnOnce(&UserRow) -> UserForm) -> Vec<UiAction> {
+        let row = cx.session.users.get(self.place(cx));
+        open(row.map(|row| Modal::UserForm(Box::new(form(row)))))
+    }
+
+    /// Lets the audit list act, while it is shown.
+    fn in_audit<T: Default>(&mut self, act: impl FnOnce(&mut Audit) -> T) -> T {
+        self.audit.as_mut().map(act).unwrap_or_default()
     }
 
     /// The place of the selected user.

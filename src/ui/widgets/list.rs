@@ -1,6 +1,6 @@
 //! One list for every list: the keys that move in it, the selected row, the words of a filter, and the rows on the screen.
 
-use crossterm::event::KeyEvent;
+use crossterm::event::{KeyCode, KeyEvent};
 
 use crate::{plant::number::to_u16, text::searchable, ui::keys};
 
@@ -17,21 +17,21 @@ pub enum Motion {
     Last,
 }
 
-/// The rows of a key table that move in a list: `motions!("select", Action::Move)`.
+/// The rows of a key table that move in a list: `motions!("select", Alarms::select)`.
 macro_rules! motions {
-    ($label:literal, $action:path) => {{
+    ($label:literal, $move:expr) => {{
         use crossterm::event::KeyCode;
         use $crate::ui::{
             keys::{Key, code},
             widgets::list::Motion,
         };
         [
-            Key::new(code(KeyCode::Up), "", "a row up", $action(Motion::Rows(-1))),
-            Key::new(code(KeyCode::Down), $label, "a row down", $action(Motion::Rows(1))),
-            Key::new(code(KeyCode::PageUp), "", "a page up", $action(Motion::Pages(-1))),
-            Key::new(code(KeyCode::PageDown), "", "a page down", $action(Motion::Pages(1))),
-            Key::new(code(KeyCode::Home), "", "first row", $action(Motion::First)),
-            Key::new(code(KeyCode::End), "", "last row", $action(Motion::Last)),
+            Key::change(code(KeyCode::Up), "", "a row up", |page, cx| $move(page, cx, Motion::Rows(-1))),
+            Key::change(code(KeyCode::Down), $label, "a row down", |page, cx| $move(page, cx, Motion::Rows(1))),
+            Key::change(code(KeyCode::PageUp), "", "a page up", |page, cx| $move(page, cx, Motion::Pages(-1))),
+            Key::change(code(KeyCode::PageDown), "", "a page down", |page, cx| $move(page, cx, Motion::Pages(1))),
+            Key::change(code(KeyCode::Home), "", "first row", |page, cx| $move(page, cx, Motion::First)),
+            Key::change(code(KeyCode::End), "", "last row", |page, cx| $move(page, cx, Motion::Last)),
         ]
     }};
 }
@@ -40,7 +40,16 @@ pub(crate) use motions;
 impl Motion {
     /// The movement of a key in a window.
     pub fn from_key(event: KeyEvent) -> Option<Motion> {
-        keys::find(&motions!("", std::convert::identity), event)
+        let motion = match event.code {
+            KeyCode::Up => Motion::Rows(-1),
+            KeyCode::Down => Motion::Rows(1),
+            KeyCode::PageUp => Motion::Pages(-1),
+            KeyCode::PageDown => Motion::Pages(1),
+            KeyCode::Home => Motion::First,
+            KeyCode::End => Motion::Last,
+            _ => return None,
+        };
+        keys::code(event.code).is(event).then_some(motion)
     }
 
     /// The row that it leads to from row `at` of `count`, where the screen has `room` rows.

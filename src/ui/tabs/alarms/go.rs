@@ -3,7 +3,7 @@
 use super::*;
 
 impl Alarms {
-    pub(super) fn ask_text(&self) -> Vec<UiAction> {
+    pub(super) fn ask_text(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
         let prompt = match self.page {
             Page::Journal => Prompt::new(t!("search the journal"), journal::FORMS, &self.journal.typed()),
             Page::Active | Page::Suppressed | Page::System | Page::Metrics | Page::Handover => {
@@ -13,23 +13,54 @@ impl Alarms {
         open(Modal::Prompt(prompt))
     }
 
-    /// Leads to what the alarm watches.
-    pub(super) fn go(&self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let Some(id) = self.target(cx) else { return Vec::new() };
-        let raised = self.selected(cx).map_or(cx.now, |alarm| alarm.raised_at);
-        match (cx.def().alarm(id).subject, action) {
-            (Subject::Tag(tag), Action::Mimic) => vec![UiAction::ShowOnMimic(vec![tag])],
-            (Subject::Device(device), Action::Mimic) => {
-                vec![UiAction::ShowOnMimic(cx.def().tags_of(device).map(|tag| tag.id).collect())]
-            }
-            (Subject::Tag(tag), Action::Trend) => vec![UiAction::ShowOnTrends(tag, (raised, raised))],
-            (Subject::Tag(tag), Action::Controller) => vec![UiAction::ShowParameter(tag)],
-            (Subject::Device(device), Action::Controller) => vec![UiAction::ShowDevice(device)],
-            (Subject::Tag(tag), Action::Why) => Why::open(Why::new(vec![tag], 0)),
-            (Subject::Device(device), Action::Why) => Why::open(Why::of_device(cx, device)),
-            (subject, Action::Open) => open(Modal::Guidance(Box::new(Guidance::new(id, faceplate(cx, subject))))),
-            (Subject::Tag(_) | Subject::Device(_) | Subject::Line(_) | Subject::Station, _) => Vec::new(),
+    /// What the alarm watches that the keys of the page are about.
+    fn subject(&self, cx: &ViewContext) -> Option<Subject> {
+        self.target(cx).map(|id| cx.def().alarm(id).subject)
+    }
+
+    /// Acknowledges with a note: the marked ones, else the selected one.
+    pub(super) fn note(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let marked = self.marked(cx);
+        match self.selected(cx) {
+            _ if !marked.is_empty() => actions::acknowledge_all(cx, marked.into_iter(), true),
+            alarm => alarm.map_or_else(Vec::new, |alarm| actions::note(cx, alarm)),
         }
+    }
+
+    pub(super) fn open_guidance(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let guidance = |id| Guidance::new(id, faceplate(cx, cx.def().alarm(id).subject));
+        open(self.target(cx).map(|id| Modal::Guidance(Box::new(guidance(id)))))
+    }
+
+    pub(super) fn show_on_mimic(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let tags = match self.subject(cx) {
+            Some(Subject::Tag(tag)) => vec![tag],
+            Some(Subject::Device(device)) => cx.def().tags_of(device).map(|tag| tag.id).collect(),
+            Some(Subject::Line(_) | Subject::Station) | None => return Vec::new(),
+        };
+        vec![UiAction::ShowOnMimic(tags)]
+    }
+
+    pub(super) fn show_trend(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let Some(Subject::Tag(tag)) = self.subject(cx) else { return Vec::new() };
+        let raised = self.selected(cx).map_or(cx.now, |alarm| alarm.raised_at);
+        vec![UiAction::ShowOnTrends(tag, (raised, raised))]
+    }
+
+    pub(super) fn show_controller(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        match self.subject(cx) {
+            Some(Subject::Tag(tag)) => vec![UiAction::ShowParameter(tag)],
+            Some(Subject::Device(device)) => vec![UiAction::ShowDevice(device)],
+            Some(Subject::Line(_) | Subject::Station) | None => Vec::new(),
+        }
+    }
+
+    pub(super) fn why(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        Why::open(match self.subject(cx) {
+            Some(Subject::Tag(tag)) => Why::new(vec![tag], 0),
+            Some(Subject::Device(device)) => Why::of_device(cx, device),
+            Some(Subject::Line(_) | Subject::Station) | None => None,
+        })
     }
 }
 

@@ -1,166 +1,148 @@
 //! The keys of the alarms tab, page by page.
 
-use super::Page;
-use crate::ui::tabs::prelude::*;
+use super::{Alarms, Page, actions, filter};
+use crate::{plant::alarm::AlarmState, ui::tabs::prelude::*};
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Select another row, or scroll.
-    Move(Motion),
-    /// So many views further on.
-    View(isize),
-    /// The bell rings for new alarms, or not.
-    Bell,
-    /// Open the guidance of the alarm, whole.
-    Open,
-    /// Fold the first-out group of the alarm, or show it.
-    Fold(bool),
-    /// Mark the alarm for what is done with several, or take the mark off.
-    Mark,
-    /// The next order of the list.
-    Sort,
-    /// Acknowledge with a note.
-    Note,
-    /// Acknowledge all that is on this page of the list.
-    AcknowledgePage,
-    /// Shelve.
-    Shelve,
-    /// Take out of service.
-    OutOfService,
-    /// Unshelve, or put back in service.
-    PutBack,
-    /// Reset a latched alarm.
-    Reset,
-    /// Type words to filter or to search by.
-    Words,
-    /// The next priority.
-    Priority,
-    /// The next state.
-    State,
-    /// The next area.
-    Area,
-    /// Say why the value that the alarm watches is what it is.
-    Why,
-    /// Show what the alarm watches in the mimic.
-    Mimic,
-    /// Show the curve at the moment of the alarm.
-    Trend,
-    /// Show the device of the alarm.
-    Controller,
-    /// The journal of what the alarm watches; from the journal back to the list.
-    Journal,
-    /// Show or hide what was not annunciated.
-    Quiet,
-    /// The shift before or after.
-    Shift(isize),
-    /// The present.
-    Now,
-    /// Hand over to the next shift.
-    HandOver,
-    /// Take over from the shift before.
-    TakeOver,
-}
+/// A row of the tables here.
+type Key = crate::ui::keys::Key<Alarms>;
 
-type Row = Key<Action>;
+const MOVE: [Key; 6] = motions!("select", Alarms::step);
 
-const MOVE: [Row; 6] = motions!("select", Action::Move);
+/// Esc leaves the past once it leads nowhere back here.
+const PREVIOUS: [Key; 1] = [Key::elsewhere(code(KeyCode::Esc), "back", "previous page")
+    .when(|alarms, cx| Offer::only_if(cx.is_past() && alarms.leads_back()))];
 
-const VIEWS: [Row; 3] = [
-    Key::new(char('v'), "view", "next view: active, suppressed, system, journal, metrics, handover", Action::View(1)),
-    Key::new(char('V'), "", "previous view", Action::View(-1)),
-    Key::new(char('b'), "", "bell for new alarms on or off", Action::Bell),
+/// Keys of every tab, but here is where they are looked for.
+const EVERYWHERE: [Key; 2] = [
+    Key::elsewhere(char('a'), "ack", "acknowledge the selected alarm").needs(Role::Technician),
+    Key::elsewhere(char('A'), "all", "acknowledge all that are listed (asks first)").needs(Role::Technician),
 ];
 
-const RESET: [Row; 1] =
-    [Key::new(char('r'), "reset", "reset a latched alarm whose condition has cleared (asks first)", Action::Reset)
-        .needs(Role::Technician)];
+const VIEWS: [Key; 3] = [
+    Key::change(char('v'), "view", "next view: active, suppressed, system, journal, metrics, handover", |alarms, _| {
+        alarms.turn(1)
+    }),
+    Key::change(char('V'), "", "previous view", |alarms, _| alarms.turn(-1)),
+    Key::new(char('b'), "", "bell for new alarms on or off", |_, cx| actions::toggle_bell(cx)),
+];
 
-const ACTIONS: [Row; 11] = [
-    Key::new(char('n'), "note", "acknowledge with a note", Action::Note).needs(Role::Technician),
-    Key::new(char('z'), "shelve", "shelve the alarm for a time, with a reason", Action::Shelve).needs(Role::Technician),
-    Key::new(char('/'), "filter", "show only alarms with these words; Esc: show all", Action::Words),
-    Key::new(char('p'), "page", "acknowledge all on this page of the list (asks first)", Action::AcknowledgePage)
-        .needs(Role::Technician),
-    Key::new(char(' '), "mark", "mark several alarms: a, n and z act on all marked ones; Esc: no marks", Action::Mark),
-    Key::new(code(KeyCode::Right), "expand", "show the consequences of a first-out group", Action::Fold(false)),
-    Key::new(code(KeyCode::Left), "fold", "hide the consequences of a first-out group", Action::Fold(true)),
-    Key::new(char('s'), "sort", "sort: most urgent first, latest first, by tag", Action::Sort),
+const RESET: [Key; 1] =
+    [Key::new(char('r'), "reset", "reset a latched alarm whose condition has cleared (asks first)", |alarms, cx| {
+        alarms.selected(cx).map_or_else(Vec::new, |alarm| actions::reset(cx, alarm))
+    })
+    .when(|alarms, cx| Offer::footer_if(alarms.selected(cx).is_some_and(|alarm| alarm.state.is_latched())))
+    .needs(Role::Technician)];
+
+const ACTIONS: [Key; 11] = [
+    Key::new(char('n'), "note", "acknowledge with a note", Alarms::note).needs(Role::Technician),
+    Key::new(char('z'), "shelve", "shelve the alarm for a time, with a reason", |alarms, cx| {
+        actions::shelve(cx, &alarms.meant(cx))
+    })
+    .needs(Role::Technician),
+    Key::new(char('/'), "filter", "show only alarms with these words; Esc: show all", Alarms::ask_text),
+    Key::new(char('p'), "page", "acknowledge all on this page of the list (asks first)", |alarms, cx| {
+        actions::acknowledge_all(cx, alarms.seen(cx).into_iter(), false)
+    })
+    .needs(Role::Technician),
+    Key::change(
+        char(' '),
+        "mark",
+        "mark several alarms: a, n and z act on all marked ones; Esc: no marks",
+        Alarms::mark,
+    ),
+    Key::change(code(KeyCode::Right), "expand", "show the consequences of a first-out group", |alarms, cx| {
+        alarms.fold(cx, false);
+    })
+    .when(|alarms, cx| Offer::footer_if(alarms.is_folded(cx, true))),
+    Key::change(code(KeyCode::Left), "fold", "hide the consequences of a first-out group", |alarms, cx| {
+        alarms.fold(cx, true);
+    })
+    .when(|alarms, cx| Offer::footer_if(alarms.is_folded(cx, false))),
+    Key::change(char('s'), "sort", "sort: most urgent first, latest first, by tag", |alarms, _| {
+        alarms.sort = alarms.sort.next();
+    }),
     Key::new(
         char('o'),
         "out of service",
         "take the alarm out of service until it is returned, with a reason",
-        Action::OutOfService,
+        |alarms, cx| alarms.selected(cx).map_or_else(Vec::new, |alarm| actions::out_of_service(cx, alarm.id)),
     )
     .needs(Role::Supervisor),
-    Key::new(char('f'), "", "filter: next priority", Action::Priority),
-    Key::new(char('d'), "", "filter: next state", Action::State),
+    Key::change(char('f'), "", "filter: next priority", |alarms, _| alarms.filter.next_priority()),
+    Key::change(char('d'), "", "filter: next state", |alarms, _| alarms.filter.next_state()),
 ];
 
-const AREA: [Row; 1] = [Key::new(char('g'), "area", "filter: next area", Action::Area)];
+const AREA: [Key; 1] = [Key::change(char('g'), "area", "filter: next area", |alarms, cx| match alarms.page {
+    Page::Journal => alarms.journal.next_area(cx),
+    _ => alarms.filter.next_area(cx.def()),
+})
+.when(|_, cx| Offer::footer_if(!filter::areas(cx.def()).is_empty()))];
 
-const OPEN: [Row; 1] = [Key::new(
+const OPEN: [Key; 1] = [Key::new(
     code(KeyCode::Enter),
     "guidance",
     "full guidance; ⏎ again: the faceplate of the alarm source",
-    Action::Open,
+    Alarms::open_guidance,
 )];
 
-const GO: [Row; 5] = [
-    Key::new(char('m'), "", "go to the mimic, with the source of the alarm selected", Action::Mimic),
-    Key::new(char('t'), "", "go to the trend at the time of the alarm", Action::Trend),
-    Key::new(char('c'), "", "go to the controller of the alarm", Action::Controller),
-    Key::new(char('j'), "journal", "journal of the alarm source", Action::Journal),
-    Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why),
+const GO: [Key; 5] = [
+    Key::new(char('m'), "", "go to the mimic, with the source of the alarm selected", Alarms::show_on_mimic),
+    Key::new(char('t'), "", "go to the trend at the time of the alarm", Alarms::show_trend),
+    Key::new(char('c'), "", "go to the controller of the alarm", Alarms::show_controller),
+    Key::change(char('j'), "journal", "journal of the alarm source", Alarms::turn_to_journal),
+    Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Alarms::why),
 ];
 
-const BACK: [Row; 1] =
-    [Key::new(char('u'), "return", "unshelve, or return to service", Action::PutBack).needs(Role::Technician)];
+const BACK: [Key; 1] = [Key::new(char('u'), "return", "unshelve, or return to service", |alarms, cx| {
+    alarms.suppressed(cx).map_or_else(Vec::new, |alarm| actions::put_back(cx, alarm))
+})
+.when(|alarms, cx| {
+    let state = alarms.suppressed(cx).map(|alarm| alarm.state);
+    Offer::footer_if(matches!(state, Some(AlarmState::Shelved | AlarmState::OutOfService)))
+})
+.needs(Role::Technician)];
 
-const SEARCH: [Row; 2] = [
-    Key::new(char('/'), "search", "search by words of tag, message, user; and by time: 06:00-14:00", Action::Words),
-    Key::new(char('j'), "list", "back to the list", Action::Journal),
+const SEARCH: [Key; 2] = [
+    Key::new(char('/'), "search", "search by words of tag, message, user; and by time: 06:00-14:00", Alarms::ask_text),
+    Key::change(char('j'), "list", "back to the list", Alarms::turn_to_journal),
 ];
 
-const QUIET: [Row; 1] = [Key::new(
+const QUIET: [Key; 1] = [Key::change(
     char('d'),
     "by design",
     "show or hide what was not annunciated: suppression by design, events of suppressed alarms",
-    Action::Quiet,
+    |alarms, _| alarms.journal.toggle_quiet(),
 )];
 
-const SHIFT: [Row; 3] = [
-    Key::new(code(KeyCode::Left), "", "previous shift", Action::Shift(-1)),
-    Key::new(code(KeyCode::Right), "shift", "next shift", Action::Shift(1)),
-    Key::new(char('l'), "now", "present", Action::Now),
+const SHIFT: [Key; 3] = [
+    Key::change(code(KeyCode::Left), "", "previous shift", |alarms, cx| alarms.shift(cx, -1)),
+    Key::change(code(KeyCode::Right), "shift", "next shift", |alarms, cx| alarms.shift(cx, 1)),
+    Key::change(char('l'), "now", "present", |alarms, cx| alarms.shift(cx, 0)),
 ];
 
-const HANDOVER: [Row; 2] = [
-    Key::new(char('n'), "hand over", "hand over the plant to the next shift, with a note", Action::HandOver)
-        .needs(Role::Technician),
-    Key::new(char('o'), "take over", "take over the plant from the previous shift", Action::TakeOver)
-        .needs(Role::Technician),
+const HANDOVER: [Key; 2] = [
+    Key::new(char('n'), "hand over", "hand over the plant to the next shift, with a note", |alarms, _| {
+        alarms.handover.want();
+        actions::hand_over()
+    })
+    .needs(Role::Technician),
+    Key::new(char('o'), "take over", "take over the plant from the previous shift", |alarms, cx| {
+        if alarms.handover.is_own(cx) {
+            return actions::own_handover();
+        }
+        alarms.handover.want();
+        actions::take_over(cx)
+    })
+    .needs(Role::Technician),
 ];
 
 /// The keys of a page, the most wanted ones first: these must not fall off a narrow footer.
-pub fn table(page: Page) -> Vec<Row> {
-    let parts: &[&[Row]] = match page {
-        Page::Active | Page::System => &[&RESET, &VIEWS, &OPEN, &ACTIONS, &AREA, &MOVE, &GO],
-        Page::Suppressed => &[&BACK, &VIEWS, &OPEN, &MOVE, &GO],
-        Page::Journal => &[&SEARCH, &VIEWS, &QUIET, &AREA, &SHIFT, &MOVE],
-        Page::Metrics => &[&VIEWS, &SHIFT, &MOVE],
-        Page::Handover => &[&HANDOVER, &VIEWS, &SHIFT, &MOVE],
-    };
-    parts.concat()
-}
-
-/// Keys of every tab, but here is where they are looked for.
-pub fn everywhere(page: Page) -> Vec<Hint> {
-    match page {
-        Page::Active | Page::System => vec![
-            Hint::new("a", t!("ack"), t!("acknowledge the selected alarm")).needs(Role::Technician),
-            Hint::new("A", t!("all"), t!("acknowledge all that are listed (asks first)")).needs(Role::Technician),
-        ],
-        Page::Suppressed | Page::Journal | Page::Metrics | Page::Handover => Vec::new(),
-    }
+pub fn table(page: Page) -> Keys<Alarms> {
+    Keys::of(match page {
+        Page::Active | Page::System => &[&PREVIOUS, &EVERYWHERE, &RESET, &VIEWS, &OPEN, &ACTIONS, &AREA, &MOVE, &GO],
+        Page::Suppressed => &[&PREVIOUS, &BACK, &VIEWS, &OPEN, &MOVE, &GO],
+        Page::Journal => &[&PREVIOUS, &SEARCH, &VIEWS, &QUIET, &AREA, &SHIFT, &MOVE],
+        Page::Metrics => &[&PREVIOUS, &VIEWS, &SHIFT, &MOVE],
+        Page::Handover => &[&PREVIOUS, &HANDOVER, &VIEWS, &SHIFT, &MOVE],
+    })
 }

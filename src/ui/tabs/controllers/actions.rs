@@ -1,191 +1,254 @@
-//! What can be done with a device on any of its pages, and the windows that ask before it.
+//! What keys do with a device on its pages, and the windows that ask before it.
 
 use super::{
-    Action, Controllers, Page,
+    Asked, Controllers, Page,
     compare::Compare,
-    keys::{self, ProgramCommand, needing, page_keys},
-    lamps,
-    sets::Source,
+    guide,
+    keys::{run, tune},
+    lamps, procedures,
+    runs::Runs,
+    sets::{self, Source},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
     access::right,
-    plant::interlock::role_to_write,
+    plant::{def::ProgramDef, interlock::role_to_write},
     ui::{
-        keys::{hide, hints},
         modal::{Choice, Settings},
         rights,
         tabs::line_switch,
     },
 };
 
+/// What a key needs that is known only when it is pressed.
 impl Controllers {
-    /// What can be done with a device on any of its pages.
-    pub(super) fn on_device(&mut self, cx: &ViewContext, device: &DeviceDef, action: Action) -> Vec<UiAction> {
-        match action {
-            Action::Why if matches!(self.page, Page::Program) => {
-                let tag = device.program.as_ref().and_then(|program| self.cell.tag(program));
-                Why::open(Why::new(tag.into_iter().collect(), 0))
+    /// The device that is shown or selected.
+    pub(super) fn device<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a DeviceDef> {
+        cx.def().devices.get(self.device.index())
+    }
+
+    /// In the footer only for a device that has what the key is for.
+    pub(super) fn offer(&self, cx: &ViewContext, has: impl FnOnce(&DeviceDef) -> bool) -> Offer {
+        Offer::footer_if(self.device(cx).is_some_and(has))
+    }
+
+    /// The role that may write to this tag of the device.
+    pub(super) fn role_for(&self, cx: &ViewContext, tag: impl FnOnce(&DeviceDef) -> Option<TagId>) -> Option<Role> {
+        self.device(cx).and_then(tag).map(|tag| rights::to_write(cx, [tag]))
+    }
+
+    pub(super) fn role_for_actions(&self, cx: &ViewContext) -> Option<Role> {
+        let actions = &self.device(cx)?.actions;
+        actions.iter().map(|action| role_to_write(cx.def(), action.tag, action.value.into())).min()
+    }
+
+    pub(super) fn role_to_start(&self, cx: &ViewContext) -> Option<Role> {
+        let id = self.procedures.id(cx)?;
+        Some(right::needs(cx.def(), &CommandKind::StartProcedure(id)))
+    }
+
+    /// The tag of the selected cell of the program.
+    pub(super) fn cell_tag(&self, device: &DeviceDef) -> Option<TagId> {
+        self.cell.tag(device.program.as_ref()?)
+    }
+
+    /// The comparison that is shown.
+    pub(super) fn compared(&self) -> Option<&Compare> {
+        if let Page::Compare(compare) = &self.page { Some(compare) } else { None }
+    }
+
+    /// Acts on the device.
+    fn on_device(
+        &mut self,
+        cx: &ViewContext,
+        act: impl FnOnce(&mut Controllers, &DeviceDef) -> Vec<UiAction>,
+    ) -> Vec<UiAction> {
+        self.device(cx).map_or_else(Vec::new, |device| act(self, device))
+    }
+
+    /// Turns to a page of the device, or says why it has none.
+    fn turn_to(&mut self, cx: &ViewContext, page: Page, why_not: Option<&str>) -> Vec<UiAction> {
+        self.on_device(cx, |tab, device| match why_not {
+            Some(why) => notice(device, why),
+            None => {
+                tab.page = page;
+                Vec::new()
             }
-            Action::Why => {
-                let tags = self.table.rows(cx, device.id).into_iter().map(|tag| tag.id).collect();
-                Why::open(Why::new(tags, self.table.selected))
-            }
-            Action::Refresh => vec![UiAction::Command(CommandKind::Refresh(device.id))],
-            Action::Actions => {
-                let Some(list) = Choice::actions(cx, device.id) else {
-                    return notice(device, t!("this device has no actions"));
-                };
-                open(Notice::unreachable(cx, device.id).map_or(Modal::Choice(list), Modal::Notice))
-            }
-            Action::Tune => tune(cx, device),
-            Action::Run => match device.faceplate.as_ref().and_then(|faceplate| faceplate.run) {
-                Some(run) => write(cx, Some(run)),
-                None => notice(device, t!("this device cannot be put in standby from here")),
-            },
-            Action::Settings => open(Modal::Settings(Box::new(Settings::new(cx, device.line)))),
-            Action::Line => open(Modal::Confirm(line_switch::confirm(cx, device.line))),
-            Action::Control(command) => control(cx, device, command),
-            Action::Mode => write(cx, device.program.as_ref().and_then(|program| program.mode)),
-            Action::Pattern => write(cx, device.program.as_ref().and_then(|program| program.pattern)),
-            Action::Stop => vec![UiAction::Command(CommandKind::StopRestore(device.id))],
-            Action::ReadSets => vec![UiAction::Command(CommandKind::ReadSets)],
-            // Of one page: it has done them itself.
-            Action::Device(_)
-            | Action::Move(_)
-            | Action::Column(_)
-            | Action::Wall
-            | Action::Open
-            | Action::Lamps
-            | Action::Program
-            | Action::Sets
-            | Action::Find
-            | Action::Defaults
-            | Action::Guide
-            | Action::Turn(_)
-            | Action::Save
-            | Action::Runs
-            | Action::Procedures
-            | Action::Abort
-            | Action::Trend
-            | Action::Mark
-            | Action::Overlay
-            | Action::Tag(_)
-            | Action::All
-            | Action::SwapDirection => Vec::new(),
-        }
+        })
     }
 }
 
+/// What can be done with a device on any of its pages.
 impl Controllers {
-    /// The role that an action of a page needs because of what it writes; `None` where it writes nothing.
-    pub(super) fn role_for(&self, cx: &ViewContext, device: &DeviceDef, action: Action) -> Option<Role> {
-        let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
-        let written = match (action, &self.page) {
-            (Action::Open, Page::Device) => {
-                self.table.tag(cx, device.id).filter(|tag| tag.writable()).map(|tag| tag.id)
-            }
-            (Action::Open, Page::Program) => program.and_then(|program| self.cell.tag(program)),
-            (Action::Open, Page::Procedures) => {
-                let id = self.procedures.id(cx)?;
-                return Some(right::needs(cx.def(), &CommandKind::StartProcedure(id)));
-            }
-            (Action::Open, Page::Compare(compare)) => return compare.role_to_restore(cx, device),
-            (Action::Tune, _) => faceplate.and_then(|faceplate| faceplate.tune),
-            (Action::Run, _) => faceplate.and_then(|faceplate| faceplate.run),
-            (Action::Control(_), _) => program.map(|program| program.command),
-            (Action::Mode, _) => program.and_then(|program| program.mode),
-            (Action::Pattern, _) => program.and_then(|program| program.pattern),
-            (Action::Actions, _) => {
-                let roles =
-                    device.actions.iter().map(|action| role_to_write(cx.def(), action.tag, action.value.into()));
-                return roles.min();
-            }
-            _ => None,
-        };
-        written.map(|tag| rights::to_write(cx, [tag]))
+    pub(super) fn refresh(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |_, device| vec![UiAction::Command(CommandKind::Refresh(device.id))])
+    }
+
+    pub(super) fn why(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let tags = self.table.rows(cx, self.device).into_iter().map(|tag| tag.id).collect();
+        Why::open(Why::new(tags, self.table.selected))
+    }
+
+    pub(super) fn choose_action(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |_, device| match Choice::actions(cx, device.id) {
+            Some(list) => open(Notice::unreachable(cx, device.id).map_or(Modal::Choice(list), Modal::Notice)),
+            None => notice(device, t!("this device has no actions")),
+        })
+    }
+
+    pub(super) fn switch(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |_, device| open(Modal::Confirm(line_switch::confirm(cx, device.line))))
+    }
+
+    pub(super) fn open_settings(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |_, device| open(Modal::Settings(Box::new(Settings::new(cx, device.line)))))
+    }
+
+    /// Auto-tuning at work is stopped, else the window asks which kind is wanted.
+    pub(super) fn tune(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |_, device| {
+            let Some(tune) = tune(device) else { return notice(device, t!("this device has no auto-tuning")) };
+            let on = cx.snapshot.sample(tune).good_value().is_some_and(|value| value != 0.0);
+            if on { confirm(cx, tune, 0.0) } else { write(cx, Some(tune)) }
+        })
+    }
+
+    pub(super) fn toggle_standby(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |_, device| match run(device) {
+            Some(run) => write(cx, Some(run)),
+            None => notice(device, t!("this device cannot be put in standby from here")),
+        })
+    }
+
+    /// The window that writes a tag of the device.
+    pub(super) fn write(
+        &mut self,
+        cx: &ViewContext,
+        tag: impl FnOnce(&Controllers, &DeviceDef) -> Option<TagId>,
+    ) -> Vec<UiAction> {
+        self.on_device(cx, |tab, device| write(cx, tag(tab, device)))
+    }
+
+    /// Runs, holds or stops the program of the device.
+    pub(super) fn control(
+        &mut self,
+        cx: &ViewContext,
+        value: impl FnOnce(&ProgramDef) -> Option<f64>,
+    ) -> Vec<UiAction> {
+        self.on_device(cx, |_, device| match &device.program {
+            Some(program) => value(program).map_or_else(
+                || notice(device, t!("this program cannot be held")),
+                |value| confirm(cx, program.command, value),
+            ),
+            None => Vec::new(),
+        })
+    }
+
+    pub(super) fn open_parameter(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        match self.table.tag(cx, self.device) {
+            Some(tag) if tag.writable() => write(cx, Some(tag.id)),
+            Some(tag) => open(Faceplate::new(tag.label.clone(), vec![tag.id]).map(Modal::Faceplate)),
+            None => Vec::new(),
+        }
+    }
+
+    pub(super) fn ask_filter(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
+        self.asked_for = Asked::Filter;
+        let (title, hint) = (t!("find a parameter"), t!("words in name or meaning; empty shows all"));
+        open(Modal::Prompt(Prompt::new(title, hint, &self.table.filter.to_string())))
     }
 }
 
+/// The pages of a device.
 impl Controllers {
-    /// The keys of the page, without those that this device or this moment has no use for.
-    pub(super) fn page_hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        let mut keys = page_keys(&self.page);
-        let device = cx.def().devices.get(self.device.index());
-        if let Some(device) = device {
-            let (faceplate, program) = (device.faceplate.as_ref(), device.program.as_ref());
-            let copies = matches!(&self.page, Page::Compare(Compare { source: Source::Device(_), .. }));
-            // Nothing is written or sent on the line of another master, and it has no settings to try.
-            let listens = cx.def().listens_on(device.line);
-            let lacking = [
-                (Action::Refresh, listens),
-                (Action::Settings, listens),
-                (Action::Tune, faceplate.is_none_or(|faceplate| faceplate.tune.is_none())),
-                (Action::Run, faceplate.is_none_or(|faceplate| faceplate.run.is_none())),
-                (Action::Lamps, !lamps::has_any(cx, device)),
-                (Action::Program, program.is_none()),
-                (Action::Runs, !cx.snapshot.has_runs(device.id)),
-                (Action::Procedures, cx.def().procedures.is_empty() || cx.is_past()),
-                (Action::Abort, self.procedures.to_abort(cx).is_none()),
-                (Action::Actions, device.actions.is_empty()),
-                (Action::Defaults, cx.def().tags_of(device.id).all(|tag| tag.default.is_none())),
-                (Action::Control(keys::ProgramCommand::Hold), program.is_none_or(|program| program.halt.is_none())),
-                (Action::Stop, cx.snapshot.restore(device.id).is_none_or(|run| !run.at_work())),
-                (Action::SwapDirection, !copies),
-            ];
-            hide(&mut keys, &lacking);
-            keys.retain(|key| !listens || self.role_for(cx, device, key.action).is_none());
-            keys = needing(keys, |action| self.role_for(cx, device, action));
-        }
-        let mut hints = hints(&keys);
-        // On the page of a device there is no room left for a key that every operator tries anyway; in the past there is.
-        let leads_back = match self.page {
-            Page::List => false,
-            Page::Device => cx.is_past() && 1 < cx.def().devices.len(),
-            Page::Program | Page::Sets | Page::Compare(_) | Page::Guide(..) => true,
-            Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay(_) => true,
-        };
-        if leads_back {
-            let enter = keys.iter().position(|key| key.chord == code(KeyCode::Enter));
-            let place = enter.map_or(keys.len(), |enter| enter + 1);
-            hints.insert(place, Hint::new("Esc", t!("back"), t!("previous page")));
-        }
-        hints
+    pub(super) fn open_lamps(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let has_any = self.device(cx).is_some_and(|device| lamps::has_any(cx, device));
+        self.turn_to(cx, Page::Lamps, (!has_any).then_some(t!("this device has no bits to show as lamps")))
     }
-}
 
-/// Runs, holds or stops the program of a device.
-fn control(cx: &ViewContext, device: &DeviceDef, command: ProgramCommand) -> Vec<UiAction> {
-    let Some(program) = &device.program else { return Vec::new() };
-    let value = match command {
-        ProgramCommand::Run => Some(program.run),
-        ProgramCommand::Hold => program.halt,
-        ProgramCommand::Off => Some(program.off),
-    };
-    let cannot = || notice(device, t!("this program cannot be held"));
-    value.map_or_else(cannot, |value| confirm(cx, program.command, value))
+    pub(super) fn show_program(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let has_one = self.device(cx).is_some_and(|device| device.program.is_some());
+        self.turn_to(cx, Page::Program, (!has_one).then_some(t!("this device has no ramp/soak program")))
+    }
+
+    pub(super) fn show_sets(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.set = 0;
+        let past = t!("parameter sets are shown in the present only");
+        self.turn_to(cx, Page::Sets, cx.is_past().then_some(past))
+    }
+
+    pub(super) fn show_runs(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.runs = Runs::default();
+        let has_runs = cx.snapshot.has_runs(self.device);
+        self.turn_to(cx, Page::Runs, (!has_runs).then_some(t!("this device has no SV and PV")))
+    }
+
+    pub(super) fn show_procedures(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let none = cx.is_past() || cx.def().procedures.is_empty();
+        self.turn_to(cx, Page::Procedures, none.then(|| procedures::why_none(cx)))
+    }
+
+    pub(super) fn show_guide(&mut self, _cx: &ViewContext) {
+        let before = std::mem::replace(&mut self.page, Page::List);
+        self.page = Page::Guide(0, Box::new(before));
+    }
+
+    /// Turns the pages of the guide.
+    pub(super) fn turn(&mut self, by: isize) {
+        if let Page::Guide(page, _) = &mut self.page {
+            *page = page.saturating_add_signed(by).min(guide::count() - 1);
+        }
+    }
+
+    /// The selected set against the device.
+    pub(super) fn compare(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |tab, device| {
+            let Some(source) = sets::sources(cx, device).into_iter().nth(tab.set) else { return Vec::new() };
+            if let Some(notice) = sets::problems(cx, &source) {
+                return open(Modal::Notice(notice));
+            }
+            tab.page = Page::Compare(Compare::new(source));
+            Vec::new()
+        })
+    }
+
+    pub(super) fn restore(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let confirm = self.compared().and_then(|compare| Some(compare.restore(cx, self.device(cx)?)));
+        open(confirm.map(|confirm| confirm.map_or_else(Modal::Notice, Modal::Confirm)))
+    }
+
+    /// A copy the other way round: the target is chosen by opening its page.
+    pub(super) fn swap_direction(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |tab, device| {
+            let Some(Compare { source: Source::Device(other), .. }) = tab.compared() else {
+                return notice(device, t!("only a copy between two controllers can be turned around"));
+            };
+            tab.show(*other);
+            tab.page = Page::Compare(Compare::new(Source::Device(device.id)));
+            Vec::new()
+        })
+    }
+
+    pub(super) fn ask_set_name(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.on_device(cx, |tab, device| {
+            tab.asked_for = Asked::SetName;
+            let title = t!("save the settings of {name} as a set", name = device.name);
+            open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))
+        })
+    }
 }
 
 /// The window that writes a tag.
-pub(super) fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<UiAction> {
+fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<UiAction> {
     open(tag.and_then(|tag| Modal::write(cx, tag)))
 }
 
 /// The confirmation to write this value, unless nothing can be written now.
-pub(super) fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<UiAction> {
+fn confirm(cx: &ViewContext, tag: TagId, value: f64) -> Vec<UiAction> {
     let device = cx.def().tag(tag).device;
     open(Notice::unreachable(cx, device).map_or_else(|| Modal::Confirm(Confirm::write(cx, tag, value)), Modal::Notice))
 }
 
-/// Auto-tuning at work is stopped, else the window asks which kind is wanted.
-fn tune(cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
-    let Some(tune) = device.faceplate.as_ref().and_then(|faceplate| faceplate.tune) else {
-        return notice(device, t!("this device has no auto-tuning"));
-    };
-    let on = cx.snapshot.sample(tune).good_value().is_some_and(|value| value != 0.0);
-    if on { confirm(cx, tune, 0.0) } else { write(cx, Some(tune)) }
-}
-
-pub(super) fn notice(device: &DeviceDef, words: &str) -> Vec<UiAction> {
+fn notice(device: &DeviceDef, words: &str) -> Vec<UiAction> {
     open(Modal::Notice(Notice::new(device.name.clone(), vec![words.to_owned()])))
 }

@@ -1,241 +1,282 @@
-//! The keys of the controllers tab, page by page: footer, help and the check for clashes read these rows.
+//! The keys of the controllers tab, page by page.
 
-use super::Page;
+use super::{Controllers, Page, compare::Compare, lamps, sets::Source};
 use crate::ui::tabs::prelude::*;
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Show the device so many further on.
-    Device(isize),
-    /// Select another row, or scroll.
-    Move(Motion),
-    /// Select so many columns further on.
-    Column(isize),
-    /// The devices as faceplates, or as a table.
-    Wall,
-    /// Open, edit or write what is selected.
-    Open,
-    /// Say why the selected value is what it is.
-    Why,
-    /// Read everything now.
-    Refresh,
-    /// Pick one of the device's actions.
-    Actions,
-    /// Start or stop auto-tuning.
-    Tune,
-    /// Run or standby.
-    Run,
-    /// Close the device's line, or open it again.
-    Line,
-    /// Look at the communication settings of the device's line, and change them.
-    Settings,
-    /// Its bits as lamps.
-    Lamps,
-    /// The ramp/soak program.
-    Program,
-    /// The parameter sets.
-    Sets,
-    /// The control runs.
-    Runs,
-    /// The procedures of the plant.
-    Procedures,
-    /// Abort the one at work.
-    Abort,
-    /// The curves of the time of the selected run.
-    Trend,
-    /// Mark it for the overlay, or no longer.
-    Mark,
-    /// The marked ones over each other, or the list again.
-    Overlay,
-    /// The curves of another tag.
-    Tag(isize),
-    /// Only parameters with some words.
-    Find,
-    /// Mark what differs from the maker's default.
-    Defaults,
-    /// Words to read about control.
-    Guide,
-    /// So many pages of them on.
-    Turn(isize),
-    /// Run, hold or stop the program.
-    Control(ProgramCommand),
-    /// What the program does at its end.
-    Mode,
-    /// Which steps it runs.
-    Pattern,
-    /// Save the settings as a set.
-    Save,
-    /// Refresh the list of sets.
-    ReadSets,
-    /// Show what is the same too, or hide it.
-    All,
-    /// Copy the other way round.
-    SwapDirection,
-    /// Stop the restore at work.
-    Stop,
-}
+/// A row of the tables here.
+type Key = crate::ui::keys::Key<Controllers>;
 
-/// What a program is to do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ProgramCommand {
-    /// From the beginning, or on from a halt.
-    Run,
-    /// Stand still.
-    Hold,
-    /// Back to the fixed setpoint.
-    Off,
-}
-
-const SELECT: [Key<Action>; 6] = motions!("select", Action::Move);
-const SCROLL: [Key<Action>; 6] = motions!("scroll", Action::Move);
-const GUIDE: Key<Action> =
-    Key::new(char('h'), "guide", "what P, I, D, fuzzy and tuning do, and what to change", Action::Guide);
-const REFRESH: Key<Action> = Key::new(
+const SELECT: [Key; 6] = motions!("select", Controllers::step);
+const SCROLL: [Key; 6] = motions!("scroll", Controllers::step);
+const BACK: Key = Key::elsewhere(code(KeyCode::Esc), "back", "previous page");
+const GUIDE: Key =
+    Key::change(char('h'), "guide", "what P, I, D, fuzzy and tuning do, and what to change", Controllers::show_guide);
+const REFRESH: Key = Key::new(
     char('u'),
     "refresh",
     "read all parameters of the device now; retry it at once if it does not respond",
-    Action::Refresh,
+    Controllers::refresh,
 )
+.when(|tab, cx| Offer::footer_if(!tab.reads_only(cx)))
 .needs(Role::Technician);
-const WHY: Key<Action> = Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Action::Why);
-const ACTIONS: Key<Action> =
-    Key::new(char('f'), "actions", "actions of the device (save to memory)", Action::Actions).needs(Role::Technician);
-const LINE: Key<Action> =
-    Key::new(char('D'), "line", "disconnect the device's line, or connect it again (asks first)", Action::Line)
+const WHY: Key = Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Controllers::why);
+const ACTIONS: Key =
+    Key::new(char('f'), "actions", "actions of the device (save to memory)", Controllers::choose_action)
+        .when(|tab, cx| tab.offer(cx, |device| !device.actions.is_empty()))
+        .needs(Role::Technician)
+        .writes(Controllers::role_for_actions);
+const LINE: Key =
+    Key::new(char('D'), "line", "disconnect the device's line, or connect it again (asks first)", Controllers::switch)
         .needs(Role::Technician);
-const SETTINGS: Key<Action> = Key::new(
+const SETTINGS: Key = Key::new(
     char('c'),
     "settings",
     "communication settings of the device's line: baud rate, parity, timeout …",
-    Action::Settings,
-);
-
-const PROCEDURES_PAGE: Key<Action> = Key::new(
+    Controllers::open_settings,
+)
+.when(|tab, cx| Offer::footer_if(!tab.reads_only(cx)));
+const PROCEDURES_PAGE: Key = Key::new(
     char('e'),
     "procedures",
     "procedures: steps that the station carries out, and what they measured",
-    Action::Procedures,
-);
+    Controllers::show_procedures,
+)
+.when(|_, cx| Offer::footer_if(!cx.def().procedures.is_empty() && !cx.is_past()));
 
-const LIST: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "open", "faceplate and parameters of the device", Action::Open),
-    Key::new(char('v'), "view", "devices as faceplates or as a table", Action::Wall),
+const LIST: &[Key] = &[
+    Key::change(code(KeyCode::Enter), "open", "faceplate and parameters of the device", |tab, _| tab.show(tab.device)),
+    Key::change(char('v'), "view", "devices as faceplates or as a table", |tab, cx| {
+        tab.wall = Some(!tab.is_wall(cx));
+    }),
     REFRESH,
     GUIDE,
     WHY,
     SETTINGS,
     PROCEDURES_PAGE,
     LINE,
-    Key::new(code(KeyCode::Left), "", "the faceplate to the left", Action::Column(-1)),
-    Key::new(code(KeyCode::Right), "", "the faceplate to the right", Action::Column(1)),
+    Key::change(code(KeyCode::Left), "", "the faceplate to the left", |tab, cx| tab.neighbour(cx, -1)),
+    Key::change(code(KeyCode::Right), "", "the faceplate to the right", |tab, cx| tab.neighbour(cx, 1)),
 ];
-const DEVICE_FIRST: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "previous device", Action::Device(-1)),
-    Key::new(code(KeyCode::Right), "device", "next device", Action::Device(1)),
+const DEVICE_FIRST: &[Key] = &[
+    Key::change(code(KeyCode::Left), "", "previous device", |tab, cx| tab.next_device(cx, -1)),
+    Key::change(code(KeyCode::Right), "device", "next device", |tab, cx| tab.next_device(cx, 1)),
 ];
-const DEVICE: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "edit", "change the parameter, or view a read-only one", Action::Open)
-        .needs(Role::Technician),
-    Key::new(char('i'), "lamps", "inputs, outputs and relays as lamps, if the device has them", Action::Lamps),
-    Key::new(char('g'), "program", "the ramp/soak program, if the device has one", Action::Program),
-    Key::new(char('s'), "sets", "parameter sets: save, compare, restore, copy", Action::Sets),
-    Key::new(char('r'), "runs", "control runs: what each change of SV led to, compared", Action::Runs),
-    GUIDE,
-    Key::new(char('T'), "tune", "auto-tuning on, or off while it is on", Action::Tune).needs(Role::Technician),
-    ACTIONS,
-    WHY,
-    REFRESH,
-    Key::new(char('/'), "find", "show only parameters with some words in name or meaning", Action::Find),
-    Key::new(char('d'), "defaults", "mark differences from the factory default", Action::Defaults),
-    Key::new(char('S'), "standby", "run or standby, if the device has it", Action::Run).needs(Role::Technician),
-    PROCEDURES_PAGE,
-    LINE,
-    SETTINGS,
-];
-const LAMPS: &[Key<Action>] = &[REFRESH, LINE];
-const PROGRAM_FIRST: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "the cell to the left", Action::Column(-1)),
-    Key::new(code(KeyCode::Right), "cell", "the cell to the right", Action::Column(1)),
-];
-const PROGRAM: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "edit", "change the target or time", Action::Open).needs(Role::Technician),
+const DEVICE: &[Key] = &[
     Key::new(
-        char('r'),
-        "run",
-        "run the program, or resume after a hold (asks first)",
-        Action::Control(ProgramCommand::Run),
+        code(KeyCode::Enter),
+        "edit",
+        "change the parameter, or view a read-only one",
+        Controllers::open_parameter,
     )
-    .needs(Role::Technician),
-    Key::new(char('p'), "hold", "hold the program where it is (asks first)", Action::Control(ProgramCommand::Hold))
-        .needs(Role::Technician),
-    Key::new(char('o'), "off", "stop the program (asks first)", Action::Control(ProgramCommand::Off))
-        .needs(Role::Technician),
-    Key::new(char('t'), "pattern", "steps to run", Action::Pattern).needs(Role::Technician),
-    Key::new(char('m'), "mode", "behavior at the end and at power-on", Action::Mode).needs(Role::Technician),
+    .needs(Role::Technician)
+    .writes(|tab, cx| tab.role_for(cx, |_| Some(tab.table.tag(cx, tab.device).filter(|tag| tag.writable())?.id))),
+    // There is no room left for a key that every operator tries anyway; in the past there is.
+    BACK.when(|_, cx| Offer::only_if(cx.is_past() && 1 < cx.def().devices.len())),
+    Key::new(
+        char('i'),
+        "lamps",
+        "inputs, outputs and relays as lamps, if the device has them",
+        Controllers::open_lamps,
+    )
+    .when(|tab, cx| tab.offer(cx, |device| lamps::has_any(cx, device))),
+    Key::new(char('g'), "program", "the ramp/soak program, if the device has one", Controllers::show_program)
+        .when(|tab, cx| tab.offer(cx, |device| device.program.is_some())),
+    Key::new(char('s'), "sets", "parameter sets: save, compare, restore, copy", Controllers::show_sets),
+    Key::new(char('r'), "runs", "control runs: what each change of SV led to, compared", Controllers::show_runs)
+        .when(|tab, cx| tab.offer(cx, |device| cx.snapshot.has_runs(device.id))),
+    GUIDE,
+    Key::new(char('T'), "tune", "auto-tuning on, or off while it is on", Controllers::tune)
+        .when(|tab, cx| tab.offer(cx, |device| tune(device).is_some()))
+        .needs(Role::Technician)
+        .writes(|tab, cx| tab.role_for(cx, tune)),
+    ACTIONS,
+    WHY,
+    REFRESH,
+    Key::new(char('/'), "find", "show only parameters with some words in name or meaning", Controllers::ask_filter),
+    Key::change(char('d'), "defaults", "mark differences from the factory default", |tab, _| {
+        tab.table.defaults = !tab.table.defaults;
+    })
+    .when(|tab, cx| tab.offer(cx, |device| cx.def().tags_of(device.id).any(|tag| tag.default.is_some()))),
+    Key::new(char('S'), "standby", "run or standby, if the device has it", Controllers::toggle_standby)
+        .when(|tab, cx| tab.offer(cx, |device| run(device).is_some()))
+        .needs(Role::Technician)
+        .writes(|tab, cx| tab.role_for(cx, run)),
+    PROCEDURES_PAGE,
+    LINE,
+    SETTINGS,
+];
+const LAMPS: &[Key] = &[
+    Key::change(code(KeyCode::Left), "", "previous device", |tab, cx| tab.show_lamps(cx, -1)),
+    Key::change(code(KeyCode::Right), "device", "next device", |tab, cx| tab.show_lamps(cx, 1)),
+    REFRESH,
+    LINE,
+    BACK,
+];
+const PROGRAM_FIRST: &[Key] = &[
+    Key::change(code(KeyCode::Left), "", "the cell to the left", |tab, _| tab.cell.turn(-1)),
+    Key::change(code(KeyCode::Right), "cell", "the cell to the right", |tab, _| tab.cell.turn(1)),
+];
+const PROGRAM: &[Key] = &[
+    Key::new(code(KeyCode::Enter), "edit", "change the target or time", |tab, cx| {
+        tab.write(cx, |tab, device| tab.cell_tag(device))
+    })
+    .needs(Role::Technician)
+    .writes(|tab, cx| tab.role_for(cx, |device| tab.cell_tag(device))),
+    BACK,
+    Key::new(char('r'), "run", "run the program, or resume after a hold (asks first)", |tab, cx| {
+        tab.control(cx, |program| Some(program.run))
+    })
+    .needs(Role::Technician)
+    .writes(role_to_control),
+    Key::new(char('p'), "hold", "hold the program where it is (asks first)", |tab, cx| {
+        tab.control(cx, |program| program.halt)
+    })
+    .when(|tab, cx| tab.offer(cx, |device| device.program.as_ref().is_some_and(|program| program.halt.is_some())))
+    .needs(Role::Technician)
+    .writes(role_to_control),
+    Key::new(char('o'), "off", "stop the program (asks first)", |tab, cx| tab.control(cx, |program| Some(program.off)))
+        .needs(Role::Technician)
+        .writes(role_to_control),
+    Key::new(char('t'), "pattern", "steps to run", |tab, cx| tab.write(cx, |_, device| pattern(device)))
+        .needs(Role::Technician)
+        .writes(|tab, cx| tab.role_for(cx, pattern)),
+    Key::new(char('m'), "mode", "behavior at the end and at power-on", |tab, cx| {
+        tab.write(cx, |_, device| mode(device))
+    })
+    .needs(Role::Technician)
+    .writes(|tab, cx| tab.role_for(cx, mode)),
     REFRESH,
     GUIDE,
-    WHY,
+    Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", |tab, cx| {
+        let tag = tab.device(cx).and_then(|device| tab.cell_tag(device));
+        Why::open(Why::new(tag.into_iter().collect(), 0))
+    }),
 ];
-const SETS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "compare", "what differs between the set and the device", Action::Open),
-    Key::new(char('n'), "new", "save the settings of the device as a set", Action::Save).needs(Role::Technician),
-    Key::new(char('u'), "read", "refresh the list of sets", Action::ReadSets).needs(Role::Technician),
+const SETS: &[Key] = &[
+    Key::new(code(KeyCode::Enter), "compare", "what differs between the set and the device", Controllers::compare),
+    BACK,
+    Key::new(char('n'), "new", "save the settings of the device as a set", Controllers::ask_set_name)
+        .needs(Role::Technician),
+    Key::new(char('u'), "read", "refresh the list of sets", |_, _| vec![UiAction::Command(CommandKind::ReadSets)])
+        .needs(Role::Technician),
     GUIDE,
 ];
-const COMPARE: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "restore", "write what differs to the device (asks first)", Action::Open)
-        .needs(Role::Technician),
-    Key::new(char('x'), "stop", "stop after the current write", Action::Stop).needs(Role::Technician),
-    Key::new(char('='), "all", "show or hide equal settings", Action::All),
-    Key::new(char('t'), "reverse", "copy in the other direction", Action::SwapDirection),
+const COMPARE: &[Key] = &[
+    Key::new(code(KeyCode::Enter), "restore", "write what differs to the device (asks first)", Controllers::restore)
+        .needs(Role::Technician)
+        .writes(|tab, cx| tab.compared()?.role_to_restore(cx, tab.device(cx)?)),
+    BACK,
+    Key::new(char('x'), "stop", "stop after the current write", |tab, _| {
+        vec![UiAction::Command(CommandKind::StopRestore(tab.device))]
+    })
+    .when(|tab, cx| tab.offer(cx, |device| cx.snapshot.restore(device.id).is_some_and(|run| run.at_work())))
+    .needs(Role::Technician),
+    Key::change(char('='), "all", "show or hide equal settings", |tab, _| {
+        if let Page::Compare(compare) = &mut tab.page {
+            compare.all = !compare.all;
+        }
+    }),
+    Key::new(char('t'), "reverse", "copy in the other direction", Controllers::swap_direction)
+        .when(|tab, _| Offer::footer_if(matches!(tab.compared(), Some(Compare { source: Source::Device(_), .. })))),
     ACTIONS,
     REFRESH,
     GUIDE,
 ];
-const RUNS: &[Key<Action>] = &[
-    Key::new(char('o'), "overlay", "the curves of the marked runs over each other", Action::Overlay),
-    Key::new(char(' '), "mark", "mark the run for the overlay", Action::Mark),
-    Key::new(char('t'), "trend", "the curves of its time", Action::Trend),
+const RUNS: &[Key] = &[
+    Key::change(char('o'), "overlay", "the curves of the marked runs over each other", Controllers::swap_overlay),
+    Key::change(char(' '), "mark", "mark the run for the overlay", |tab, _| tab.runs.mark()),
+    Key::new(char('t'), "trend", "the curves of its time", |tab, cx| {
+        tab.runs.trend(cx, tab.device).into_iter().collect()
+    }),
+    GUIDE,
+    BACK,
+];
+const PROCEDURES: &[Key] = &[
+    Key::new(code(KeyCode::Enter), "start", "start the procedure (asks first)", |tab, cx| tab.procedures.start(cx))
+        .needs(Role::Technician)
+        .writes(Controllers::role_to_start),
+    BACK,
+    Key::new(char('x'), "abort", "abort the procedure at work: the safe state is written at once", |tab, cx| {
+        tab.procedures.abort(cx)
+    })
+    .when(|tab, cx| Offer::footer_if(tab.procedures.to_abort(cx).is_some()))
+    .needs(Role::Technician),
+    Key::change(
+        char('o'),
+        "overlay",
+        "the curves of what the procedures measured last over each other",
+        Controllers::swap_overlay,
+    ),
     GUIDE,
 ];
-const PROCEDURES: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "start", "start the procedure (asks first)", Action::Open).needs(Role::Technician),
-    Key::new(char('x'), "abort", "abort the procedure at work: the safe state is written at once", Action::Abort)
-        .needs(Role::Technician),
-    Key::new(char('o'), "overlay", "the curves of what the procedures measured last over each other", Action::Overlay),
-    GUIDE,
+const OVERLAY: &[Key] = &[
+    Key::change(code(KeyCode::Left), "", "previous tag", |tab, _| tab.runs.next_tag(-1)),
+    Key::change(code(KeyCode::Right), "tag", "next tag", |tab, _| tab.runs.next_tag(1)),
+    Key::change(char('o'), "list", "back to the list", Controllers::swap_overlay),
+    BACK,
 ];
-const OVERLAY: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "previous tag", Action::Tag(-1)),
-    Key::new(code(KeyCode::Right), "tag", "next tag", Action::Tag(1)),
-    Key::new(char('o'), "list", "back to the list", Action::Overlay),
-];
-const READ: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "", "previous page", Action::Turn(-1)),
-    Key::new(code(KeyCode::Right), "page", "next page", Action::Turn(1)),
-    Key::new(code(KeyCode::Up), "", "previous page", Action::Turn(-1)),
-    Key::new(code(KeyCode::Down), "", "next page", Action::Turn(1)),
+const READ: &[Key] = &[
+    Key::change(code(KeyCode::Left), "", "previous page", |tab, _| tab.turn(-1)),
+    Key::change(code(KeyCode::Right), "page", "next page", |tab, _| tab.turn(1)),
+    Key::change(code(KeyCode::Up), "", "previous page", |tab, _| tab.turn(-1)),
+    Key::change(code(KeyCode::Down), "", "next page", |tab, _| tab.turn(1)),
+    BACK,
 ];
 
-/// Gives the keys that write the role that what they write needs.
-pub fn needing(keys: Vec<Key<Action>>, role: impl Fn(Action) -> Option<Role>) -> Vec<Key<Action>> {
-    let needing = |key: Key<Action>| Key { needs: role(key.action).or(key.needs), ..key };
-    keys.into_iter().map(needing).collect()
+impl KeyTable for Controllers {
+    fn keys(&self, _cx: &ViewContext) -> Keys<Controllers> {
+        table(&self.page)
+    }
+
+    /// Nothing is written or sent on the line of another master, and it has no settings to try.
+    fn reads_only(&self, cx: &ViewContext) -> bool {
+        self.device(cx).is_some_and(|device| cx.def().listens_on(device.line))
+    }
+
+    #[cfg(test)]
+    fn chords() -> crate::ui::keys::PageChords {
+        let compare = Page::Compare(Compare::new(Source::Set(String::new())));
+        let guide = Page::Guide(0, Box::new(Page::List));
+        let runs = [Page::Runs, Page::Procedures, Page::Overlay(Box::new(Page::Runs))];
+        let pages = [Page::List, Page::Device, Page::Lamps, Page::Program, Page::Sets, compare, guide];
+        pages.into_iter().chain(runs).map(|page| ("controllers", table(&page).chords())).collect()
+    }
 }
 
 /// The keys of a page.
-pub fn page_keys(page: &Page) -> Vec<Key<Action>> {
-    match page {
-        Page::List => [&SELECT, LIST].concat(),
-        Page::Device => [DEVICE_FIRST, &SELECT, DEVICE].concat(),
-        Page::Lamps => [DEVICE_FIRST, LAMPS].concat(),
-        Page::Program => [PROGRAM_FIRST, &SELECT, PROGRAM].concat(),
-        Page::Sets => [&SELECT, SETS].concat(),
-        Page::Compare(_) => [&SCROLL, COMPARE].concat(),
-        Page::Runs => [&SELECT, RUNS].concat(),
-        Page::Procedures => [&SELECT, PROCEDURES].concat(),
-        Page::Overlay(_) => OVERLAY.to_vec(),
-        Page::Guide(..) => READ.to_vec(),
-    }
+fn table(page: &Page) -> Keys<Controllers> {
+    Keys::of(match page {
+        Page::List => &[&SELECT, LIST],
+        Page::Device => &[DEVICE_FIRST, &SELECT, DEVICE],
+        Page::Lamps => &[LAMPS],
+        Page::Program => &[PROGRAM_FIRST, &SELECT, PROGRAM],
+        Page::Sets => &[&SELECT, SETS],
+        Page::Compare(_) => &[&SCROLL, COMPARE],
+        Page::Runs => &[&SELECT, RUNS],
+        Page::Procedures => &[&SELECT, PROCEDURES],
+        Page::Overlay(_) => &[OVERLAY],
+        Page::Guide(..) => &[READ],
+    })
+}
+
+/// What auto-tuning is written to.
+pub(super) fn tune(device: &DeviceDef) -> Option<TagId> {
+    device.faceplate.as_ref()?.tune
+}
+
+/// What run or standby is written to.
+pub(super) fn run(device: &DeviceDef) -> Option<TagId> {
+    device.faceplate.as_ref()?.run
+}
+
+fn pattern(device: &DeviceDef) -> Option<TagId> {
+    device.program.as_ref()?.pattern
+}
+
+fn mode(device: &DeviceDef) -> Option<TagId> {
+    device.program.as_ref()?.mode
+}
+
+fn role_to_control(tab: &Controllers, cx: &ViewContext) -> Option<Role> {
+    tab.role_for(cx, |device| Some(device.program.as_ref()?.command))
 }

@@ -3,7 +3,8 @@
 use super::*;
 
 impl Controllers {
-    pub(super) fn move_by(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion) {
+    pub(super) fn step(&mut self, cx: &ViewContext, motion: Motion) {
+        let Some(device) = self.device(cx) else { return };
         let wall = (self.page == Page::List && self.is_wall(cx))
             .then(|| wall::Grid::new(cx.size, cx.area, cx.def().devices.len()));
         let room = wall.map_or(usize::from(cx.area.height.saturating_sub(4)).max(1), |grid| grid.rows * grid.columns);
@@ -30,7 +31,7 @@ impl Controllers {
     }
 
     /// Lays the marked runs, or those of the procedures, over each other, or goes back to their list.
-    pub(super) fn swap_overlay(&mut self, cx: &ViewContext, device: DeviceId) {
+    pub(super) fn swap_overlay(&mut self, cx: &ViewContext) {
         let before = std::mem::replace(&mut self.page, Page::List);
         if let Page::Overlay(before) = before {
             (self.page, self.runs.overlay) = (*before, None);
@@ -39,53 +40,19 @@ impl Controllers {
         if before == Page::Procedures {
             self.runs.overlay = self.procedures.overlay(cx);
         } else {
-            self.runs.lay_over(cx, device);
+            self.runs.lay_over(cx, self.device);
         }
         self.page = if self.runs.overlay.is_some() { Page::Overlay(Box::new(before)) } else { before };
     }
 
-    /// Enter: what is selected is opened, edited or written.
-    pub(super) fn open_selected(&mut self, cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
-        match &self.page {
-            Page::List => {
-                self.show(device.id);
-                self.on_snapshot(cx)
-            }
-            Page::Device => match self.table.tag(cx, device.id) {
-                Some(tag) if tag.writable() => write(cx, Some(tag.id)),
-                Some(tag) => open(Faceplate::new(tag.label.clone(), vec![tag.id]).map(Modal::Faceplate)),
-                None => Vec::new(),
-            },
-            Page::Program => write(cx, device.program.as_ref().and_then(|program| self.cell.tag(program))),
-            Page::Sets => {
-                let Some(source) = sets::sources(cx, device).into_iter().nth(self.set) else { return Vec::new() };
-                if let Some(notice) = sets::problems(cx, &source) {
-                    return open(Modal::Notice(notice));
-                }
-                self.page = Page::Compare(Compare::new(source));
-                Vec::new()
-            }
-            Page::Compare(compare) => open(compare.restore(cx, device).map_or_else(Modal::Notice, Modal::Confirm)),
-            Page::Procedures => self.procedures.start(cx),
-            Page::Lamps | Page::Runs | Page::Overlay(_) | Page::Guide(..) => Vec::new(),
-        }
+    /// Shows the device so many further on, around the end.
+    pub(super) fn next_device(&mut self, cx: &ViewContext, by: isize) {
+        self.show(DeviceId(to_u16(around(self.device.index(), by, cx.def().devices.len()))));
     }
 
-    pub(super) fn in_compare(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        let Page::Compare(compare) = &mut self.page else { return Vec::new() };
-        match (action, &compare.source) {
-            (Action::All, _) => compare.all = !compare.all,
-            // A copy the other way round: the target is chosen by opening its page.
-            (_, Source::Device(other)) => {
-                let (other, here) = (*other, self.device);
-                self.show(other);
-                self.page = Page::Compare(Compare::new(Source::Device(here)));
-            }
-            (_, Source::Set(_)) => {
-                let device = cx.def().device(self.device);
-                return notice(device, t!("only a copy between two controllers can be turned around"));
-            }
-        }
-        Vec::new()
+    /// Selects the faceplate so many to the right.
+    pub(super) fn neighbour(&mut self, cx: &ViewContext, by: isize) {
+        let last = cx.def().devices.len().saturating_sub(1);
+        self.device = DeviceId(to_u16(self.device.index().saturating_add_signed(by).min(last)));
     }
 }

@@ -26,6 +26,10 @@ impl Cell {
         let step = program.steps.get(self.row)?;
         [step.sv, step.ramp, step.soak].get(self.column).copied()
     }
+    /// So many columns to the right.
+    pub fn turn(&mut self, by: isize) {
+        self.column = self.column.saturating_add_signed(by).min(2);
+    }
 }
 
 /// Draws the page.

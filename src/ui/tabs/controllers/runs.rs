@@ -74,6 +74,11 @@ impl Runs {
         self.overlay = Overlay::of_runs(rule, chosen).filter(|_| !self.rows().is_empty());
     }
 
+    /// The curves of another tag.
+    pub fn next_tag(&mut self, by: isize) {
+        self.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by));
+    }
+
     /// Asks the history when it is time to.
     pub fn ask(&mut self, cx: &ViewContext, device: &DeviceDef, number: &mut u32) -> Vec<UiAction> {
         let curves = self.overlay.as_mut().map_or(Vec::new(), |overlay| overlay.ask(cx, number));

@@ -1,157 +1,142 @@
-//! The keys of the registers tab.
+//! The keys of the registers tab, and of the graph of what is watched.
 
 use super::*;
+use crate::ui::tabs::bus;
+#[cfg(test)]
+use crate::ui::tabs::trends;
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Another address.
-    Move(Motion),
-    /// The table so many further on.
-    Table(isize),
-    /// Asks for an address.
-    GoTo,
-    /// Asks for a value.
-    Find,
-    /// Asks for another unit.
-    Unit,
-    /// Asks with what to compare, or ends that.
-    Compare,
-    /// The next byte order.
-    Order,
-    /// The next way to write addresses.
-    Base,
-    /// Stops or resumes reading.
-    Pause,
-    /// A shorter period.
-    Faster,
-    /// A longer one.
-    Slower,
-    /// Asks for a sweep: which addresses answer.
-    Sweep,
-    /// Asks again for what was refused.
-    Relearn,
-    /// Names of the profile that the unit looks like.
-    Names,
-    /// Asks for the file of a register list.
-    Load,
-    /// Asks for the file to save a plant in.
-    Save,
-    /// Shows what is watched as curves.
-    Graph,
-    /// Watches the selected register, or no longer.
-    Watch,
-    /// Asks for its name and type.
-    Name,
-    /// Begins or ends a log of what is watched.
-    Log,
-    /// Asks for a value to write.
-    Write,
-    /// Adds to the selected register.
-    Add(i16),
-    /// Writes back what was replaced.
-    Undo,
-    /// Lists what was written.
-    Writes,
-}
+/// A row of the tables here.
+type Key = crate::ui::keys::Key<Registers>;
 
-pub(super) const KEYS: &[Key<Action>] = &[
-    Key::new(
+const MOVE: [Key; 6] = motions!("", Registers::scroll);
+const TABLES_KEYS: &[Key] = &[
+    Key::change(
         code(KeyCode::Right),
         "table",
         "next table: coils, discrete inputs, input and holding registers",
-        Action::Table(1),
+        |registers, _| registers.next_table(1),
     ),
-    Key::new(code(KeyCode::Left), "", "previous table", Action::Table(-1)),
-    Key::new(
-        code(KeyCode::Enter),
-        "names",
-        "take names, units and scales of the device that it looks like",
-        Action::Names,
-    ),
-    Key::new(char('j'), "go to", "go to an address: 1002, 0x3EA, 41003, input:1000", Action::GoTo),
-    Key::new(char('/'), "find", "find a value in what was read", Action::Find),
-    Key::new(char('o'), "order", "byte order: ABCD, CDAB, BADC, DCBA", Action::Order),
-    Key::new(char('b'), "base", "addresses as Modicon numbers, from 0 or from 1", Action::Base),
-    Key::new(char(' '), "pause", "pause or resume reading", Action::Pause),
-    Key::new(char('+'), "", "read more often", Action::Faster),
-    Key::new(char('-'), "", "read less often", Action::Slower),
-    Key::new(char('p'), "watch", "watch the selected register, or no longer", Action::Watch),
-    Key::new(char('g'), "graph", "graph of what is watched, full screen", Action::Graph),
-    Key::new(char('e'), "name", "name, type, scale and unit of the selected register", Action::Name),
-    Key::new(char('R'), "log", "begin or end a log of what is watched, as CSV: a row for every read", Action::Log),
+    Key::change(code(KeyCode::Left), "", "previous table", |registers, _| registers.next_table(-1)),
+];
+const NAMES: &[Key] = &[Key::change(
+    code(KeyCode::Enter),
+    "names",
+    "take names, units and scales of the device that it looks like",
+    Registers::apply_names,
+)];
+const LOOK: &[Key] = &[
+    Key::new(char('j'), "go to", "go to an address: 1002, 0x3EA, 41003, input:1000", |registers, _| {
+        registers.ask_text(Asking::Address, t!("go to address"), t!("1002, 0x3EA, 41003, or input:1000"))
+    }),
+    Key::new(char('/'), "find", "find a value in what was read", |registers, _| {
+        let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
+        registers.ask_text(Asking::Value, t!("find a value in what was read"), hint)
+    }),
+    Key::change(char('o'), "order", "byte order: ABCD, CDAB, BADC, DCBA", |registers, _| {
+        registers.order = next(&ByteOrder::ALL, registers.order);
+    }),
+    Key::change(char('b'), "base", "addresses as Modicon numbers, from 0 or from 1", |registers, _| {
+        registers.base = next(&[Base::Modicon, Base::Zero, Base::One], registers.base);
+    }),
+    Key::change(char(' '), "pause", "pause or resume reading", |registers, _| registers.paused = !registers.paused),
+    Key::change(char('+'), "", "read more often", |registers, _| registers.change_period(-1)),
+    Key::change(char('-'), "", "read less often", |registers, _| registers.change_period(1)),
+    Key::new(char('p'), "watch", "watch the selected register, or no longer", |registers, _| registers.toggle_watch()),
+    Key::new(char('g'), "graph", "graph of what is watched, full screen", Registers::open_graph),
+    Key::new(char('e'), "name", "name, type, scale and unit of the selected register", |registers, _| {
+        registers.ask_name()
+    }),
+];
+const LOG: &[Key] = &[Key::new(
+    char('R'),
+    "log",
+    "begin or end a log of what is watched, as CSV: a row for every read",
+    Registers::toggle_log,
+)];
+const WRITE: &[Key] = &[
     Key::new(
         char('w'),
         "write",
         "write the selected register; asks first, and once whether writing is wanted at all",
-        Action::Write,
+        |registers, _| registers.ask_write(),
     )
     .needs(Role::Supervisor),
-    Key::new(char('I'), "", "write one more than it holds (asks first)", Action::Add(1)).needs(Role::Supervisor),
-    Key::new(char('D'), "", "write one less than it holds (asks first)", Action::Add(-1)).needs(Role::Supervisor),
-    Key::new(char('u'), "", "undo the last verified write (asks first)", Action::Undo).needs(Role::Supervisor),
-    Key::new(char('W'), "", "list what was written", Action::Writes),
-    Key::new(char('N'), "", "load a register list from a manual: CSV or columns; or paste it here", Action::Load),
+    Key::new(char('I'), "", "write one more than it holds (asks first)", |registers, _| registers.add(1))
+        .needs(Role::Supervisor),
+    Key::new(char('D'), "", "write one less than it holds (asks first)", |registers, _| registers.add(-1))
+        .needs(Role::Supervisor),
+    Key::new(char('u'), "", "undo the last verified write (asks first)", |registers, cx| registers.undo(cx))
+        .needs(Role::Supervisor),
+    Key::new(char('W'), "", "list what was written", |registers, cx| {
+        vec![registers.writing.window(cx, &registers.names)]
+    }),
+    Key::new(char('N'), "", "load a register list from a manual: CSV or columns; or paste it here", |registers, _| {
+        let hint = t!("a file: CSV, or columns with address, name, type, scale, unit. Or paste the list into the tab");
+        registers.ask_text(Asking::List, t!("load a register list"), hint)
+    }),
     Key::new(
         char('S'),
         "save",
         "save what has a name as a plant file: sightglass FILE is then the same device",
-        Action::Save,
+        |registers, _| registers.ask_save(),
     ),
-    Key::new(char('U'), "unit", "read another unit", Action::Unit),
+];
+const UNIT: &[Key] = &[
+    Key::new(char('U'), "unit", "read another unit", Registers::ask_unit),
     Key::new(
         char('c'),
         "compare",
         "compare with another unit, or with this moment later; again to end it",
-        Action::Compare,
+        |registers, _| registers.toggle_comparison(),
     ),
-    Key::new(char('m'), "map", "map of the addresses that answer, 0 to 65535", Action::Sweep).needs(Role::Technician),
-    Key::new(char('r'), "", "ask again for what the unit has refused", Action::Relearn),
+    Key::new(char('m'), "map", "map of the addresses that answer, 0 to 65535", |registers, cx| {
+        bus::ask_sweep(cx, registers.line, registers.unit, registers.table)
+    })
+    .needs(Role::Technician),
+    Key::change(char('r'), "", "ask again for what the unit has refused", |registers, _| registers.relearn = true),
 ];
 
-/// All keys; where a plant file says what may be written and taken away, those that read.
-pub(in crate::ui::tabs) fn table(cx: &ViewContext) -> Vec<Key<Action>> {
-    if cx.def().is_bench() { [&motions!("", Action::Move), KEYS].concat() } else { of_plant() }
-}
+const BENCH: &[&[Key]] = &[&MOVE, TABLES_KEYS, NAMES, LOOK, LOG, WRITE, UNIT];
+/// Where a plant file says what may be written and taken away, those that read.
+const PLANT: &[&[Key]] = &[&MOVE, TABLES_KEYS, LOOK, UNIT];
+const BACK: &[Key] = &[Key::elsewhere(code(KeyCode::Esc), "back", "back to the registers")];
+/// The keys of the trends, without those that ask the plant.
+const GRAPH: Below<Registers> = Below { hints: Registers::graph_hints, press: Registers::press_on_graph };
 
-/// The keys that read.
-pub(super) fn of_plant() -> Vec<Key<Action>> {
-    let keys = [&motions!("", Action::Move), KEYS].concat();
-    keys.into_iter().filter(|key| key.action.only_reads()).collect()
-}
-
-/// The key of the log, which the graph has too.
-pub(super) fn log(cx: &ViewContext) -> Vec<Key<Action>> {
-    table(cx).into_iter().filter(|key| key.action == Action::Log).collect()
-}
-
-impl Action {
-    fn only_reads(self) -> bool {
-        match self {
-            Action::Move(_)
-            | Action::Table(_)
-            | Action::GoTo
-            | Action::Find
-            | Action::Unit
-            | Action::Compare
-            | Action::Order
-            | Action::Base
-            | Action::Pause
-            | Action::Faster
-            | Action::Slower
-            | Action::Relearn
-            | Action::Sweep
-            | Action::Graph
-            | Action::Watch
-            | Action::Name => true,
-            Action::Names
-            | Action::Load
-            | Action::Save
-            | Action::Log
-            | Action::Write
-            | Action::Add(_)
-            | Action::Undo
-            | Action::Writes => false,
+impl KeyTable for Registers {
+    fn keys(&self, cx: &ViewContext) -> Keys<Registers> {
+        match (self.watch.has_graph(), cx.def().is_bench()) {
+            (true, _) if self.watch.is_shown_log() => Keys::below(&GRAPH),
+            (true, true) => Keys::below(&GRAPH).and(Keys::of(&[LOG, BACK])),
+            (true, false) => Keys::below(&GRAPH).and(Keys::of(&[BACK])),
+            (false, true) => Keys::of(BENCH),
+            (false, false) => Keys::of(PLANT),
         }
+    }
+
+    fn after_key(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.read_now(cx)
+    }
+
+    #[cfg(test)]
+    fn chords() -> crate::ui::keys::PageChords {
+        let graph = trends::Trends::chords().into_iter().map(|(_, chords)| {
+            let log = Keys::of(&[LOG]).chords();
+            ("graph", [chords, log].concat())
+        });
+        [("registers", Keys::of(BENCH).chords())].into_iter().chain(graph).collect()
+    }
+}
+
+/// The chords that read, for the page of the tab Bus.
+#[cfg(test)]
+pub fn chords_of_page() -> Vec<crate::ui::keys::Chord> {
+    Keys::of(PLANT).chords()
+}
+
+impl Registers {
+    fn next_table(&mut self, by: isize) {
+        let at = TABLES.iter().position(|table| *table == self.table).unwrap_or(0);
+        self.table = TABLES[around(at, by, TABLES.len())];
     }
 }

@@ -1,17 +1,8 @@
 //! The registers as a page of the tab Bus, of a unit that the plant file knows.
 
-use super::{Registers, keys::table, names::Named};
+use super::{Registers, names::Named};
+use crate::plant::tag::{Decimals, Table, TagDef};
 use crate::ui::tabs::prelude::*;
-use crate::{
-    plant::tag::{Decimals, Table, TagDef},
-    ui::keys::find,
-};
-
-/// The chords that read, for the page of the tab Bus.
-#[cfg(test)]
-pub fn chords_of_page() -> Vec<crate::ui::keys::Chord> {
-    crate::ui::keys::chords_of(&super::keys::of_plant())
-}
 
 impl Registers {
     /// As a page of another tab.
@@ -58,11 +49,6 @@ impl Registers {
     /// The line whose registers are shown.
     pub fn line(&self) -> LineId {
         self.line
-    }
-
-    /// Is a key one of its own?
-    pub fn handles(&self, cx: &ViewContext, event: KeyEvent) -> bool {
-        self.watch.has_graph() || find(&table(cx), event).is_some()
     }
 
     /// Is the graph of what is watched shown?

@@ -1,6 +1,6 @@
 //! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
 
-use super::{Export, Reports};
+use super::{Export, Key, Reports};
 use crate::ui::tabs::{
     overlay::{self, Overlay},
     prelude::*,
@@ -11,55 +11,36 @@ use crate::{
     text::file,
 };
 
-/// What a key means on the list.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Select another row.
-    Move(Motion),
-    /// The report of the selected one.
-    Report,
-    /// The curves of its time.
-    Trend,
-    /// Mark it for the overlay, or no longer.
-    Mark,
-    /// The marked ones over each other.
-    Overlay,
-    /// Write the list as CSV.
-    Export,
-    /// The reports of shifts.
-    Back,
-}
-
 /// Keys of the list.
-const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "report", "the whole report of its time", Action::Report),
-    Key::new(char('t'), "trend", "the curves of its time", Action::Trend),
-    Key::new(char('o'), "overlay", "the curves of the marked batches over each other", Action::Overlay),
-    Key::new(char(' '), "mark", "mark the batch for the overlay", Action::Mark),
-    Key::new(char('e'), "export", "write the list as CSV", Action::Export).needs(Role::Technician),
-    Key::new(char('b'), "shifts", "the reports of shifts", Action::Back),
+pub const LIST: &[&[Key]] = &[
+    &motions!("select", |reports: &mut Reports, cx: &ViewContext, motion| reports.batches.select(cx, motion)),
+    &[
+        Key::change(code(KeyCode::Enter), "report", "the whole report of its time", |reports, _| {
+            if let Some(period) = reports.batches.period() {
+                reports.batches.shown = false;
+                reports.show(Some(period));
+            }
+        }),
+        Key::new(char('t'), "trend", "the curves of its time", |reports, cx| {
+            reports.batches.trend(cx).into_iter().collect()
+        }),
+        Key::change(char('o'), "overlay", "the curves of the marked batches over each other", |reports, cx| {
+            reports.batches.lay_over(cx);
+        }),
+        Key::change(char(' '), "mark", "mark the batch for the overlay", |reports, _| reports.batches.mark()),
+        Key::new(char('e'), "export", "write the list as CSV", Reports::export_batches).needs(Role::Technician),
+        Key::change(char('b'), "shifts", "the reports of shifts", |reports, _| {
+            (reports.batches.shown, reports.export) = (false, Export::Not);
+        }),
+    ],
 ];
 
-/// What a key means where batches lie over each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OverlayAction {
-    /// Another tag.
-    Tag(isize),
-    /// The list of batches.
-    Back,
-}
-
-/// Keys of that page.
-pub const OVERLAY_KEYS: &[Key<OverlayAction>] = &[
-    Key::new(code(KeyCode::Left), "", "previous tag", OverlayAction::Tag(-1)),
-    Key::new(code(KeyCode::Right), "tag", "next tag", OverlayAction::Tag(1)),
-    Key::new(char('o'), "list", "back to the list of batches", OverlayAction::Back),
-];
-
-/// All keys of the list.
-pub fn keys() -> Vec<Key<Action>> {
-    [&motions!("select", Action::Move), KEYS].concat()
-}
+/// Keys where batches lie over each other.
+pub const OVERLAY: &[&[Key]] = &[&[
+    Key::change(code(KeyCode::Left), "", "previous tag", |reports, _| reports.batches.next_tag(-1)),
+    Key::change(code(KeyCode::Right), "tag", "next tag", |reports, _| reports.batches.next_tag(1)),
+    Key::change(char('o'), "list", "back to the list of batches", |reports, _| reports.batches.overlay = None),
+]];
 
 /// Rows of one answer; the command `batches` has all of them.
 const ROWS: usize = 50;
@@ -83,6 +64,15 @@ pub struct Batches {
 }
 
 impl Batches {
+    /// The keys of the moment.
+    pub fn keys(&self) -> &'static [&'static [Key]] {
+        if self.overlay.is_some() { OVERLAY } else { LIST }
+    }
+
+    fn next_tag(&mut self, by: isize) {
+        self.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by));
+    }
+
     /// The batches that are listed, newest first.
     pub fn rows(&self) -> &[BatchReport] {
         self.rows.value.as_deref().unwrap_or_default()
@@ -263,34 +253,9 @@ fn minutes(time: Duration) -> String {
 }
 
 impl Reports {
-    pub(super) fn act_on_overlay(&mut self, cx: &ViewContext, action: OverlayAction) -> Vec<UiAction> {
-        match (action, &mut self.batches.overlay) {
-            (OverlayAction::Tag(by), Some(overlay)) => overlay.next_tag(by),
-            (OverlayAction::Tag(_), None) => {}
-            (OverlayAction::Back, _) => self.batches.overlay = None,
-        }
-        self.ask(cx)
-    }
-
-    pub(super) fn act_on_batches(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        match action {
-            Action::Move(motion) => self.batches.select(cx, motion),
-            Action::Report => {
-                if let Some(period) = self.batches.period() {
-                    self.batches.shown = false;
-                    self.show(Some(period));
-                }
-            }
-            Action::Mark => self.batches.mark(),
-            Action::Overlay => self.batches.lay_over(cx),
-            Action::Trend => return self.batches.trend(cx).into_iter().collect(),
-            Action::Export => {
-                let bytes = file(|| report::batch::csv(self.batches.rows(), cx.def(), self.dialect));
-                let listed = !self.batches.rows().is_empty();
-                return self.send(listed.then(|| (self.batches_path(cx), bytes)));
-            }
-            Action::Back => (self.batches.shown, self.export) = (false, Export::Not),
-        }
-        self.ask(cx)
+    fn export_batches(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let bytes = file(|| report::batch::csv(self.batches.rows(), cx.def(), self.dialect));
+        let listed = !self.batches.rows().is_empty();
+        self.send(listed.then(|| (self.batches_path(cx), bytes)))
     }
 }

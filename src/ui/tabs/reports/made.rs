@@ -1,5 +1,6 @@
 //! The reports that the station makes by itself: each with its state, its file and how to fetch it, and the selected one as text.
 
+use super::{Key, Reports};
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::MadeReports,
@@ -7,24 +8,21 @@ use crate::{
     report::{Period, ShiftReport, automatic::is_given_up, calendar, content, language, text::lines},
 };
 
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Select another row, or scroll the text.
-    Move(Motion),
-    /// The selected one as text.
-    Open,
-    /// The reports of shifts, or from a text to the list.
-    Back,
-}
-
 /// Keys of the list.
-const LIST: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "text", "the selected report as text", Action::Open),
-    Key::new(char('r'), "shifts", "the reports of shifts", Action::Back),
+pub const LIST: &[&[Key]] = &[
+    &motions!("select", |reports: &mut Reports, cx: &ViewContext, motion| reports.made.select(cx, motion)),
+    &[
+        Key::change(code(KeyCode::Enter), "text", "the selected report as text", |reports, cx| {
+            reports.made.open = reports.made.selected().map(|report| opened(cx, report));
+        }),
+        Key::change(char('r'), "shifts", "the reports of shifts", |reports, _| reports.made.shown = false),
+    ],
 ];
 /// Keys of the text.
-const TEXT: &[Key<Action>] = &[Key::new(char('r'), "list", "back to the list of automatic reports", Action::Back)];
+pub const TEXT: &[&[Key]] = &[
+    &motions!("", |reports: &mut Reports, cx: &ViewContext, motion| reports.made.scroll(cx, motion)),
+    &[Key::change(char('r'), "list", "back to the list of automatic reports", |reports, _| reports.made.open = None)],
+];
 
 /// Rows of the list.
 const ROWS: usize = 500;
@@ -65,8 +63,8 @@ impl Opened {
 
 impl Made {
     /// The keys of the moment.
-    pub fn keys(&self) -> Vec<Key<Action>> {
-        if self.open.is_some() { text_keys() } else { list_keys() }
+    pub fn keys(&self) -> &'static [&'static [Key]] {
+        if self.open.is_some() { TEXT } else { LIST }
     }
 
     fn rows(&self) -> &[ReportRecord] {
@@ -81,22 +79,15 @@ impl Made {
         self.rows().get(self.place())
     }
 
-    /// Does what a key means.
-    pub fn act(&mut self, cx: &ViewContext, action: Action) {
-        match (action, &mut self.open) {
-            (Action::Move(motion), None) => {
-                let (keys, room) =
-                    (self.rows().iter().map(ReportRecord::key).collect::<Vec<_>>(), room(cx.area.height));
-                self.selected.on(motion, keys, room);
-            }
-            (Action::Move(motion), Some(open)) => {
-                let count = open.lines(cx).len();
-                open.scroll.on(motion, count, usize::from(cx.area.height.saturating_sub(2)).max(1));
-            }
-            (Action::Open, _) => self.open = self.selected().map(|report| opened(cx, report)),
-            (Action::Back, Some(_)) => self.open = None,
-            (Action::Back, None) => self.shown = false,
-        }
+    fn select(&mut self, cx: &ViewContext, motion: Motion) {
+        let keys: Vec<_> = self.rows().iter().map(ReportRecord::key).collect();
+        self.selected.on(motion, keys, room(cx.area.height));
+    }
+
+    fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
+        let Some(open) = &mut self.open else { return };
+        let count = open.lines(cx).len();
+        open.scroll.on(motion, count, usize::from(cx.area.height.saturating_sub(2)).max(1));
     }
 
     /// Asks the history when it is time to.
@@ -176,16 +167,6 @@ impl Made {
             canvas.text(1, y, &line, style);
         }
     }
-}
-
-/// All keys of the list.
-pub fn list_keys() -> Vec<Key<Action>> {
-    [&motions!("select", Action::Move), LIST].concat()
-}
-
-/// All keys of the text.
-pub fn text_keys() -> Vec<Key<Action>> {
-    [&motions!("", Action::Move), TEXT].concat()
 }
 
 /// Rows of the list on a tab of this height: the rest is about the selected one.

@@ -2,57 +2,35 @@
 
 use jiff::{civil, tz::TimeZone};
 
-use super::{Export, Reports};
+use super::{Export, Key, Reports};
 use crate::report::{self, RecordRow, ShiftReport, record_csv::record_decimals};
 use crate::ui::tabs::prelude::*;
 
-impl Reports {
-    pub(super) fn act_on_rows(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        match action {
-            Action::Move(motion) => self.rows.on_motion(cx, self.report.value.as_deref(), motion),
-            Action::Shift(by) => return self.act(cx, super::Action::Shift(by)),
-            Action::Find => return vec![self.rows.ask()],
-            Action::Export => {
-                let format = report::FORMATS.iter().find(|format| format.name() == "record");
-                let chosen = self.format;
-                self.format = format.copied().unwrap_or(chosen);
-                let actions = self.export(cx);
-                self.format = chosen;
-                return actions;
-            }
-            Action::Back => (self.rows.shown, self.export) = (false, Export::Not),
-        }
-        Vec::new()
-    }
-}
-
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Scroll.
-    Move(Motion),
-    /// The shift so many further on.
-    Shift(isize),
-    /// Asks for a time or a condition.
-    Find,
-    /// The rows as CSV.
-    Export,
-    /// The figures of the report.
-    Back,
-}
-
-const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "earlier", "rows of the previous shift", Action::Shift(-1)),
-    Key::new(code(KeyCode::Right), "later", "rows of the next shift", Action::Shift(1)),
-    Key::new(char('/'), "find", "go to a time, or show only rows with a condition", Action::Find),
-    Key::new(char('e'), "export", "write the rows to a CSV file", Action::Export).needs(Role::Technician),
-    Key::new(char('n'), "report", "the figures of the report", Action::Back),
+/// Keys of the page.
+pub const KEYS: &[&[Key]] = &[
+    &[
+        Key::change(code(KeyCode::Left), "earlier", "rows of the previous shift", |reports, cx| reports.step(cx, -1)),
+        Key::change(code(KeyCode::Right), "later", "rows of the next shift", |reports, cx| reports.step(cx, 1)),
+        Key::new(char('/'), "find", "go to a time, or show only rows with a condition", |reports, _| {
+            vec![reports.rows.ask()]
+        }),
+        Key::new(char('e'), "export", "write the rows to a CSV file", |reports, cx| {
+            let format = report::FORMATS.iter().find(|format| format.name() == "record");
+            let chosen = reports.format;
+            reports.format = format.copied().unwrap_or(chosen);
+            let actions = reports.export(cx);
+            reports.format = chosen;
+            actions
+        })
+        .needs(Role::Technician),
+        Key::change(char('n'), "report", "the figures of the report", |reports, _| {
+            (reports.rows.shown, reports.export) = (false, Export::Not);
+        }),
+    ],
+    &motions!("scroll", |reports: &mut Reports, cx: &ViewContext, motion| {
+        reports.rows.on_motion(cx, reports.report.value.as_deref(), motion);
+    }),
 ];
-
-/// The keys of the page.
-pub fn keys() -> Vec<Key<Action>> {
-    [KEYS, &motions!("scroll", Action::Move)].concat()
-}
 
 /// State of the page.
 #[derive(Debug, Default)]

@@ -2,7 +2,7 @@
 
 use jiff::Span;
 
-use super::*;
+use super::{keys::Key, *};
 use crate::{
     plant::def::PlantDef,
     ui::tabs::overlay::{CURVES_MAX, Overlay},
@@ -13,41 +13,24 @@ const FORMS: &str = "yesterday  7d  8h  2026-11-20  06:00-14:00 / 2026-11-20 06:
 /// What is offered: one alone lies over the view.
 const OFFERED: &str = "yesterday";
 
-/// What a key means while periods lie over each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OverlayAction {
-    /// Another tag.
-    Tag(isize),
-    /// Ask for other periods.
-    Periods,
-    /// The curves of the view.
-    Back,
-}
-
 /// Keys of that page.
-pub const OVERLAY: &[Key<OverlayAction>] = &[
-    Key::new(code(KeyCode::Left), "", "previous tag", OverlayAction::Tag(-1)),
-    Key::new(code(KeyCode::Right), "tag", "next tag", OverlayAction::Tag(1)),
-    Key::new(char('/'), "periods", "other periods", OverlayAction::Periods),
-    Key::new(char('o'), "curves", "back to the curves", OverlayAction::Back),
+pub(super) const KEYS: &[Key] = &[
+    Key::change(code(KeyCode::Left), "", "previous tag", |trends, _| trends.next_overlaid(-1)),
+    Key::change(code(KeyCode::Right), "tag", "next tag", |trends, _| trends.next_overlaid(1)),
+    Key::new(char('/'), "periods", "other periods", Trends::ask_overlay),
+    Key::change(char('o'), "curves", "back to the curves", |trends, _| trends.overlay = None),
 ];
 
 impl Trends {
     /// Asks what lies over the view.
-    pub(super) fn ask_overlay(&mut self) -> Vec<UiAction> {
+    pub(super) fn ask_overlay(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
         self.asking = Asking::Overlay;
         let typed = self.typed_overlay.as_deref().unwrap_or(OFFERED);
         open(Modal::Prompt(Prompt::new(t!("Lay periods over each other"), FORMS, typed)))
     }
 
-    pub(super) fn act_on_overlay(&mut self, cx: &ViewContext, action: OverlayAction) -> Vec<UiAction> {
-        match (action, &mut self.overlay) {
-            (OverlayAction::Tag(by), Some(overlay)) => overlay.next_tag(by),
-            (OverlayAction::Tag(_), None) => {}
-            (OverlayAction::Periods, _) => return self.ask_overlay(),
-            (OverlayAction::Back, _) => self.overlay = None,
-        }
-        self.ask(cx)
+    fn next_overlaid(&mut self, by: isize) {
+        self.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by));
     }
 
     /// Lays the typed periods over each other, beginning with the selected pen.

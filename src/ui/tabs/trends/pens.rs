@@ -125,9 +125,9 @@ impl Trends {
         }
     }
 
-    /// Marks a value of the list as a pen, or no longer.
-    pub(super) fn pick(&mut self, cx: &ViewContext, row: usize) {
-        let Some(tag) = self.listed(cx).get(row).copied() else { return };
+    /// Marks the selected value of the list as a pen, or no longer.
+    pub(super) fn pick(&mut self, cx: &ViewContext) {
+        let Some(tag) = self.values.and_then(|(_, row)| self.listed(cx).get(row).copied()) else { return };
         match self.picked.iter().position(|picked| *picked == tag) {
             Some(place) => drop(self.picked.remove(place)),
             None if self.picked.len() < PENS_MAX => self.picked.push(tag),

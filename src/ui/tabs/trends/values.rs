@@ -20,7 +20,7 @@ impl Trends {
     }
 
     /// Asks for the words of the filter, and shows the list.
-    pub(super) fn ask_filter(&mut self) -> Vec<UiAction> {
+    pub(super) fn ask_filter(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
         self.asking = Asking::Filter;
         self.values.get_or_insert((0, 0));
         self.hours.query.want();
@@ -44,7 +44,15 @@ impl Trends {
         true
     }
 
-    pub(super) fn select_value(&mut self, cx: &ViewContext, first: usize, row: usize, motion: Motion) {
+    /// Shows the curve of the selected value.
+    pub(super) fn open(&mut self, cx: &ViewContext) {
+        if let Some(tag) = self.values.and_then(|(_, row)| self.listed(cx).get(row).copied()) {
+            self.open_value(cx, tag);
+        }
+    }
+
+    pub(super) fn select_value(&mut self, cx: &ViewContext, motion: Motion) {
+        let (first, row) = self.values.unwrap_or_default();
         let rows = usize::from(cx.area.height.saturating_sub(2)).max(1);
         let row = motion.to(row, self.listed(cx).len(), rows);
         let first_now = first.clamp((row + 1).saturating_sub(rows), row);

@@ -154,8 +154,11 @@ impl Trends {
         self.moved();
     }
 
-    /// Back to the present, without cursors.
-    pub(super) fn go_live(&mut self) {
+    /// Back to the present, without cursors; in a replay its instant comes into the view.
+    pub(super) fn go_live(&mut self, cx: &ViewContext) {
+        if cx.is_past() {
+            return self.go_to_moment(cx, cx.now);
+        }
         (self.end, self.cursor) = (None, None);
         self.between.clear();
         self.moved();

@@ -1,24 +1,8 @@
 //! The audit list: who did what, from where, when, and how it ended; newest first, with a search that the history does.
 
+use super::{Key, Users};
 use crate::ui::tabs::prelude::*;
 use crate::{plant::record::ActionRecord, report::Period, ui::modal::AuditEntryDialog};
-
-/// What a key means on the audit list.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// Select another row.
-    Move(Motion),
-    /// All fields of the selected entry.
-    Open,
-    /// Search words, a user, an action, a time.
-    Search(SearchField),
-    /// Show every terminal that came and went, or fold them.
-    Fold,
-    /// Search nothing.
-    Everything,
-    /// The list of users.
-    Back,
-}
 
 /// What can be searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,20 +18,26 @@ pub enum SearchField {
 }
 
 /// Keys of the audit list.
-const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Enter), "open", "entry details", Action::Open),
-    Key::new(char('/'), "search", "only rows with some words", Action::Search(SearchField::Words)),
-    Key::new(char('b'), "by", "only actions of a user", Action::Search(SearchField::Who)),
-    Key::new(char('w'), "what", "only an action: write, login …", Action::Search(SearchField::Action)),
-    Key::new(char('t'), "time", "another day or period", Action::Search(SearchField::Time)),
-    Key::new(char('d'), "terminals", "show or fold attach and detach", Action::Fold),
-    Key::new(char('c'), "all", "clear the search, show the last 7 days", Action::Everything),
-    Key::new(char('j'), "users", "the list of users", Action::Back),
+pub const KEYS: &[&[Key]] = &[
+    &motions!("select", |users: &mut Users, cx: &ViewContext, motion| users.in_audit(|audit| audit.step(cx, motion))),
+    &[
+        Key::new(code(KeyCode::Enter), "open", "entry details", |users, _| users.in_audit(Audit::open)),
+        Key::new(char('/'), "search", "only rows with some words", |users, _| ask(users, SearchField::Words)),
+        Key::new(char('b'), "by", "only actions of a user", |users, _| ask(users, SearchField::Who)),
+        Key::new(char('w'), "what", "only an action: write, login …", |users, _| ask(users, SearchField::Action)),
+        Key::new(char('t'), "time", "another day or period", |users, _| ask(users, SearchField::Time)),
+        Key::change(char('d'), "terminals", "show or fold attach and detach", |users, _| {
+            users.in_audit(|audit| audit.unfold(!audit.unfolded));
+        }),
+        Key::change(char('c'), "all", "clear the search, show the last 7 days", |users, _| {
+            users.in_audit(|audit| *audit = Audit::default());
+        }),
+        Key::change(char('j'), "users", "the list of users", |users, _| users.audit = None),
+    ],
 ];
 
-/// All keys of the list.
-pub fn keys() -> Vec<Key<Action>> {
-    [&motions!("select", Action::Move), KEYS].concat()
+fn ask(users: &mut Users, field: SearchField) -> Vec<UiAction> {
+    users.in_audit(|audit| audit.ask_for(field))
 }
 
 /// Rows of one answer; more are said to be left out.
@@ -93,41 +83,37 @@ impl Audit {
         Rows::of(rows.map(|(row, count)| (row.at, &row.by, &row.action, &row.target, count)), self.selected)
     }
 
-    /// A key of [`KEYS`].
-    pub fn on_key(&mut self, cx: &ViewContext, action: Action) -> Vec<UiAction> {
-        match action {
-            Action::Move(motion) => {
-                self.selected = motion.to(self.selected, self.groups().len(), rows_on(cx.area.height))
+    fn step(&mut self, cx: &ViewContext, motion: Motion) {
+        self.selected = motion.to(self.selected, self.groups().len(), rows_on(cx.area.height));
+    }
+
+    /// All fields of the selected entry, or the entries that are folded into it.
+    fn open(&mut self) -> Vec<UiAction> {
+        let groups = self.groups();
+        match groups.get(self.selected).copied() {
+            Some([entry]) => open(Modal::AuditEntry(Box::new(AuditEntryDialog(entry.clone())))),
+            Some(_) => {
+                self.unfold(true);
+                Vec::new()
             }
-            Action::Open => {
-                let groups = self.groups();
-                if groups.get(self.selected).is_some_and(|group| 1 < group.len()) {
-                    self.unfold(true);
-                    return Vec::new();
-                }
-                let entry = groups.get(self.selected).and_then(|group| group.first()).cloned();
-                let window = entry.map(|entry| Modal::AuditEntry(Box::new(AuditEntryDialog(entry))));
-                return open(window);
-            }
-            Action::Search(part) => {
-                self.asking = Some(part);
-                let (title, hint, text) = match part {
-                    SearchField::Words => (t!("search"), t!("words of any column; empty for all"), self.words.as_str()),
-                    SearchField::Who => {
-                        (t!("only by"), t!("name of a user, or a part of it; empty for all"), self.who.as_str())
-                    }
-                    SearchField::Action => {
-                        (t!("only this action"), t!("write, acknowledge, login …; empty for all"), &*self.action)
-                    }
-                    SearchField::Time => (t!("time"), period::FORMS, ""),
-                };
-                return open(Modal::Prompt(Prompt::new(title, hint, text)));
-            }
-            Action::Fold => self.unfold(!self.unfolded),
-            Action::Everything => *self = Audit::default(),
-            Action::Back => {}
+            None => Vec::new(),
         }
-        Vec::new()
+    }
+
+    /// Asks what to search.
+    fn ask_for(&mut self, field: SearchField) -> Vec<UiAction> {
+        self.asking = Some(field);
+        let (title, hint, text) = match field {
+            SearchField::Words => (t!("search"), t!("words of any column; empty for all"), self.words.as_str()),
+            SearchField::Who => {
+                (t!("only by"), t!("name of a user, or a part of it; empty for all"), self.who.as_str())
+            }
+            SearchField::Action => {
+                (t!("only this action"), t!("write, acknowledge, login …; empty for all"), &*self.action)
+            }
+            SearchField::Time => (t!("time"), period::FORMS, ""),
+        };
+        open(Modal::Prompt(Prompt::new(title, hint, text)))
     }
 
     /// Lists terminals one by one, or folds them; the selected entry stays selected.

@@ -28,7 +28,7 @@ use crate::{
         step_series::{HOLD_MAX, HeldValue, ValuesAt},
         value_log::reader::{LoggedValue, ValueLog},
     },
-    ui::{Effect, keys::find},
+    ui::Effect,
 };
 
 /// Pens of a group.
@@ -225,19 +225,27 @@ impl Registers {
         !self.watch.is_shown_log() && good.is_some_and(|last| is_past(self, cx, last.at))
     }
 
-    /// A key of the trends.
-    pub(in crate::ui::tabs::registers) fn graph_key(&mut self, cx: &ViewContext, event: KeyEvent) -> Vec<UiAction> {
-        let WatchList { graph, items, .. } = &mut self.watch;
-        if let (Some(graph), Some(_)) = (graph, find(&keys(), event)) {
-            graph.act(cx, items, |trends, cx| trends.on_key(cx, event));
-        }
-        Vec::new()
+    /// The keys of the trends, but for those that ask the plant.
+    pub(in crate::ui::tabs::registers) fn graph_hints(&self, cx: &ViewContext) -> Vec<Hint> {
+        let graph = self.watch.graph.as_ref();
+        graph.map_or(Vec::new(), |graph| graph.trends.hints(&Graph::context(&graph.snapshot, cx)))
     }
-}
 
-/// The keys of the trends, but for those that ask the plant.
-pub fn keys() -> Vec<Key<trends::Action>> {
-    trends::KEYS.iter().copied().filter(|key| !key.action.is_of_plant()).collect()
+    /// One of them.
+    pub(in crate::ui::tabs::registers) fn press_on_graph(
+        &mut self,
+        cx: &ViewContext,
+        event: KeyEvent,
+    ) -> Option<Vec<UiAction>> {
+        let WatchList { graph, items, .. } = &mut self.watch;
+        let mut is_key = false;
+        graph.as_mut()?.act(cx, items, |trends, cx| {
+            let actions = trends.press(cx, event);
+            is_key = actions.is_some();
+            actions.unwrap_or_default()
+        });
+        is_key.then(Vec::new)
+    }
 }
 
 /// Draws it; where it has room, what is wrong with reading, or the log.
