@@ -2,8 +2,10 @@
 
 pub(super) mod period;
 mod batches;
+mod counters;
 mod export;
 mod made;
+mod page_keys;
 mod rows;
 mod view;
 
@@ -12,7 +14,13 @@ mod tests;
 
 use std::path::PathBuf;
 
-use self::{batches::Batches, export::Export, made::Made, rows::Rows};
+use self::{
+    batches::Batches,
+    export::Export,
+    made::Made,
+    page_keys::{Action, table},
+    rows::Rows,
+};
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -21,71 +29,6 @@ use crate::{
     report::{self, Period, ReportFormat, ShiftReport},
     ui::{tabs::trends::span::View, widgets::chart},
 };
-
-/// What a key means here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Action {
-    /// The shift so many further on.
-    Shift(isize),
-    /// The running shift.
-    Running,
-    /// Any period.
-    Free,
-    /// Scroll.
-    Move(Motion),
-    /// Write the CSV.
-    Export,
-    /// The next format.
-    Format,
-    /// The other way to write CSV.
-    Dialect,
-    /// The report as it will be written, or its figures again.
-    Preview,
-    /// Ask the history again.
-    Refresh,
-    /// Why the values of the report are what they are now.
-    Why,
-    /// The list of batches.
-    Batches,
-    /// The list of automatic reports.
-    Made,
-    /// The rows of the record.
-    Rows,
-    /// The other columns of the figures.
-    Columns,
-    /// Show or hide what was not annunciated.
-    Quiet,
-    /// The chart of the tag so many rows further on.
-    Tag(isize),
-}
-
-/// Keys of this tab.
-const KEYS: &[Key<Action>] = &[
-    Key::new(code(KeyCode::Left), "earlier", "previous shift", Action::Shift(-1)),
-    Key::new(code(KeyCode::Right), "later", "next shift", Action::Shift(1)),
-    Key::new(char('l'), "running", "current shift", Action::Running),
-    Key::new(char('/'), "period", "any period: from-to, a day, a shift", Action::Free),
-    Key::new(char('e'), "export", "write the report to a file", Action::Export).needs(Role::Technician),
-    Key::new(char('f'), "format", "next format: CSV, text, HTML, Excel, Word, …", Action::Format),
-    Key::new(char('p'), "preview", "the report as text, as it is written", Action::Preview),
-    Key::new(char('n'), "rows", "date, time, SV, PV and ER, row by row", Action::Rows),
-    Key::new(char(';'), "", "CSV with , and . or with ; and ,", Action::Dialect),
-    Key::new(char('r'), "automatic", "the reports that the station makes by itself", Action::Made),
-    Key::new(char('t'), "tag", "chart of the next tag (110 columns or more)", Action::Tag(1)),
-    Key::new(char('T'), "", "chart of the previous tag", Action::Tag(-1)),
-    Key::new(char('c'), "", "the other columns (narrower than 80)", Action::Columns),
-    Key::new(char('d'), "", "show or hide the alarm events that were not annunciated", Action::Quiet),
-    Key::new(char('u'), "", "refresh the figures", Action::Refresh),
-    Key::new(char('w'), "", "explain its current values", Action::Why),
-];
-
-/// The key of a plant that makes batches.
-const BATCHES: &[Key<Action>] = &[Key::new(char('b'), "batches", "the list of batches", Action::Batches)];
-
-fn table(cx: &ViewContext) -> Vec<Key<Action>> {
-    let batches = if cx.def().batches.is_empty() { &[] } else { BATCHES };
-    [KEYS, batches, &motions!("", Action::Move)].concat()
-}
 
 /// How often the figures of a running shift are refreshed, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 30.0;
@@ -268,7 +211,7 @@ impl TabView for Reports {
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        let report = [KEYS, BATCHES, &motions!("", Action::Move)].concat();
+        let report = page_keys::all();
         let pages =
             [("batches", keys::chords_of(&batches::keys())), ("overlay", keys::chords_of(batches::OVERLAY_KEYS))];
         let made = [("made", keys::chords_of(&made::list_keys())), ("text", keys::chords_of(&made::text_keys()))];
@@ -321,6 +264,7 @@ impl Reports {
                 (self.made.shown, self.export) = (true, Export::Not);
                 self.made.list.query.want();
             }
+            Action::Correct => return counters::correct(cx, self.report.value.as_deref(), self.charted),
             Action::Rows => (self.rows.shown, self.export) = (true, Export::Not),
             Action::Why => {
                 let rows = self.report.value.iter().flat_map(|report| &report.tags);

@@ -102,7 +102,10 @@ fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 
         }
         latest = now;
         receiver.push(&bytes[..count]);
-        while let Some(request) = receiver.take() {
+        // A whole request is followed by the silence that its answer waits for below.
+        if receiver.is_whole()
+            && let Some(request) = receiver.on_silent_interval()
+        {
             let over = (began + character * request.len() as u32).max(now);
             began = over;
             let received = Some(&request[..request.len() - 2]).filter(|message| {

@@ -2,6 +2,7 @@
 
 mod batches;
 mod columns;
+mod counters;
 mod made;
 mod chart;
 mod rows;
@@ -15,6 +16,7 @@ use crate::{
     access::{Durability, SessionRequest},
     plant::{
         batch::Batch,
+        command::Command,
         def::Priority,
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
     },
@@ -31,6 +33,7 @@ struct Stand {
     model: Model,
     asked: Vec<(QueryId, Query)>,
     saved: Vec<(PathBuf, Vec<u8>)>,
+    commands: Vec<Command>,
     /// What the station says to an export.
     reply: Result<Durability, String>,
 }
@@ -42,7 +45,13 @@ impl Stand {
 
     fn of(fixture: &Fixture, theme: Theme, width: u16, height: u16) -> Stand {
         let model = Model::new(fixture.snapshot(), theme, 1, crate::ui::fixture::session());
-        let mut stand = Stand { model, asked: Vec::new(), saved: Vec::new(), reply: Ok(Durability::Recorded) };
+        let mut stand = Stand {
+            model,
+            asked: Vec::new(),
+            saved: Vec::new(),
+            commands: Vec::new(),
+            reply: Ok(Durability::Recorded),
+        };
         stand.send(Msg::Resize(width, height));
         stand.press("5");
         stand
@@ -57,8 +66,8 @@ impl Stand {
                     assert_eq!((file.ends_with(".csv"), sha256.len()), (true, 64));
                     self.send(Msg::RequestDone(id, self.reply.clone()));
                 }
+                Effect::Command(command, _) => self.commands.push(command),
                 Effect::Query(..)
-                | Effect::Command(..)
                 | Effect::SessionRequest(..)
                 | Effect::Extension(_)
                 | Effect::Load { .. }
@@ -81,6 +90,8 @@ impl Stand {
                 '↑' => KeyCode::Up,
                 '⏎' => KeyCode::Enter,
                 '⎋' => KeyCode::Esc,
+                '⇥' => KeyCode::Tab,
+                '⌫' => KeyCode::Backspace,
                 key => KeyCode::Char(key),
             };
             self.send(Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)));
