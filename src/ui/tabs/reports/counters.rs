@@ -9,23 +9,20 @@ use crate::{
     ui::modal::Correction,
 };
 
-/// `21:14:07  PM-1.E       replaced       1204.50 to 3.00 kWh, counted 0.00`; of a correction by whom, and why.
+/// `21:14:07  PM-1.E       replaced       1204.50 → 3.00 kWh, counted 0.00`; of a correction by whom, and why.
 pub fn line(cx: &ViewContext, row: &CounterRow, time: String) -> Line<'static> {
     let value = |value: Exact| digits(value, Some(row.decimals));
     let CounterRow { tag, unit, step, note, .. } = row;
     let what = match step.event {
-        CounterEvent::Corrected => t!("by {counted} {unit}, {note}", counted = value(step.counted), unit, note),
+        CounterEvent::Corrected => format!("{} {unit}, {note}", value(step.counted)),
         CounterEvent::FalseReading
         | CounterEvent::Rollover
         | CounterEvent::Reset
         | CounterEvent::Replaced
-        | CounterEvent::Held => t!(
-            "{old} to {new} {unit}, counted {counted}",
-            old = value(step.old),
-            new = value(step.new),
-            unit,
-            counted = value(step.counted)
-        ),
+        | CounterEvent::Held => {
+            let counted = t!("counted {counted}", counted = value(step.counted));
+            format!("{} {} {} {unit}, {counted}", value(step.old), cx.theme.pick("→", "->"), value(step.new))
+        }
     };
     let words = draw::columns([14, 15], [tag, translate(step.event.word())]);
     let room = cx.area.width.saturating_sub(width(&time) + width(&words) + 1);

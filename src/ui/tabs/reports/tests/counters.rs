@@ -43,8 +43,7 @@ fn steps_of_counters_stand_below_the_figures() {
         let mut stand = counted(Theme::FULL, width, height);
         stand.send(Msg::Key(KeyEvent::new(KeyCode::End, KeyModifiers::NONE)));
         let shown = stand.screen();
-        for words in
-            ["counters", "14:07:00", "replaced", "1204.5 to 3.0 kWh, counted 0.0", "by -2.5 kWh, anna: read by"]
+        for words in ["counters", "14:07:00", "replaced", "1204.5 → 3.0 kWh, counted 0.0", "-2.5 kWh, anna: read by"]
         {
             assert!(shown.contains(words), "no {words} at {width}x{height}:\n{shown}");
         }
