@@ -159,7 +159,7 @@ mod tests {
     fn what_is_sent_without_a_silence_is_no_request() {
         let (read, corrupt) = (with_crc(READ), [1, 3, 3, 0xEA, 0, 1, 0, 0]);
         let long = with_crc(&[2; 255]);
-        for frames in [[&read[..], &read].concat(), [&read[..], &[0]].concat(), [&corrupt[..], &read].concat(), long] {
+        for frames in [[&read[..], &read].concat(), [&read[..], &[7]].concat(), [&corrupt[..], &read].concat(), long] {
             let mut receiver = Receiver::default();
             receiver.push(&frames);
             assert_eq!(receiver.on_silent_interval(), None, "{frames:02X?}");

@@ -330,8 +330,8 @@ fn the_outcome_of_a_test_counts_its_requests_and_errors() {
         "passed: 3 requests, no errors; 3 answers",
         "failed: 3 requests, no errors; no unit answers within 100 ms",
         "passed: 2 requests, no errors",
-        "failed: 2 requests, 2 errors; no valid response in time",
-        "failed: 1 request, no errors; refused: it has changed to 0 since",
+        "failed: 3 requests, 3 errors; response timeout",
+        "failed: 1 request, no errors; refused: it was changed to 0 after it was shown",
         "passed: 4 requests, no errors; 128 bytes sent, 128 received: 0 wrong, 0 missing, 0 more than sent; 0.0 % faults",
     ];
     assert_eq!(texts.each_ref().map(String::as_str), expected);

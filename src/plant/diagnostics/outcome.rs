@@ -36,8 +36,8 @@ impl DiagnosticRun {
     pub fn outcome_text(&self) -> String {
         let (word, why) = match &self.state {
             DiagnosticState::Running => return String::new(),
-            DiagnosticState::Done if self.has_passed() => (t!("passed"), self.result()),
-            DiagnosticState::Done => (t!("failed"), self.result()),
+            DiagnosticState::Done if self.has_passed() => (t!("passed"), self.result(true)),
+            DiagnosticState::Done => (t!("failed"), self.result(false)),
             DiagnosticState::Cancelled => (t!("cancelled"), None),
             DiagnosticState::Failed(why) => (t!("failed"), Some(why.clone())),
         };
@@ -59,20 +59,23 @@ impl DiagnosticRun {
     }
 
     fn conclusion(&self) -> Option<&Conclusion> {
-        self.findings.iter().find_map(|finding| match finding {
-            Finding::Conclusion(Conclusion::Deaf(_)) => None,
-            Finding::Conclusion(conclusion) => Some(conclusion),
-            _ => None,
-        })
+        let conclusions = self.findings.iter().filter_map(|finding| {
+            let Finding::Conclusion(conclusion) = finding else { return None };
+            Some(conclusion)
+        });
+        { conclusions }.find(|conclusion| !matches!(conclusion, Conclusion::Deaf(_)))
     }
 
-    /// What follows from all of it; else what became of its write, or why a request failed.
-    fn result(&self) -> Option<String> {
-        let found = self.findings.iter().rev().find_map(|finding| match finding {
-            Finding::Written(outcome) => Some(outcome.to_string()),
-            Finding::Failed { fault, .. } => Some(fault.to_string()),
-            _ => None,
+    /// What follows from all of it; else what became of its write, or why it failed.
+    fn result(&self, has_passed: bool) -> Option<String> {
+        let written = self.findings.iter().find_map(|finding| {
+            let Finding::Written(outcome) = finding else { return None };
+            Some(outcome.to_string())
         });
-        self.conclusion().map(ToString::to_string).or(found)
+        let failed = self.findings.iter().rev().find_map(|finding| {
+            let Finding::Failed { fault, .. } = finding else { return None };
+            Some(fault.to_string())
+        });
+        self.conclusion().map(ToString::to_string).or(written).or(failed.filter(|_| !has_passed))
     }
 }

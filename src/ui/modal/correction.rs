@@ -128,13 +128,14 @@ impl Correction {
             canvas.text(0, to_u16(y), note, theme.normal());
         }
         let mut y = to_u16(notes.len());
+        let names = self.counters.iter().map(|tag| width(&cx.def().tag(*tag).name)).max().unwrap_or(0);
         for (place, tag) in self.counters.iter().enumerate().skip(first).take(rows) {
             let (def, is_chosen) = (cx.def().tag(*tag), place == self.chosen);
             let shown = value::show(cx, *tag);
             canvas.text(0, y, if is_chosen { theme.pick("▸ ", "> ") } else { "  " }, theme.strong());
-            let x = canvas.text(2, y, &def.name, if is_chosen { theme.focus() } else { theme.normal() });
-            let x = canvas.text(x + 2, y, &shown.whole(), shown.style);
-            canvas.text(x + 2, y, &fit(&def.label, room.saturating_sub(x + 2)), theme.dim());
+            canvas.text(2, y, &def.name, if is_chosen { theme.focus() } else { theme.normal() });
+            let x = canvas.text(4 + names, y, &shown.whole(), shown.style).max(18 + names) + 2;
+            canvas.text(x, y, &fit(&def.label, room.saturating_sub(x)), theme.dim());
             y += 1;
         }
         let unit = cx.snapshot.unit(self.counters[self.chosen]);

@@ -34,7 +34,7 @@ enum Edit {
 impl Edit {
     /// Everything is where it was, and only called otherwise?
     fn renames(self) -> bool {
-        matches!(self, Edit::RenameTag(_) | Edit::RenameDevice | Edit::RenameLine | Edit::Message(_))
+        matches!(self, Edit::RenameTag(_) | Edit::RenameDevice | Edit::RenameLine)
     }
 }
 

@@ -373,19 +373,6 @@ fn the_next_shift_is_shown_when_it_begins() {
 }
 
 #[test]
-fn no_size_is_too_small_to_survive() {
-    for (width, height) in
-        (0..40).flat_map(|width| (0..20).map(move |height| (width, height))).chain([(200, 60), (80, 12)])
-    {
-        let mut stand = Stand::new(Theme::FULL, width, height);
-        stand.terminal();
-        stand.answer(true);
-        stand.press("↓↓↓↓↓e");
-        assert_eq!(stand.terminal().backend().buffer().area.width, width);
-    }
-}
-
-#[test]
 fn a_clock_that_is_set_back_does_not_keep_a_report_waiting() {
     let mut stand = Stand::new(Theme::FULL, 80, 24);
     let later = |by: i64, seconds: i64| {
