@@ -58,24 +58,24 @@ impl Store {
         check_span(from, until)?;
         let sql = format!(
             "SELECT {COLUMNS} FROM control_run
-             WHERE rowid IN (SELECT max(rowid) FROM control_run WHERE until_utc <= ?1 GROUP BY controller, number)
+             WHERE rowid IN (SELECT max(rowid) FROM control_run
+                WHERE until_utc <= ?1 OR epoch < ?7 AND until_utc < ?6 GROUP BY controller, number)
              AND utc < ?6 AND (until_utc >= ?2 OR state = ?3 AND until_utc >= ?4)
              ORDER BY utc DESC, controller, number DESC LIMIT ?5"
         );
         let doubled = self.doubled()?;
         let period = from.as_microsecond()..until.as_microsecond();
-        let asked = widened(&doubled, period.clone());
+        let (asked, now) = (widened(&doubled, period.clone()), end_of_period(&doubled, period.end));
         let (begin, end) = (instant(asked.start).unwrap_or(from), instant(asked.end).unwrap_or(until));
         let at_work = begin.saturating_sub(SignedDuration::try_from(STORED.1).unwrap_or_default()).unwrap_or(begin);
         let most = RUNS_MAX as u64 + 1;
-        let values = params![utc(until), utc(begin), RunState::Running.word(), utc(at_work), most, utc(end)];
+        let values = params![utc(until), utc(begin), RunState::Running.word(), utc(at_work), most, utc(end), now.0];
         let mut runs = self.list(&sql, values, dated)?;
         let left_out = runs.drain(RUNS_MAX.min(runs.len())..).next().map(|(_, first)| {
             let why = format!("only the latest {RUNS_MAX} control runs are listed");
             Gap { from: from.min(first.from), to: first.until, why }
         });
         let (mut found, mut parts) = (Vec::new(), Vec::new());
-        let now = end_of_period(&doubled, period.end);
         for (epoch, run) in runs {
             let (run, legs) = self.as_of(run, epoch, &doubled, now)?;
             let within = clip(&legs, &period);
