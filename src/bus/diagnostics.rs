@@ -99,6 +99,8 @@ impl Job {
             started: at,
             done: 0,
             total: planned,
+            requests: 0,
+            errors: 0,
             now: None,
             state: DiagnosticState::Running,
             findings: Vec::new(),
@@ -168,6 +170,8 @@ impl Job {
     /// Handles the result of the step that was next.
     pub fn on_result(&mut self, result: StepResult) {
         let Some(step) = self.step.take() else { return };
+        self.run.requests += u32::from(!matches!(result, StepResult::Signals(_)));
+        self.run.errors += u32::from(self.is_error(&result));
         self.run.done += 1;
         match (&self.run.diagnostic, result) {
             (_, StepResult::Signals(Ok(signals))) => self.on_signals(signals),
@@ -195,6 +199,23 @@ impl Job {
             self.run.state = DiagnosticState::Done;
         }
         self.update_now();
+    }
+
+    /// Is this not what the step was made for? A scan expects silence, a sweep and an identification expect refusals.
+    fn is_error(&self, result: &StepResult) -> bool {
+        match (&self.run.diagnostic, result) {
+            (Diagnostic::Pattern { bits, .. }, StepResult::Bytes(bytes, _)) => {
+                *bytes != pattern::bytes(self.run.done, *bits)
+            }
+            (_, StepResult::Bytes(bytes, _)) => bytes.is_empty(),
+            (_, StepResult::Answer(Ok(_), _) | StepResult::Signals(_)) => false,
+            (Diagnostic::Loopback { .. }, StepResult::Answer(Err(_), _)) => 0 < self.run.done,
+            (Diagnostic::Scan(_), StepResult::Answer(Err(fault), _)) => fault.is_corrupt(),
+            (Diagnostic::Sweep(_) | Diagnostic::Identify { .. }, StepResult::Answer(Err(Fault::Exception(_)), _)) => {
+                false
+            }
+            (_, StepResult::Answer(Err(_), _)) => true,
+        }
     }
 
     /// Makes the step that is next.

@@ -2,6 +2,7 @@
 
 pub mod tiers;
 pub mod recorded;
+pub(crate) mod legs;
 pub mod retention;
 pub mod series;
 pub mod alarm_state;

@@ -147,6 +147,13 @@ pub struct Leg {
     pub ended: Option<i64>,
 }
 
+impl Leg {
+    /// A span in which the clock was not set back, or that goes by its time alone.
+    pub fn whole(from: i64, to: i64) -> Leg {
+        Leg { from, to, epochs: Epochs::All, began: None, ended: None }
+    }
+}
+
 /// The epochs of what is read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Epochs {
@@ -180,24 +187,28 @@ impl Epochs {
     }
 }
 
-/// How long legs are together: more than their span where the clock was set back.
-pub fn seconds(legs: &[Leg]) -> f64 {
+/// How long legs are together, in microseconds: more than their span where the clock was set back.
+pub fn micros(legs: &[Leg]) -> i64 {
     let micros = legs.iter().map(|Leg { from, to, began, ended, .. }| {
         (ended.unwrap_or(*to).min(*to) - began.unwrap_or(*from).max(*from)).max(0)
     });
-    micros.sum::<i64>() as f64 / 1e6
+    micros.sum()
+}
+
+/// The same in seconds.
+pub fn seconds(legs: &[Leg]) -> f64 {
+    micros(legs) as f64 / 1e6
 }
 
 /// The legs of a span, in the order in which what they hold was stored.
 pub fn legs(doubled: &[Doubled], from: i64, to: i64) -> Vec<Leg> {
     let mut legs = Vec::new();
     let mut next = from;
-    let whole = |from, to| Leg { from, to, epochs: Epochs::All, began: None, ended: None };
     for Doubled { span, epochs } in doubled.iter().filter(|doubled| doubled.span.start < to && from < doubled.span.end)
     {
         let (start, end) = (span.start.max(from), span.end.min(to));
         if next < start {
-            legs.push(whole(next, start));
+            legs.push(Leg::whole(next, start));
         }
         for (place, (epoch, first, last)) in epochs.iter().enumerate() {
             let (of, began) = match place {
@@ -211,7 +222,7 @@ pub fn legs(doubled: &[Doubled], from: i64, to: i64) -> Vec<Leg> {
         next = end;
     }
     if next < to {
-        legs.push(whole(next, to));
+        legs.push(Leg::whole(next, to));
     }
     legs
 }
@@ -274,7 +285,7 @@ mod tests {
     #[test]
     fn legs_follow_the_order_of_writing() {
         let doubled = doubled(&[of(0, 0, 5), of(1, 4, 9)]);
-        let whole = |from, to| Leg { from, to, epochs: Epochs::All, began: None, ended: None };
+        let whole = Leg::whole;
         let got = legs(&doubled, 0, 9 * HOUR);
         let (first, then) = (Epochs::Without(vec![1]), Epochs::One(1));
         let end = 5 * HOUR + 1;

@@ -13,7 +13,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{expr::Expr, id::TagId, keyword::keyword_enum, sample::Sample, tag::TagDef, time::elapsed};
+use super::{expr::Expr, id::TagId, keyword::keyword_enum, sample::Sample, tag::TagDef};
 
 /// What a batch is, from a `[[batch]]` of the plant file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -121,26 +121,16 @@ impl Batch {
     }
 }
 
-/// The records as they would be if nothing had happened before an instant: of what lies after it.
-pub fn records_since(records: &[BatchRecord], from: Timestamp) -> Vec<BatchRecord> {
-    records.iter().map(|record| BatchRecord { at: record.at.max(from), ..record.clone() }).collect()
-}
-
-/// Batches from their records, which lie together for each batch and in the order of their places. One that runs is as long as
-/// it is at `now`.
-pub fn batches(records: &[BatchRecord], now: Timestamp) -> Vec<Batch> {
-    let of_one = records.chunk_by(|one, next| one.number == next.number && one.batch == next.batch);
-    of_one.filter_map(|records| batch(records, now)).collect()
-}
-
-fn batch(records: &[BatchRecord], now: Timestamp) -> Option<Batch> {
+/// A batch from its records, in the order of their places. `lasts` gives for how long it was as each of them says: until the
+/// next one, or until now.
+pub fn batch(records: &[BatchRecord], lasts: impl Fn(usize) -> Duration) -> Option<Batch> {
     let (first, last) = (records.first()?, records.last()?);
     let to = last.event.is_end().then_some(last.at);
     let mut phases: Vec<(Arc<str>, Duration)> = Vec::new();
     let (mut lasted, mut unknown) = (Duration::ZERO, Duration::ZERO);
-    let ends = records.iter().skip(1).map(|next| next.at).chain(to.is_none().then_some(now));
-    for (record, end) in records.iter().zip(ends) {
-        let span = elapsed(record.at, end);
+    let at_work = records.len() - usize::from(to.is_some());
+    for (place, record) in records[..at_work].iter().enumerate() {
+        let span = lasts(place);
         lasted += span;
         match &record.phase {
             _ if record.event == BatchEvent::Unknown => unknown += span,

@@ -92,7 +92,7 @@ impl Calculator {
     /// value, as it does after a restart.
     pub fn redefine(&mut self, before: &mut Calculator, change: &Redefinition) {
         for (tag, _, state) in &mut self.order {
-            let step = change.named(*tag).and_then(|was| before.order.iter_mut().find(|(tag, ..)| *tag == was));
+            let step = change.tag(*tag).and_then(|was| before.order.iter_mut().find(|(tag, ..)| *tag == was));
             match (state, step.and_then(|(.., state)| state.take())) {
                 (Some(state), Some(was)) if change.source(*tag).is_some() => *state = was,
                 (Some(State::Total(total)), Some(State::Total(was))) => total.go_on_from(&was),

@@ -3,7 +3,7 @@
 mod check;
 mod record;
 
-use std::{collections::VecDeque, sync::Arc, time::Duration};
+use std::{collections::VecDeque, mem::take, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
@@ -12,6 +12,7 @@ use super::{
         BusRequest, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal, WriteId, WriteJob,
     },
     def::{LineId, PlantDef, TagId},
+    diagnostics::{self, DiagnosticRun, DiagnosticState},
     event::{Fault, WriteResult},
     exact::Exact,
     process_image::ProcessImage,
@@ -45,13 +46,15 @@ pub struct CommandTracker {
     commands: VecDeque<CommandStatus>,
     /// Writes on the bus, each with its command.
     writes: Vec<(CommandId, WriteJob)>,
+    /// Tests that lines have taken, until they have ended: at most as many as the queues of the lines hold.
+    tests: Vec<CommandStatus>,
     last_write: u64,
 }
 
 impl CommandTracker {
     /// A tracker without commands.
     pub fn new(def: Arc<PlantDef>) -> CommandTracker {
-        CommandTracker { def, commands: VecDeque::new(), writes: Vec::new(), last_write: 0 }
+        CommandTracker { def, commands: VecDeque::new(), writes: Vec::new(), tests: Vec::new(), last_write: 0 }
     }
 
     /// The latest commands, newest first.
@@ -193,7 +196,52 @@ impl CommandTracker {
         at: Timestamp,
     ) -> Option<ActionRecord> {
         let id = self.of_line(line, request)?;
-        self.complete(id, Outcome::Verified, image, at)
+        let started = self.complete(id, Outcome::Verified, image, at);
+        if matches!(request, BusRequest::Test { .. }) {
+            self.tests.extend(self.commands.iter().find(|status| status.command.id == id).cloned());
+        }
+        started
+    }
+
+    /// A line reports on a test: where it has ended its outcome is recorded, beside its start.
+    pub fn tested(&mut self, run: &DiagnosticRun, image: &ProcessImage, at: Timestamp) -> Option<ActionRecord> {
+        let has_ended = |status: &CommandStatus| status.command.id == run.id && run.state != DiagnosticState::Running;
+        let place = self.tests.iter().position(has_ended)?;
+        let status = self.tests.remove(place);
+        Some(self.end_of_test(&status, run.outcome_text(), image, at))
+    }
+
+    /// Ends the tests of lines of which nothing more is heard.
+    pub fn end_tests(
+        &mut self,
+        is_meant: impl Fn(LineId) -> bool,
+        outcome: impl Fn(LineId, CommandId) -> String,
+        image: &ProcessImage,
+        at: Timestamp,
+    ) -> Vec<ActionRecord> {
+        let line = |status: &CommandStatus| status.command.kind.line(&self.def).filter(|line| is_meant(*line));
+        let (ended, rest): (Vec<_>, Vec<_>) = take(&mut self.tests)
+            .into_iter()
+            .map(|status| (line(&status), status))
+            .partition(|(line, _)| line.is_some());
+        let ended = ended.into_iter().filter_map(|(line, status)| {
+            let outcome = outcome(line?, status.command.id);
+            Some(self.end_of_test(&status, outcome, image, at))
+        });
+        let ended = ended.collect();
+        self.tests = rest.into_iter().map(|(_, status)| status).collect();
+        ended
+    }
+
+    fn end_of_test(
+        &self,
+        status: &CommandStatus,
+        outcome: String,
+        image: &ProcessImage,
+        at: Timestamp,
+    ) -> ActionRecord {
+        let (action, outcome) = (diagnostics::END.into(), outcome.into());
+        ActionRecord { at, action, outcome, note: None, ..record(&self.def, status, image) }
     }
 
     /// The queue of a line was full: refuses the command of the request.

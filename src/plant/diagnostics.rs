@@ -2,6 +2,7 @@
 
 mod conclusion;
 mod finding;
+mod outcome;
 
 use crate::{t, text::translate};
 use std::{sync::Arc, time::Duration};
@@ -20,6 +21,7 @@ use super::{
 
 pub use conclusion::{Conclusion, PatternTally, SweepEnd};
 pub use finding::{DiagnosticStep, Finding, UnitReply};
+pub use outcome::END;
 
 /// Findings that a run keeps at most.
 pub const FINDINGS_MAX: usize = 1_000;
@@ -278,6 +280,10 @@ pub struct DiagnosticRun {
     pub done: u32,
     /// Steps in all.
     pub total: u32,
+    /// Requests made so far.
+    pub requests: u32,
+    /// Of these, those without the response that they were made for.
+    pub errors: u32,
     /// What it asks now.
     pub now: Option<DiagnosticStep>,
     /// How it stands.

@@ -237,6 +237,20 @@ impl ActuatorTracker {
         ActuatorTracker { since: logic.actuators.iter().map(since).collect() }
     }
 
+    /// Goes on under another definition, in which a tag is what `was` gives.
+    pub(super) fn redefine(
+        &mut self,
+        before: &ControlLogic,
+        logic: &ControlLogic,
+        was: impl Fn(TagId) -> Option<TagId>,
+    ) {
+        let since = |now: &ActuatorDef| {
+            let is_it = |own: &ActuatorDef| [now.command, now.output].map(&was) == [own.command, own.output].map(Some);
+            before.actuators.iter().zip(&self.since).find(|(own, _)| is_it(own)).and_then(|(_, since)| *since)
+        };
+        self.since = logic.actuators.iter().map(since).collect();
+    }
+
     /// Notes what differs at `at`, and since when.
     pub fn update(&mut self, logic: &ControlLogic, sample: impl Fn(TagId) -> Sample, at: Timestamp) {
         self.since.resize(logic.actuators.len(), None);
@@ -359,5 +373,18 @@ mod tests {
                 "at {second} s"
             );
         }
+    }
+
+    #[test]
+    fn a_feedback_mismatch_goes_on_under_other_ids_and_names() {
+        let (before, mut watch) = (logic(true), ActuatorTracker::default());
+        watch.update(&before, |tag| [good(0.0), good(1.0), good(0.0), good(9.0)][tag.index()], at(0));
+        let moved = |actuator: &ActuatorDef| ActuatorDef { output: TagId(8), command: TagId(9), ..actuator.clone() };
+        let other = ActuatorDef { output: AUTO, ..before.actuators[0].clone() };
+        let logic = ControlLogic { actuators: vec![other, moved(&before.actuators[0])], ..before.clone() };
+        let was = |tag: TagId| (8 <= tag.0).then(|| if tag.0 == 8 { OUTPUT } else { COMMAND });
+        watch.redefine(&before, &logic, was);
+        let lasts = [0, 1].map(|place| watch.feedback_mismatch(&logic, place, at(7)).map(|span| span.as_secs()));
+        assert_eq!(lasts, [None, Some(7)]);
     }
 }

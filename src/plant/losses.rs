@@ -3,7 +3,7 @@
 use super::{
     PlantDef, Snapshot,
     alarm::{manager::name_of, state::OperatorNote, succession::successors},
-    def::AlarmId,
+    def::{AlarmId, ProcedureDef},
     id::ProcedureId,
     number::to_u16,
     snapshot::SuppressedAlarm,
@@ -46,7 +46,8 @@ impl Snapshot {
         let suppressed = noted.filter_map(|suppressed| alarm(suppressed.id, suppression(suppressed)));
         let at_work = active.chain(suppressed).collect::<Vec<_>>();
         let ends = |what: String| Loss { what, becomes: None };
-        at_work.into_iter().chain(self.ended_work(def).into_iter().map(ends)).collect()
+        let ended = self.ended_work(def).into_iter().map(ends);
+        at_work.into_iter().chain(ended).chain(self.open_procedures(def)).collect()
     }
 
     /// What is at work and ends.
@@ -57,16 +58,25 @@ impl Snapshot {
         let restores =
             self.restores.iter().filter(|run| run.at_work() && !before.keeps_line(def, before.device(run.device).line));
         let procedures = self.procedures.iter().enumerate().filter_map(|(place, run)| {
-            let (run, name) = (run.as_ref()?, &before.procedures[place].name);
-            if run.at_work() {
-                return (!before.keeps_procedure(def, ProcedureId(to_u16(place)))).then(|| format!("procedure {name}"));
-            }
-            let is_open = run.missing().next().is_some() && !def.procedures.iter().any(|other| other.name == *name);
-            is_open.then(|| format!("procedure {name}, whose safe state is not written,"))
+            let ends = run.as_ref()?.at_work() && !before.keeps_procedure(def, ProcedureId(to_u16(place)));
+            ends.then(|| format!("procedure {}", before.procedures[place].name))
         });
         let runs = runs.map(|run| format!("control run {}", run.label()));
         let restores = restores.map(|run| format!("restore of {}", before.device(run.device).name));
         runs.chain(restores).chain(procedures).collect()
+    }
+
+    /// What becomes of procedures whose safe state is not written, where they have not the same name.
+    fn open_procedures(&self, def: &PlantDef) -> Vec<Loss> {
+        let was = self.def.procedures_before(def);
+        let open = |(id, own): (ProcedureId, &ProcedureDef)| {
+            let run = self.procedures.get(id.index())?.as_ref().filter(|run| !run.at_work())?;
+            run.missing().next()?;
+            let successor = was.iter().position(|was| *was == Some(id)).map(|place| &def.procedures[place].name);
+            let what = format!("procedure {}, whose safe state is not written,", own.name);
+            (successor != Some(&own.name)).then(|| Loss { what, becomes: successor.map(|name| name.to_string()) })
+        };
+        (0..).map(ProcedureId).zip(&self.def.procedures).filter_map(open).collect()
     }
 }
 

@@ -56,6 +56,7 @@ pub mod report;
 pub mod record;
 pub(crate) mod interlock;
 pub mod alarm;
+pub(crate) mod place;
 pub(crate) mod ne107;
 pub(crate) mod step_response;
 pub(crate) mod tuning;

@@ -81,6 +81,10 @@ impl AlarmRecord {
 pub struct AlarmIdentity {
     /// Its `id` in the plant file, else subject and condition: `TIC-1.PV high`.
     pub name: Arc<str>,
+    /// What is watched by its line, unit and register, with the condition: known under any name. `None` where another alarm
+    /// of its plant file is there too.
+    #[serde(default)]
+    pub place: Option<Arc<str>>,
     /// It stays until it is reset.
     pub latches: bool,
 }

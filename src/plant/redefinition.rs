@@ -6,9 +6,11 @@ use std::{
 };
 
 use super::{
-    def::{DeviceDef, PlantDef},
+    def::{DeviceDef, PlantDef, ProcedureDef},
     id::{DeviceId, LineId, ProcedureId, TagId},
     line::{LineDef, Transport},
+    number::to_u16,
+    place,
     tag::TagDef,
 };
 
@@ -67,6 +69,13 @@ impl PlantDef {
         self.keeps_ids(other)
             && other.procedures.get(id.index()) == Some(own)
             && lines.all(|line| self.keeps_line(other, line))
+    }
+
+    /// The procedure here that each of another definition goes on as: of the same name, else for certain the one that does the
+    /// same to the same tags.
+    pub fn procedures_before(&self, other: &PlantDef) -> Vec<Option<ProcedureId>> {
+        let was = place::predecessors(&placed_procedures(self), &placed_procedures(other));
+        was.into_iter().map(|was| was.map(|was| ProcedureId(to_u16(was)))).collect()
     }
 }
 
@@ -137,15 +146,32 @@ fn tags_on(def: &PlantDef, line: LineId) -> HashMap<&str, &TagDef> {
     tags.map(|tag| (tag.name.as_str(), tag)).collect()
 }
 
+fn placed_devices(def: &PlantDef) -> Vec<(&str, String)> {
+    def.devices.iter().map(|device| (device.name.as_str(), place::of_device(def, device))).collect()
+}
+
+/// A procedure is where it writes to, in what steps.
+fn placed_procedures(def: &PlantDef) -> Vec<(&str, String)> {
+    let place = |procedure: &ProcedureDef| {
+        let writes: Vec<String> = procedure.writes().map(|(tag, _)| place::of_tag(def, def.tag(tag))).collect();
+        format!("{writes:?} {:?} {:?}", procedure.steps, procedure.safe)
+    };
+    def.procedures.iter().map(|procedure| (&*procedure.name, place(procedure))).collect()
+}
+
+fn placed_tags(def: &PlantDef) -> Vec<(&str, String)> {
+    def.tags.iter().map(|tag| (tag.name.as_str(), place::of_tag(def, tag))).collect()
+}
+
 /// What a definition has of the one before it, by its own ids.
 pub struct Redefinition {
     /// The lines that keep running.
     lines: Vec<bool>,
     /// The lines that keep their ports, each with its id of before.
     ports: Vec<Option<LineId>>,
-    /// The devices that are asked where they were, each with its id of before.
+    /// The devices that are asked where they were, whatever they were called, each with its id of before.
     devices: Vec<Option<DeviceId>>,
-    /// The tags of the same names, each with its id of before.
+    /// The tags of the same names, or [for certain](place::predecessors) of other names, each with its id of before.
     tags: Vec<Option<TagId>>,
     /// Of these, those whose registers are the same, or whose calculation is.
     same_source: Vec<bool>,
@@ -157,16 +183,15 @@ impl Redefinition {
         let lines: Vec<bool> = def.lines.iter().map(|line| before.keeps_line(def, line.id)).collect();
         let port = |line: &LineDef| if lines[line.id.index()] { Some(line.id) } else { before.same_port(def, line.id) };
         let ports = def.lines.iter().map(port).collect();
-        let named: HashMap<&str, &DeviceDef> =
-            before.devices.iter().map(|device| (device.name.as_str(), device)).collect();
-        let same_device = |device: &DeviceDef| {
-            let was = named.get(device.name.as_str())?;
+        let same_device = |(device, was): (&DeviceDef, Option<usize>)| {
+            let was = &before.devices[was?];
             let same_place = was.unit == device.unit && *transport(was.line) == def.line(device.line).transport;
             (lines[device.line.index()] || same_place).then_some(was.id)
         };
-        let devices: Vec<Option<DeviceId>> = def.devices.iter().map(same_device).collect();
-        let named: HashMap<&str, TagId> = before.tags.iter().map(|tag| (tag.name.as_str(), tag.id)).collect();
-        let tags: Vec<Option<TagId>> = def.tags.iter().map(|tag| named.get(tag.name.as_str()).copied()).collect();
+        let was = place::predecessors(&placed_devices(before), &placed_devices(def));
+        let devices: Vec<Option<DeviceId>> = def.devices.iter().zip(was).map(same_device).collect();
+        let was = place::predecessors(&placed_tags(before), &placed_tags(def));
+        let tags: Vec<Option<TagId>> = was.into_iter().map(|was| was.map(|was| before.tags[was].id)).collect();
         let same_source = def.tags.iter().zip(&tags).map(|(tag, was)| {
             let Some(was) = was.map(|was| before.tag(was)) else { return false };
             match (&tag.calculation, &was.calculation) {
@@ -193,8 +218,8 @@ impl Redefinition {
         self.devices[id.index()]
     }
 
-    /// The tag of before with the same name.
-    pub fn named(&self, id: TagId) -> Option<TagId> {
+    /// The tag of before that this one goes on as.
+    pub fn tag(&self, id: TagId) -> Option<TagId> {
         self.tags[id.index()]
     }
 

@@ -43,6 +43,7 @@ use super::{
     traffic::Exchange,
     tuning::TuningTracker,
 };
+use crate::t;
 
 pub use redefine::Redefined;
 pub use restore::SetWork;
@@ -190,10 +191,7 @@ impl Plant {
                 status.report = Some(report);
                 (at, None)
             }
-            Event::Diagnostic { at, line, run } => {
-                self.lines[line.index()].test = Some(run);
-                (at, None)
-            }
+            Event::Diagnostic { at, line, run } => (at, self.tested(line, run, at)),
             Event::Station { at, fault, state } => {
                 self.faults.set(fault, state);
                 (at, None)
@@ -306,6 +304,7 @@ impl Plant {
     /// The station stops: ends all pending commands and the runs at work.
     pub fn on_stop(&mut self) -> Effects {
         let mut effects = Effects::of_actions(self.commands.stop(&self.image, self.at));
+        effects.records.extend(self.end_tests(|_| true, t!("the station stopped")));
         self.stop_procedures(&mut effects);
         effects.records.extend(self.stop_runs());
         effects

@@ -91,7 +91,10 @@ impl NewPlant {
             out,
             "# Made by sightglass from what was found on the line. `sightglass check FILE` checks it after a change;"
         )?;
-        writeln!(out, "# `sightglass profiles` lists the device profiles, and `sightglass help format` explains every key.\n")?;
+        writeln!(
+            out,
+            "# `sightglass profiles` lists the device profiles, and `sightglass help format` explains every key.\n"
+        )?;
         writeln!(out, "title = {}", quoted(&self.title))?;
         writeln!(
             out,

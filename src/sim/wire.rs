@@ -1,13 +1,10 @@
-//! Requests on a serial line as a slave finds them: by the length that the function tells, by silence where it does not.
+//! Requests on a serial line as a slave finds them: what comes between two silences is one frame, whatever its function says.
 
 use super::ascii;
-use crate::bus::{
-    frame::crc16,
-    pdu::{self, Length},
-};
+use crate::bus::frame::crc16;
 
-/// Twice the longest frame of a serial line (Modbus serial line V1.02, 2.5.1): one whole and the beginning of a next.
-const BYTES_MAX: usize = 2 * 256;
+/// The longest frame of a serial line (Modbus serial line V1.02, 2.5.1).
+const BYTES_MAX: usize = 256;
 
 /// A request as a slave found it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,11 +42,19 @@ impl FrameReceiver {
         }
     }
 
-    /// The next thing that is complete: a request, or `None` in its place if it could not be read.
+    /// The next thing that is complete without a silence: a request, or `None` in its place if it could not be read.
     pub fn take(&mut self) -> Option<Option<SlaveRequest>> {
         match self {
-            FrameReceiver::Rtu(receiver) => receiver.take().map(|frame| Some(request(frame))),
+            FrameReceiver::Rtu(_) => None,
             FrameReceiver::Ascii(receiver) => receiver.take(),
+        }
+    }
+
+    /// How many characters there are, if they would be a request with a right check were the line silent from now on.
+    pub fn whole(&self) -> Option<usize> {
+        match self {
+            FrameReceiver::Rtu(receiver) => receiver.is_whole().then_some(receiver.bytes.len()),
+            FrameReceiver::Ascii(_) => None,
         }
     }
 
@@ -80,56 +85,34 @@ fn request(mut frame: Vec<u8>) -> SlaveRequest {
     SlaveRequest { message: frame, characters }
 }
 
-/// Collects the bytes of RTU and cuts whole frames with a right check out of them.
+/// Collects the bytes of RTU up to the next silence.
 #[derive(Debug, Clone, Default)]
 pub struct Receiver {
     bytes: Vec<u8>,
-    lost: bool,
 }
 
 impl Receiver {
-    /// Adds bytes as they arrive. Once the place of a frame is lost, everything up to the next silence is thrown away.
+    /// Adds bytes as they arrive. What is longer than any frame is none, however it goes on.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.extend_from_slice(bytes);
-        self.lost |= self.bytes.len() > BYTES_MAX;
-        if self.lost {
-            self.bytes.truncate(1);
-        }
+        self.bytes.truncate(BYTES_MAX + 1);
     }
 
-    /// The next request that is complete by its length.
-    pub fn take(&mut self) -> Option<Vec<u8>> {
-        match self.length() {
-            Length::Known(length) if !self.lost && self.bytes.len() >= length => {
-                self.lost = crc16(&self.bytes[..length]) != 0;
-                (!self.lost).then(|| self.bytes.drain(..length).collect())
-            }
-            Length::Known(_) | Length::TooEarly | Length::BySilence => None,
-        }
-    }
-
-    /// The line was silent: what is here is one whole request, or rubbish.
+    /// The line was silent: what is here is one request with a right check, or rubbish.
     pub fn on_silent_interval(&mut self) -> Option<Vec<u8>> {
-        let (frame, lost) = (std::mem::take(&mut self.bytes), std::mem::take(&mut self.lost));
-        (!lost && frame.len() >= 4 && crc16(&frame) == 0).then_some(frame)
+        let is_whole = self.is_whole();
+        let frame = std::mem::take(&mut self.bytes);
+        is_whole.then_some(frame)
     }
 
-    /// Whether nothing waits for its rest.
+    /// Whether nothing waits for the silence.
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty()
     }
 
-    /// Length of the request with its check.
-    fn length(&self) -> Length {
-        match pdu::request_length(&self.bytes) {
-            Length::Known(length) if self.bytes.get(1) != Some(&0x08) => Length::Known(length + 2),
-            // An echo may be of any length; with two bytes of data, as is usual, the check fits here.
-            Length::Known(length) => match self.bytes.get(..length + 2).map(crc16) {
-                Some(0) | None => Length::Known(length + 2),
-                Some(_) => Length::BySilence,
-            },
-            other => other,
-        }
+    /// Whether it is a request with a right check, if the line is silent from now on.
+    pub fn is_whole(&self) -> bool {
+        (4..=BYTES_MAX).contains(&self.bytes.len()) && crc16(&self.bytes) == 0
     }
 }
 
@@ -140,39 +123,25 @@ mod tests {
     use super::*;
     use crate::bus::frame::with_crc;
 
-    fn requests() -> Vec<Vec<u8>> {
-        let messages: [&[u8]; 8] = [
-            &[1, 3, 3, 0xEA, 0, 1],
-            &[2, 15, 12, 0, 0, 9, 2, 0xFF, 1],
-            &[1, 16, 3, 0xED, 0, 2, 4, 0, 50, 0, 0],
-            &[2, 0x11],
-            &[2, 0x18, 4, 0],
-            &[2, 8, 0, 0, 0xA5, 0x37],
-            &[2, 0x2B, 14, 1, 0],
-            &[2, 0x17, 0, 0, 0, 1, 0, 0, 0, 1, 2, 0, 0],
-        ];
-        messages.iter().map(|message| with_crc(message)).collect()
-    }
-
-    fn take_all(receiver: &mut Receiver) -> Vec<Vec<u8>> {
-        std::iter::from_fn(|| receiver.take()).collect()
-    }
+    const READ: &[u8] = &[1, 3, 3, 0xEA, 0, 1];
 
     proptest! {
         #[test]
-        fn requests_are_found_however_they_are_cut(cuts in prop::collection::vec(1_usize..20, 1..40)) {
-            let stream = requests().concat();
-            let (mut receiver, mut found, mut rest) = (Receiver::default(), Vec::new(), &stream[..]);
+        fn a_frame_is_what_comes_between_two_silences(
+            message in prop::collection::vec(any::<u8>(), 2..255),
+            cuts in prop::collection::vec(1_usize..20, 1..40),
+        ) {
+            let (mut receiver, frame) = (Receiver::default(), with_crc(&message));
+            let mut rest = &frame[..];
             for cut in cuts.iter().cycle() {
                 let (now, later) = rest.split_at((*cut).min(rest.len()));
                 receiver.push(now);
-                found.extend(take_all(&mut receiver));
                 rest = later;
                 if rest.is_empty() {
                     break;
                 }
             }
-            prop_assert_eq!(found, requests());
+            prop_assert_eq!(receiver.on_silent_interval(), Some(frame));
             prop_assert!(receiver.is_empty());
         }
 
@@ -180,32 +149,21 @@ mod tests {
         fn rubbish_is_forgotten_at_the_next_silence(rubbish in prop::collection::vec(any::<u8>(), 0..1200)) {
             let mut receiver = Receiver::default();
             receiver.push(&rubbish);
-            take_all(&mut receiver);
             receiver.on_silent_interval();
-            receiver.push(&requests()[0]);
-            prop_assert_eq!(receiver.take(), Some(requests()[0].clone()));
+            receiver.push(&with_crc(READ));
+            prop_assert_eq!(receiver.on_silent_interval(), Some(with_crc(READ)));
         }
     }
 
     #[test]
-    fn a_wrong_check_corrupts_everything_up_to_the_silence() {
-        let mut receiver = Receiver::default();
-        receiver.push(&[1, 3, 3, 0xEA, 0, 1, 0, 0]);
-        assert_eq!(receiver.take(), None);
-        receiver.push(&requests()[0]);
-        assert_eq!(receiver.take(), None);
-        assert_eq!(receiver.on_silent_interval(), None);
-        receiver.push(&requests()[0]);
-        assert_eq!(receiver.take(), Some(requests()[0].clone()));
-    }
-
-    #[test]
-    fn a_request_of_unknown_length_ends_with_the_silence() {
-        for message in [&[1, 0x42, 14, 1, 0][..], &[2, 8, 0, 0, 1, 2, 3, 4, 5], &[2, 0x2B, 13, 1, 2, 3]] {
-            let (mut receiver, frame) = (Receiver::default(), with_crc(message));
-            receiver.push(&frame);
-            assert_eq!(receiver.take(), None);
-            assert_eq!(receiver.on_silent_interval(), Some(frame));
+    fn what_is_sent_without_a_silence_is_no_request() {
+        let (read, corrupt) = (with_crc(READ), [1, 3, 3, 0xEA, 0, 1, 0, 0]);
+        let long = with_crc(&[2; 255]);
+        for frames in [[&read[..], &read].concat(), [&read[..], &[7]].concat(), [&corrupt[..], &read].concat(), long] {
+            let mut receiver = Receiver::default();
+            receiver.push(&frames);
+            assert_eq!(receiver.on_silent_interval(), None, "{frames:02X?}");
+            assert!(receiver.is_empty());
         }
     }
 }

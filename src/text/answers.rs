@@ -105,6 +105,7 @@ fn action_words() -> &'static [&'static str] {
         "save settings",
         "test",
         "stop test",
+        "end test",
         "read sets",
         "save set",
         "restore set",

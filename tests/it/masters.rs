@@ -200,6 +200,10 @@ fn the_paced_slave_is_never_faster_than_its_wire() {
     }
     // A broadcast has no answer; the request after it has.
     port.write_all(&with_crc(&[0, 6, 0, 1, 0, 1])).unwrap();
+    // Sent at once, both would be one frame.
+    while slave.heard() < 3 {
+        std::thread::yield_now();
+    }
     port.write_all(&with_crc(&[7, 6, 0, 1, 0, 9])).unwrap();
     let mut echo = [0; 8];
     port.read_exact(&mut echo).unwrap();

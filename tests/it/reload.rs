@@ -346,6 +346,10 @@ async fn no_alarm_leaves_without_an_event() {
     fs::write(folder.path().join("other.toml"), &text).unwrap();
     let (done, said) = station.call(&["check", "other.toml", "--against", "both"]);
     assert!(done && said.contains("against both: alarm DA.R1 over (UNACK) ends"), "{said}");
+    // The same register by another name has the same alarm.
+    fs::write(folder.path().join("other.toml"), with_alarm(&text, "over").replace("R1", "FLOW")).unwrap();
+    let (done, said) = station.call(&["check", "other.toml", "--against", "both"]);
+    assert!(done && said.contains("against both: alarm DA.R1 over (UNACK) goes on as DA.FLOW over"), "{said}");
     // Another message is the same alarm.
     let (done, said) = station.reload(&with_alarm(&text, "too high"));
     assert!(done && said.contains("alarm DA.R1 over (UNACK) goes on as DA.R1 too high"), "{said}");

@@ -5,6 +5,7 @@
 """
 
 import sys
+import time
 
 PXR, DL06 = 1, 2
 
@@ -161,6 +162,8 @@ def ask_what_only_pymodbus_can(master, mode):
     print("PXR has none", master.read_device_information(read_code=1, object_id=0, device_id=PXR))
     if mode != "tcp":
         master.client.write_register(1002, 500, device_id=0, no_response_expected=True)
+        # The turnaround after a broadcast, which the library leaves out: without it both frames are one.
+        time.sleep(0.2)
         print("broadcast", master.holding(PXR, 1002, 1), master.holding(DL06, 1002, 1))
 
 

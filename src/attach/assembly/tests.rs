@@ -84,6 +84,8 @@ fn full() -> Snapshot {
         started: now(),
         done: 3,
         total: 9,
+        requests: 3,
+        errors: 1,
         now: Some(DiagnosticStep::Request { unit: 3, function: 8, serial: None }),
         state: DiagnosticState::Running,
         findings: Vec::new(),

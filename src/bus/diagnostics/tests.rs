@@ -293,3 +293,50 @@ fn a_port_without_signals_ends_the_test_with_the_reason() {
     assert_eq!((run.done, run.state), (1, DiagnosticState::Failed("this port has none".to_owned())));
     assert_eq!(run.findings, []);
 }
+
+#[test]
+fn the_outcome_of_a_test_counts_its_requests_and_errors() {
+    let timeout = |_: &[u8]| Err(Fault::Timeout);
+    let refuses = |code| move |_: &[u8]| Err(Fault::Exception(ExceptionCode(code)));
+    let echo = |request: &[u8]| Ok(request.to_vec());
+    let loopback = Diagnostic::Loopback { unit: 1, data: 0, count: 2 };
+    let read = Diagnostic::Read { unit: 1, table: Table::Holding, address: 0, count: 1 };
+    let scan = Diagnostic::Scan(Scan { first: 1, last: 3, serials: vec![], timeout: Duration::from_millis(100) });
+    let zero = |_: &[u8]| Ok(vec![1, 3, 2, 0, 0]);
+    let identify = Diagnostic::Identify { unit: 1 };
+    let server = |request: &[u8]| match request[1] {
+        0x11 => Ok(vec![1, 0x11, 2, b'X', 0xFF]),
+        _ => Err(Fault::Exception(ExceptionCode(1))),
+    };
+    let write = Diagnostic::Write(RegisterWrite::holding(5, 1, 2));
+    let outcomes = [
+        run(loopback.clone(), echo),
+        run(loopback, timeout),
+        run(read.clone(), zero),
+        run(read, refuses(2)),
+        run(scan.clone(), refuses(1)),
+        run(scan, timeout),
+        run(identify.clone(), server),
+        run(identify, timeout),
+        run(write, zero),
+        run(Diagnostic::Pattern { bits: 8, count: 4 }, timeout),
+    ];
+    let texts = outcomes.map(|run| run.outcome_text());
+    let expected = [
+        "passed: 3 requests, no errors; 2 of 2 came back, 12.0 to 12.0 ms",
+        "failed: 3 requests, 2 errors; none of 2 came back",
+        "passed: 1 request, no errors",
+        "failed: 1 request, 1 error; exception 02, illegal data address",
+        "passed: 3 requests, no errors; 3 answers",
+        "failed: 3 requests, no errors; no unit answers within 100 ms",
+        "passed: 2 requests, no errors",
+        "failed: 3 requests, 3 errors; response timeout",
+        "failed: 1 request, no errors; refused: it was changed to 0 after it was shown",
+        "passed: 4 requests, no errors; 128 bytes sent, 128 received: 0 wrong, 0 missing, 0 more than sent; 0.0 % faults",
+    ];
+    assert_eq!(texts.each_ref().map(String::as_str), expected);
+    let test = SignalTest { signal: OutputSignal::Rts, on: false, seconds: 1 };
+    let put_back = with_signals(test, |ask| Ok(if *ask == Ask::PutBack { 0x004 } else { 0 }));
+    assert_eq!(put_back.outcome_text(), "passed: RTS was set and put back; no input changed with it");
+    assert!(with_signals(test, |_| Ok(0x004)).outcome_text().starts_with("failed: the port did not set RTS"));
+}

@@ -21,6 +21,7 @@ use super::{
 use crate::{
     history::{
         ArchiveFile, HistoryError,
+        recorded::{Epochs, Leg},
         tiers::{Aggregate, CurvePart, HOUR, Piece, Tier, floor, pieces},
     },
     plant::{def::TagId, exact::Exact},
@@ -102,8 +103,34 @@ impl Store {
             })?;
             return Ok(Vec::new());
         }
+        self.each_held(tags, (from, to), &Epochs::All, each)
+    }
+
+    /// The same of a leg. Of one setting of the clock among others only samples tell: where they are deleted nothing is known.
+    pub(super) fn each_part_in(
+        &self,
+        tags: &[TagId],
+        leg: &Leg,
+        widest: Tier,
+        each: impl FnMut(usize, CurvePart),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        let (Some(from), Some(to)) = (instant(leg.from), instant(leg.to)) else { return Ok(Vec::new()) };
+        match &leg.epochs {
+            Epochs::All => self.each_part(tags, (from, to), widest, each),
+            _ if self.deleted_until(Tier::Raw)?.is_some_and(|until| from < until) => Ok(Vec::new()),
+            of @ (Epochs::One(_) | Epochs::Without(_)) => self.each_held(tags, (from, to), of, each),
+        }
+    }
+
+    fn each_held(
+        &self,
+        tags: &[TagId],
+        (from, to): (Timestamp, Timestamp),
+        of: &Epochs,
+        mut each: impl FnMut(usize, CurvePart),
+    ) -> Result<Vec<Gap>, HistoryError> {
         let mut steps = vec![StepSeries::new(from, to); tags.len()];
-        let gaps = self.each_sample(tags, from, to, |place, sample| {
+        let gaps = self.each_sample_of(tags, (from, to), of, |place, sample| {
             if let Some(held) = steps[place].next(sample) {
                 each(place, CurvePart::Held(held));
             }

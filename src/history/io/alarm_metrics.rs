@@ -116,8 +116,13 @@ impl Store {
 
     /// The same with what was active before, in parts in order of time: several where the clock was set back.
     pub(super) fn event_legs(&self, from: Timestamp, to: Timestamp) -> Result<Vec<EventLeg>, HistoryError> {
+        self.events_of(self.legs(from, to)?)
+    }
+
+    /// The same of some legs.
+    pub(super) fn events_of(&self, legs: Vec<Leg>) -> Result<Vec<EventLeg>, HistoryError> {
         let mut all = Vec::new();
-        for Leg { from, to, epochs, began, ended } in self.legs(from, to)? {
+        for Leg { from, to, epochs, began, ended } in legs {
             let (Some(begin), Some(end)) = (instant(from), instant(to)) else { continue };
             let from = began.and_then(instant).map_or(begin, |began| began.max(begin));
             let until = ended.and_then(instant).map_or(end, |ended| ended.min(end));

@@ -20,6 +20,8 @@ use super::{
 use crate::{
     history::{
         HistoryError,
+        legs::clip,
+        recorded::{self, Epochs, Leg},
         tiers::{Aggregate, CurvePart, HOUR, Piece, Tier, floor, rise},
     },
     plant::{
@@ -72,8 +74,8 @@ impl CountedTag {
     }
 
     /// The span begins: what was counted before is not in it.
-    fn begin(&mut self, span: Range<i64>) {
-        (self.span, self.gain, self.steps) = (span, Exact::default(), Vec::new());
+    fn begin(&mut self) {
+        (self.gain, self.steps) = (Exact::default(), Vec::new());
     }
 
     /// Books what was counted at an instant.
@@ -154,18 +156,21 @@ fn unsaid(step: CounterStep) -> (CounterStep, String) {
 }
 
 impl Store {
-    /// Counts in a span, each tag from what it showed before it.
+    /// Counts in what lies of legs in a period, each tag from what it showed before it.
     pub(super) fn count(
         &self,
         mut tags: Vec<(TagId, CountedTag)>,
-        (from, to): (Timestamp, Timestamp),
+        legs: &[Leg],
+        period: &Range<i64>,
     ) -> Result<Vec<(TagId, CountedTag)>, HistoryError> {
-        let span = from.as_microsecond()..to.as_microsecond();
+        let within = clip(legs, period);
+        // What lies between two legs in the period was counted in another one.
+        let legs = if let [Leg { epochs: Epochs::All, .. }] = legs { within.as_slice() } else { legs };
+        let Some(first) = legs.first() else { return Ok(tags) };
         // Of a time to which the clock came back all is read: each epoch goes on from what the one before it ended with.
         let doubled = self.doubled()?;
-        let around = |at: i64| doubled.iter().map(|of| of.span.clone()).find(|span| span.start < at && at < span.end);
-        let begin = around(span.start).map_or(span.start, |around| around.start);
-        let end = around(span.end).map_or(span.end, |around| around.end);
+        let around = |at: i64| doubled.iter().map(|of| of.span.clone()).find(|span| span.start <= at && at < span.end);
+        let begin = around(first.from).map_or(first.from, |around| around.start);
         let week = floor(begin - pace::HOURS * HOUR, HOUR);
         self.count_before(&mut tags, week, begin)?;
         let (known, mut unknown): (Vec<_>, Vec<_>) = tags.into_iter().partition(|(_, tag)| tag.is_known());
@@ -174,19 +179,59 @@ impl Store {
             self.count_before(&mut unknown, floor(begin - LATEST, HOUR), week)?;
             tags.append(&mut unknown);
         }
-        tags.iter_mut().for_each(|(_, tag)| tag.begin(span.clone()));
-        for piece in self.pieces(begin..end, Tier::Hour)? {
-            self.count_piece(&mut tags, piece, i64::MIN)?;
+        if let Some(around) = around(first.from).filter(|_| first.epochs != Epochs::All) {
+            // What other clocks showed before, in the same time.
+            let before = recorded::legs(&doubled, around.start, around.end);
+            let before = before.into_iter().take_while(|leg| leg.epochs != first.epochs);
+            let own = Leg { from: around.start, to: first.from, ..first.clone() };
+            for leg in before.chain([own]) {
+                self.count_leg(&mut tags, &leg)?;
+            }
+        }
+        tags.iter_mut().for_each(|(_, tag)| tag.begin());
+        for leg in legs {
+            tags.iter_mut().for_each(|(_, tag)| tag.span = leg.from.max(period.start)..leg.to.min(period.end));
+            match leg.epochs {
+                Epochs::All => {
+                    let start = around(leg.from).map_or(leg.from, |around| around.start);
+                    let end = around(leg.to).filter(|around| around.start < leg.to).map_or(leg.to, |around| around.end);
+                    for piece in self.pieces(start..end, Tier::Hour)? {
+                        self.count_piece(&mut tags, piece, i64::MIN)?;
+                    }
+                }
+                Epochs::One(_) | Epochs::Without(_) => self.count_leg(&mut tags, leg)?,
+            }
         }
         tags.iter_mut().for_each(|(_, tag)| tag.end());
-        for correction in self.list(sql::CORRECTIONS, params![counter::CORRECT, utc(from), utc(to)], action)? {
+        for leg in &within {
+            self.correct(&mut tags, leg)?;
+        }
+        Ok(tags)
+    }
+
+    /// Counts what one setting of the clock stored in a time that others stored in, too.
+    fn count_leg(&self, tags: &mut [(TagId, CountedTag)], leg: &Leg) -> Result<(), HistoryError> {
+        let ids: Vec<TagId> = tags.iter().map(|(id, _)| *id).collect();
+        self.each_part_in(&ids, leg, Tier::Raw, |place, part| {
+            if let CurvePart::Held(held) = part {
+                tags[place].1.read(held.value, held.from, held.to);
+            }
+        })?;
+        Ok(())
+    }
+
+    /// Applies the corrections of users that were entered in a leg.
+    fn correct(&self, tags: &mut [(TagId, CountedTag)], leg: &Leg) -> Result<(), HistoryError> {
+        let (Some(from), Some(to)) = (instant(leg.from), instant(leg.to)) else { return Ok(()) };
+        let sql = sql::corrections(&leg.epochs.condition());
+        for correction in self.list(&sql, params![counter::CORRECT, utc(from), utc(to)], action)? {
             let amount = correction.new.as_deref().and_then(|new| new.split(' ').next()?.parse().ok());
             let tag = tags.iter_mut().find(|(id, _)| *self.def.tag(*id).name == *correction.target);
             if let (Some((_, tag)), Some(amount)) = (tag, amount) {
                 tag.correct(&correction, amount);
             }
         }
-        Ok(tags)
+        Ok(())
     }
 
     /// Finds what tags show at the end of a span.

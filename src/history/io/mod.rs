@@ -71,6 +71,7 @@ pub mod restore;
 pub mod reunite;
 pub mod import;
 pub mod compact;
+mod gather;
 pub mod report;
 mod reports;
 pub mod alarm_metrics;

@@ -11,32 +11,23 @@ use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    counts::CountedTag,
     read::{ROWS_MAX, SAMPLES_MAX, action, chain_hash, check_span},
     sql,
     store::{Store, utc},
 };
 use crate::{
-    history::{
-        HistoryError,
-        recorded::seconds,
-        series::Span,
-        tiers::{Aggregate, CurvePart, Tier},
-    },
+    history::{HistoryError, series::Span},
     plant::{
         PlantDef,
-        counter::{self, CounterRule, CounterStep},
         def::{DeviceDef, Section, TagId, TrendGroup},
-        exact::Exact,
         report::PeriodKind,
         tag::{Access, DataType, Poll, TagDef},
         time::elapsed,
     },
     report::{
-        Compared, Gap, Outage, Period, RecordRow, RunFigures, ShiftReport, TagFigures, calendar,
+        Compared, Outage, Period, RecordRow, ShiftReport, calendar,
         chart::{Chart, ChartCurve},
-        counters::CounterRow,
-        figures::{self, EventLeg, Figures, TagDescription, Trace},
+        figures::{self, EventLeg, TagDescription, Trace},
         step_series::ValuesAt,
     },
 };
@@ -48,74 +39,6 @@ const TRACED_MAX: usize = 100;
 const TRACED_TAGS_MAX: usize = 8;
 /// Columns of a curve.
 const COLUMNS: usize = 240;
-
-/// What is gathered of one tag.
-struct Gathered {
-    figures: Option<Figures>,
-    latest_good: Option<Exact>,
-}
-
-impl Gathered {
-    fn add(&mut self, part: CurvePart) {
-        let (first, stats) = match part {
-            CurvePart::Held(held) => (held.value, held.into()),
-            CurvePart::Aggregate(Aggregate { stats, first, .. }) => (first, stats),
-        };
-        if let Some(figures) = &mut self.figures {
-            figures.add(first, stats);
-        }
-        self.latest_good = Some(stats.last);
-    }
-}
-
-/// What is gathered of some tags over a span.
-pub(super) struct GatheredTags {
-    of: HashMap<TagId, Gathered>,
-    latest: HashMap<TagId, f64>,
-    counted: HashMap<TagId, CountedTag>,
-    pub unreadable: Vec<Gap>,
-}
-
-impl GatheredTags {
-    /// The figures of some of them, each once, with the events of the span.
-    pub(super) fn rows(&self, def: &PlantDef, tags: &[TagId], events: &[EventLeg]) -> Vec<TagFigures> {
-        let in_alarm = figures::times_in_alarm(events);
-        let row = |tag: &TagId| {
-            let label = TagDescription::new(def.tag(*tag), &self.latest);
-            let in_alarm = in_alarm.get(label.tag.as_str()).copied().unwrap_or_default();
-            Some(self.of.get(tag)?.figures?.end(label, self.gain(*tag), in_alarm))
-        };
-        tags.iter().filter_map(row).collect()
-    }
-
-    /// The run hours of the actuators.
-    fn runs(&self, def: &PlantDef) -> Vec<RunFigures> {
-        let row = |tag: TagId| Some(self.of.get(&tag)?.figures?.runs(def.tag(tag).name.clone(), self.gain(tag)));
-        outputs(def).filter_map(row).collect()
-    }
-
-    /// What counters did beside counting, in order of time.
-    fn counters(&self, def: &PlantDef) -> Vec<CounterRow> {
-        let rows = self.counted.iter().flat_map(|(tag, counted)| {
-            let TagDescription { tag, unit, decimals, counts } = TagDescription::new(def.tag(*tag), &self.latest);
-            let row = move |(step, note): &(CounterStep, String)| CounterRow {
-                tag: tag.clone(),
-                unit: unit.clone(),
-                decimals,
-                step: *step,
-                note: note.clone(),
-            };
-            counted.steps.iter().filter(move |_| counts).map(row)
-        });
-        let mut rows: Vec<CounterRow> = rows.collect();
-        rows.sort_by(|one, other| (one.step.at, &one.tag).cmp(&(other.step.at, &other.tag)));
-        rows
-    }
-
-    fn gain(&self, tag: TagId) -> Exact {
-        self.counted.get(&tag).map_or(Exact::default(), |counted| counted.gain)
-    }
-}
 
 /// The controller of the record.
 struct Recorded {
@@ -155,8 +78,7 @@ impl Store {
         let tags = gathered.rows(def, &reported, &events);
         let (counters, runs) = (gathered.counters(def), gathered.runs(def));
         let charts = self.charts((from, until), &gathered.latest)?;
-        let (control_runs, left_out) = self.control_runs_of(from, until)?;
-        let run_parts = self.run_parts(&control_runs, from)?;
+        let (control_runs, run_parts, left_out) = self.control_runs_of(from, until)?;
         let mut unreadable = gathered.unreadable;
         unreadable.extend(left_out);
         let compared = self.compared(&reported, period, until)?;
@@ -281,31 +203,6 @@ impl Store {
         Ok(outage.traced(&traces, not_before))
     }
 
-    /// Gathers the figures of some tags over a span, and the latest good values of those that choose their units and
-    /// decimals and of `more`.
-    pub(super) fn gather(
-        &self,
-        shown: &[TagId],
-        more: impl Iterator<Item = TagId>,
-        (from, until): (Timestamp, Timestamp),
-    ) -> Result<GatheredTags, HistoryError> {
-        let tags = tags_to_read(&self.def, shown, more);
-        let seconds = seconds(&self.legs(from, until)?);
-        let shown: HashSet<TagId> = shown.iter().copied().collect();
-        let gather =
-            |tag: &TagId| Gathered { figures: shown.contains(tag).then(|| Figures::new(seconds)), latest_good: None };
-        let mut gathered: Vec<Gathered> = tags.iter().map(gather).collect();
-        let unreadable = self.each_part(&tags, (from, until), Tier::Hour, |place, part| gathered[place].add(part))?;
-        let latest = tags
-            .iter()
-            .zip(&gathered)
-            .filter_map(|(tag, gathered)| Some((*tag, gathered.latest_good?.near())))
-            .collect();
-        let counted = self.count(counting(&self.def, &shown, &latest), (from, until))?.into_iter().collect();
-        let of = tags.into_iter().zip(gathered).collect();
-        Ok(GatheredTags { of, latest, counted, unreadable })
-    }
-
     fn record(
         &self,
         recorded: &Recorded,
@@ -341,24 +238,12 @@ impl Store {
 }
 
 /// The stored outputs of actuators that are on or off, and what else has its hours given; each once.
-fn outputs(def: &PlantDef) -> impl Iterator<Item = TagId> {
+pub(super) fn outputs(def: &PlantDef) -> impl Iterator<Item = TagId> {
     let outputs = def.logic.actuators.iter().map(|actuator| actuator.output);
     let outputs = outputs.filter(|tag| def.tag(*tag).point.kind == DataType::Bool);
     let asked = def.tags.iter().filter(|tag| tag.hours).map(|tag| tag.id);
     let mut seen = HashSet::new();
     outputs.chain(asked).filter(|tag| def.tag(*tag).is_stored()).filter(move |tag| seen.insert(*tag))
-}
-
-/// Those of some tags that count, and how.
-fn counting(def: &PlantDef, tags: &HashSet<TagId>, latest: &HashMap<TagId, f64>) -> Vec<(TagId, CountedTag)> {
-    let switched: HashSet<TagId> = outputs(def).collect();
-    let of_tag = |tag: &TagId| {
-        let of = def.tag(*tag);
-        let rule = || CounterRule::of(of, of.scaling_decimals(|tag| latest.get(&tag).copied()));
-        let counter = counter::may_count(of).then(|| CountedTag::counter(rule()));
-        Some((*tag, counter.or_else(|| switched.contains(tag).then(CountedTag::starts))?))
-    };
-    tags.iter().filter_map(of_tag).collect()
 }
 
 fn rows(from: Timestamp, until: Timestamp, interval: Duration) -> u64 {
@@ -375,15 +260,5 @@ fn reported_tags(def: &PlantDef) -> Vec<TagId> {
     };
     let mut seen = HashSet::new();
     tags.retain(|tag| seen.insert(*tag));
-    tags
-}
-
-/// Some tags, those that choose their units and decimals, and `more`.
-fn tags_to_read(def: &PlantDef, shown: &[TagId], more: impl Iterator<Item = TagId>) -> Vec<TagId> {
-    let mut tags: Vec<TagId> = shown.iter().copied().chain(more).collect();
-    let scaling_tags: Vec<TagId> = tags.iter().flat_map(|tag| figures::scaling_tags(def.tag(*tag))).collect();
-    tags.extend(scaling_tags);
-    tags.sort_unstable_by_key(|tag| tag.index());
-    tags.dedup();
     tags
 }

@@ -1,20 +1,23 @@
 //! Control runs as they are stored.
 
-use std::time::Duration;
+use std::{ops::Range, time::Duration};
 
 use duckdb::{Appender, Row, params};
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    read::{check_span, maybe_time, shared, time},
-    store::{Store, utc},
+    read::{self, check_span, maybe_time, shared},
+    store::{Store, instant, utc},
 };
 use crate::{
-    history::HistoryError,
+    history::{
+        HistoryError,
+        legs::{Position, back, between, clip, end_of_period, joined, time, widened},
+        recorded::{Doubled, Leg, micros},
+    },
     plant::{
         control_run::{ControlRun, Figure, RunCause, RunState, STORED},
         keyword::Keyword,
-        time::elapsed,
     },
     report::{
         Gap, batch,
@@ -24,7 +27,7 @@ use crate::{
 
 const COLUMNS: &str =
     "utc, controller, number, place, state, cause, detail, begin_seen, until_utc, sv_before, sv, pv, unit,
-    decimals, band, settings, settings_changed, at_sv, steady, rise, overshoot, final_offset, iae, kwh, kwh_good, good";
+    decimals, band, settings, settings_changed, at_sv, steady, rise, overshoot, final_offset, iae, kwh, kwh_good, good, epoch";
 /// The last record of each run.
 const LATEST: &str = "rowid IN (SELECT max(rowid) FROM control_run GROUP BY controller, number)";
 /// A time that is not known.
@@ -46,60 +49,88 @@ impl Store {
     }
 
     /// The runs of a period for its report as they stood at its end, whenever it is made: newest first; of too many the span
-    /// of those that are left out.
+    /// of those that are left out. With what lies in the period of those that do not lie in it as a whole.
     pub(super) fn control_runs_of(
         &self,
         from: Timestamp,
         until: Timestamp,
-    ) -> Result<(Vec<ControlRun>, Option<Gap>), HistoryError> {
+    ) -> Result<(Vec<ControlRun>, Vec<RunPart>, Option<Gap>), HistoryError> {
         check_span(from, until)?;
         let sql = format!(
             "SELECT {COLUMNS} FROM control_run
-             WHERE rowid IN (SELECT max(rowid) FROM control_run WHERE until_utc <= ?1 GROUP BY controller, number)
-             AND utc < ?1 AND (until_utc >= ?2 OR state = ?3 AND until_utc >= ?4)
+             WHERE rowid IN (SELECT max(rowid) FROM control_run
+                WHERE until_utc <= ?1 OR epoch < ?7 AND until_utc < ?6 GROUP BY controller, number)
+             AND utc < ?6 AND (until_utc >= ?2 OR state = ?3 AND until_utc >= ?4)
              ORDER BY utc DESC, controller, number DESC LIMIT ?5"
         );
-        let at_work = from.saturating_sub(SignedDuration::try_from(STORED.1).unwrap_or_default()).unwrap_or(from);
-        let values = params![utc(until), utc(from), RunState::Running.word(), utc(at_work), RUNS_MAX as u64 + 1];
-        let mut runs = self.list(&sql, values, run)?;
-        let left_out = runs.drain(RUNS_MAX.min(runs.len())..).next().map(|first| {
+        let doubled = self.doubled()?;
+        let period = from.as_microsecond()..until.as_microsecond();
+        let (asked, now) = (widened(&doubled, period.clone()), end_of_period(&doubled, period.end));
+        let (begin, end) = (instant(asked.start).unwrap_or(from), instant(asked.end).unwrap_or(until));
+        let at_work = begin.saturating_sub(SignedDuration::try_from(STORED.1).unwrap_or_default()).unwrap_or(begin);
+        let most = RUNS_MAX as u64 + 1;
+        let values = params![utc(until), utc(begin), RunState::Running.word(), utc(at_work), most, utc(end), now.0];
+        let mut runs = self.list(&sql, values, dated)?;
+        let left_out = runs.drain(RUNS_MAX.min(runs.len())..).next().map(|(_, first)| {
             let why = format!("only the latest {RUNS_MAX} control runs are listed");
             Gap { from: from.min(first.from), to: first.until, why }
         });
-        for run in runs.iter_mut().filter(|run| run.is_running()) {
-            match self.ended {
-                // The next station will say so, too.
-                Some(ended) if ended <= until => *run = run.interrupted().unwrap_or_else(|| run.clone()),
-                // It was stored some minutes before.
-                Some(_) | None => {
-                    run.until = until;
-                    run.energy = self.run_energy(run, (run.from, until))?.or(run.energy);
-                }
+        let (mut found, mut parts) = (Vec::new(), Vec::new());
+        for (epoch, run) in runs {
+            let (run, legs) = self.as_of(run, epoch, &doubled, now)?;
+            let within = clip(&legs, &period);
+            if !legs.is_empty() && within.is_empty() {
+                continue;
+            }
+            if within != legs {
+                let energy = self.run_energy(&run, &legs, &period)?;
+                parts.push(RunPart { run: run.label(), lasted: time(&within), energy });
+            }
+            found.push(run);
+        }
+        Ok((found, parts, left_out))
+    }
+
+    /// A run as it was at an instant, and where it lies. It lasted as long as it says, whatever clocks showed since it began.
+    fn as_of(
+        &self,
+        mut run: ControlRun,
+        epoch: u16,
+        doubled: &[Doubled],
+        now: Position,
+    ) -> Result<(ControlRun, Vec<Leg>), HistoryError> {
+        let stored = (epoch, run.until.as_microsecond());
+        let lasted = i64::try_from(run.lasted().as_micros()).unwrap_or(i64::MAX);
+        let mut legs = back(doubled, stored, lasted);
+        let Some(until) = instant(now.1).filter(|_| run.is_running()) else { return Ok((run, legs)) };
+        match self.ended {
+            // The next station will say so, too.
+            Some(ended) if ended <= until => run = run.interrupted().unwrap_or(run),
+            // It was stored some minutes before.
+            Some(_) | None => {
+                legs.extend(between(doubled, stored, now));
+                legs = joined(legs);
+                let lasted = SignedDuration::from_micros(micros(&legs));
+                (run.from, run.until) = (until.saturating_sub(lasted).unwrap_or(run.from), until);
+                run.energy = self.run_energy(&run, &legs, &(i64::MIN..i64::MAX))?.or(run.energy);
             }
         }
-        Ok((runs, left_out))
+        Ok((run, legs))
     }
 
-    /// What lies in a period of the runs that began before it.
-    pub(super) fn run_parts(&self, runs: &[ControlRun], from: Timestamp) -> Result<Vec<RunPart>, HistoryError> {
-        let part = |run: &ControlRun| {
-            let energy = self.run_energy(run, (from, run.until))?;
-            Ok(RunPart { run: run.label(), lasted: elapsed(from, run.until), energy })
-        };
-        runs.iter().filter(|run| run.from < from).map(part).collect()
-    }
-
-    /// The energy of a run in a span, and the share of it in which it is known.
+    /// The energy of what lies of a run in a period, and the share of that time in which it is known.
     fn run_energy(
         &self,
         run: &ControlRun,
-        (from, until): (Timestamp, Timestamp),
+        legs: &[Leg],
+        period: &Range<i64>,
     ) -> Result<Option<(f64, f64)>, HistoryError> {
         let rule = self.def.runs.iter().find(|rule| *self.def.device(rule.controller).name == *run.controller);
-        let Some((tag, _)) = rule.and_then(|rule| rule.energy).filter(|_| from < until) else { return Ok(None) };
-        let gathered = self.gather(&[tag], std::iter::empty(), (from, until))?;
+        let energy = rule.and_then(|rule| rule.energy).filter(|_| !clip(legs, period).is_empty());
+        let Some((tag, _)) = energy else { return Ok(None) };
+        let gathered = self.gather_of(&[tag], std::iter::empty(), legs, period)?;
         let figures = gathered.rows(&self.def, &[tag], &[]);
-        Ok(figures.first().and_then(|figures| batch::energy(figures, elapsed(from, until))))
+        Ok(figures.first().and_then(|figures| batch::energy(figures, gathered.time)))
     }
 
     /// The latest run of each controller.
@@ -161,11 +192,16 @@ fn figure(row: &Row, column: usize) -> duckdb::Result<Figure> {
     })
 }
 
+/// With the epoch of the clock that it was stored by.
+fn dated(row: &Row) -> duckdb::Result<(u16, ControlRun)> {
+    Ok((row.get(26)?, run(row)?))
+}
+
 fn run(row: &Row) -> duckdb::Result<ControlRun> {
     let state: String = row.get(4)?;
     let cause: String = row.get(5)?;
     Ok(ControlRun {
-        from: time(row)?,
+        from: read::time(row)?,
         controller: shared(row, 1)?,
         number: row.get(2)?,
         place: row.get(3)?,

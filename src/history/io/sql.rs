@@ -164,9 +164,12 @@ pub fn actions(order: &str) -> String {
 }
 
 /// The corrections of counters in a span that were accepted, oldest first.
-pub const CORRECTIONS: &str =
-    "SELECT utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash
-    FROM operator_action WHERE action = ? AND outcome = 'verified' AND utc >= ? AND utc < ? ORDER BY utc, rowid";
+pub fn corrections(epochs: &str) -> String {
+    format!(
+        "SELECT utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash
+        FROM operator_action WHERE action = ? AND outcome = 'verified' AND utc >= ? AND utc < ?{epochs} ORDER BY utc, rowid"
+    )
+}
 
 /// Actions in a span, newest first, with a part of who, of the action, and of the words of all columns; large and small
 /// letters are the same. An empty part is in everything.

@@ -9,7 +9,10 @@ use super::{
     store::{Store, instant},
 };
 use crate::{
-    history::{HistoryError, recorded::StoredSamples},
+    history::{
+        HistoryError,
+        recorded::{Epochs, Leg, StoredSamples},
+    },
     plant::{
         def::TagId,
         sample::{Cause, Quality, Sample},
@@ -44,11 +47,22 @@ impl Store {
         tags: &[TagId],
         from: Timestamp,
         to: Timestamp,
+        each: impl FnMut(usize, Sample),
+    ) -> Result<Vec<Gap>, HistoryError> {
+        self.each_sample_of(tags, (from, to), &Epochs::All, each)
+    }
+
+    /// The same of some epochs only, in a time that is theirs among others: what holds at its begin may be of one before.
+    pub(super) fn each_sample_of(
+        &self,
+        tags: &[TagId],
+        (from, to): (Timestamp, Timestamp),
+        of: &Epochs,
         mut each: impl FnMut(usize, Sample),
     ) -> Result<Vec<Gap>, HistoryError> {
         let all = 0..tags.len();
         let mut held: Vec<Option<Sample>> = vec![None; tags.len()];
-        let gaps = self.each_row(&self.wanted(tags), (in_force(from), to), |read| match read {
+        let gaps = self.each_row(&self.wanted(tags), (in_force(from), to), of, |read| match read {
             Read::Sample(place, sample) => {
                 held[place as usize] = Some(sample);
                 each(place as usize, sample);
@@ -100,7 +114,7 @@ impl Store {
         mut each: impl FnMut(u16, Sample),
     ) -> Result<Vec<Gap>, HistoryError> {
         let all = Wanted::all(condition);
-        self.each_row(&all, (in_force(from), to), |read| {
+        self.each_row(&all, (in_force(from), to), &Epochs::All, |read| {
             if let Read::Sample(place, sample) = read {
                 each(u16::try_from(place).unwrap_or(u16::MAX), sample);
             }
@@ -111,19 +125,36 @@ impl Store {
         &self,
         wanted: &Wanted,
         (from, to): (Timestamp, Timestamp),
+        of: &Epochs,
         mut each: impl FnMut(Read),
     ) -> Result<Vec<Gap>, HistoryError> {
         let mut gaps = Vec::new();
-        let legs = self.legs(from, to)?;
+        let mut legs = self.legs(from, to)?;
+        let is_read = |leg: &Leg| match of {
+            Epochs::All => true,
+            // What was before a doubled time holds on into its first epoch.
+            Epochs::Without(_) => *of == leg.epochs || leg.epochs == Epochs::All,
+            Epochs::One(_) => *of == leg.epochs,
+        };
+        let last = legs.iter().rposition(|leg| leg.epochs == *of).filter(|_| *of != Epochs::All);
+        legs.truncate(last.map_or(legs.len(), |last| last + 1));
         for (place, leg) in legs.iter().enumerate() {
             let (Some(from), Some(to), epochs) = (instant(leg.from), instant(leg.to), leg.epochs.condition()) else {
                 continue;
             };
-            gaps.extend(self.each_row_of(wanted, &epochs, (from, to), &mut each)?);
-            let next = legs.get(place + 1).and_then(|next| instant(next.began?));
-            let (Some(ended), Some(began)) = (leg.ended.and_then(instant), next) else { continue };
+            let mut own = |read| match (is_read(leg), read) {
+                (true, read) => each(read),
+                (false, Read::Sample(place, sample)) => each(Read::Held(place, sample)),
+                (false, Read::Held(..) | Read::Nothing(..) | Read::Set(..)) => {}
+            };
+            gaps.extend(self.each_row_of(wanted, &epochs, (from, to), &mut own)?);
+            let next = legs.get(place + 1);
+            let (Some(ended), true) = (leg.ended.and_then(instant), next.is_some() || *of != Epochs::All) else {
+                continue;
+            };
             // Its values hold until the clock was set back, and then from there on.
-            each(Read::Nothing(Cause::StationOff, ended.min(to)));
+            own(Read::Nothing(Cause::StationOff, ended.min(to)));
+            let Some(began) = next.filter(|next| is_read(next)).and_then(|next| instant(next.began?)) else { continue };
             let end = instant(ended.as_microsecond() + 1).unwrap_or(ended);
             let rest = (to.max(in_force(ended)), end);
             if rest.0 < rest.1 {
@@ -155,7 +186,7 @@ impl Store {
         };
         let (wanted, mut over) = (self.wanted(&tags), None);
         match epoch {
-            None => self.each_row(&wanted, (from, to), each)?,
+            None => self.each_row(&wanted, (from, to), &Epochs::All, each)?,
             Some(epoch) => {
                 over = self.over(epoch)?;
                 self.each_row_of(&wanted, &format!(" AND coalesce(epoch, 0) = {epoch}"), (from, to), &mut each)?

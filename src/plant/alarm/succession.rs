@@ -1,8 +1,9 @@
 //! Which alarm of one plant file is which of another, and what becomes of those that have no successor.
 //!
-//! An alarm is the same where its `id` is, else where subject and condition are, else where it is called the same. What
-//! stands of it goes on, whatever it is called now: under its old name it ends, under the new one it is carried over. What
-//! has no successor ends too: no alarm leaves without an event.
+//! An alarm is the same where its `id` is, else where subject and condition are, else where it is called the same, else where
+//! what it watches is the same line, unit and register under another name and nothing else is there. What stands of it goes
+//! on, whatever it is called now: under its old name it ends, under the new one it is carried over. What has no successor
+//! ends too: no alarm leaves without an event.
 
 use std::{
     collections::{HashMap, HashSet},
@@ -18,7 +19,8 @@ use super::{
     state::{AlarmState, AlarmStateMachine, OperatorNote},
 };
 use crate::plant::{
-    def::{AlarmDef, AlarmId, PlantDef},
+    def::{AlarmDef, AlarmId, PlantDef, Subject},
+    place,
     record::{AlarmEvent, AlarmIdentity, AlarmRecord},
 };
 
@@ -116,7 +118,9 @@ impl AlarmManager {
     ) -> HashMap<Names<'a>, AlarmId> {
         let by_identity: HashMap<&str, AlarmId> =
             self.identities.iter().zip(&self.def.alarms).map(|(identity, alarm)| (&*identity.name, alarm.id)).collect();
+        let by_place: HashMap<&str, AlarmId> = by_place(&self.identities);
         let identified = |name: &Names| by_identity.get(&*known[name].identity?.name).copied();
+        let placed = |name: &Names| by_place.get(&**known[name].identity?.place.as_ref()?).copied();
         let named = |name: &Names| by_name.get(name).copied();
         let standing = || order.iter().filter(|name| known[*name].machine.stands());
         let (mut successors, mut taken) = (HashMap::new(), HashSet::new());
@@ -128,6 +132,7 @@ impl AlarmManager {
         standing().for_each(|name| take(name, identified(name).filter(|id| named(name) == Some(*id))));
         standing().for_each(|name| take(name, identified(name)));
         standing().for_each(|name| take(name, named(name)));
+        standing().for_each(|name| take(name, placed(name)));
         order.iter().for_each(|name| take(name, named(name)));
         successors
     }
@@ -243,32 +248,50 @@ pub fn successors(before: &PlantDef, def: &PlantDef) -> Vec<Option<AlarmId>> {
     for (alarm, successor) in before.alarms.iter().zip(&mut successors).filter(|(_, successor)| successor.is_none()) {
         *successor = take(by_name.get(&name_of(before, alarm)));
     }
+    let by_place = by_place(&identities);
+    for (identity, successor) in was.iter().zip(&mut successors).filter(|(_, successor)| successor.is_none()) {
+        *successor = take(identity.place.as_ref().and_then(|place| by_place.get(&**place)));
+    }
     successors
 }
 
 /// What each alarm of a plant is, by its place.
 pub(super) fn identities(def: &PlantDef) -> Vec<AlarmIdentity> {
-    let kinds: Vec<String> = def
-        .alarms
-        .iter()
-        .map(|alarm| format!("{} {}", subject_name(def, alarm.subject), kind(alarm.condition)))
-        .collect();
+    let names = distinct(def, |subject| subject_name(def, subject).to_owned());
+    let places = distinct(def, |subject| place::of_subject(def, subject));
+    let often = counted(&places);
+    let place = |place: &String| (often[place.as_str()] == 1).then(|| place.as_str().into());
+    let identity = |((alarm, name), of): ((&AlarmDef, &String), &String)| {
+        let name = alarm.key.clone().unwrap_or_else(|| name.as_str().into());
+        AlarmIdentity { name, place: place(of), latches: alarm.latch }
+    };
+    def.alarms.iter().zip(&names).zip(&places).map(identity).collect()
+}
+
+/// Subject and kind of the condition of each alarm, with its limit and its message where others have the same.
+fn distinct(def: &PlantDef, subject: impl Fn(Subject) -> String) -> Vec<String> {
+    let kind = |alarm: &AlarmDef| format!("{} {}", subject(alarm.subject), kind(alarm.condition));
+    let kinds: Vec<String> = def.alarms.iter().map(kind).collect();
     let with_limit = |(alarm, kind): (&AlarmDef, &String)| match alarm.condition.limit() {
         Some(limit) => format!("{kind} {limit}"),
         None => kind.clone(),
     };
     let limits: Vec<String> = def.alarms.iter().zip(&kinds).map(with_limit).collect();
     let (often, as_often) = (counted(&kinds), counted(&limits));
-    let identity = |((alarm, kind), limit): ((&AlarmDef, &String), &String)| {
-        let name = match &alarm.key {
-            Some(key) => key.clone(),
-            None if often[kind.as_str()] == 1 => kind.as_str().into(),
-            None if as_often[limit.as_str()] == 1 => limit.as_str().into(),
-            None => format!("{limit} {}", alarm.message).into(),
-        };
-        AlarmIdentity { name, latches: alarm.latch }
+    let words = |((alarm, kind), limit): ((&AlarmDef, &String), &String)| match (
+        often[kind.as_str()],
+        as_often[limit.as_str()],
+    ) {
+        (1, _) => kind.clone(),
+        (_, 1) => limit.clone(),
+        _ => format!("{limit} {}", alarm.message),
     };
-    def.alarms.iter().zip(&kinds).zip(&limits).map(identity).collect()
+    def.alarms.iter().zip(&kinds).zip(&limits).map(words).collect()
+}
+
+fn by_place(identities: &[AlarmIdentity]) -> HashMap<&str, AlarmId> {
+    let ids = (0..).map(AlarmId);
+    identities.iter().zip(ids).filter_map(|(identity, id)| Some((identity.place.as_deref()?, id))).collect()
 }
 
 fn counted(names: &[String]) -> HashMap<&str, u32> {

@@ -19,9 +19,10 @@ impl ProcessImage {
         self.calculator.redefine(&mut before.calculator, change);
         let mut goes_on = vec![false; before.def.tags.len()];
         for tag in &def.tags {
-            let Some(was) = change.named(tag.id) else { continue };
+            let Some(was) = change.tag(tag.id) else { continue };
             // The history knows a tag by name and unit.
-            if tag.is_stored() && before.def.tag(was).unit == tag.unit {
+            let known = before.def.tag(was);
+            if tag.is_stored() && (&known.name, &known.unit) == (&tag.name, &tag.unit) {
                 goes_on[was.index()] = true;
                 self.stored[tag.id.index()] = before.stored[was.index()];
             }

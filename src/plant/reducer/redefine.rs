@@ -3,23 +3,29 @@
 #[cfg(test)]
 mod tests;
 
-use std::{collections::BTreeMap, mem::take, sync::Arc};
+use std::{
+    collections::{BTreeMap, HashMap},
+    mem::take,
+    sync::Arc,
+};
 
 use jiff::Timestamp;
 
 use super::{Effects, Plant};
-use crate::plant::{
-    PlantDef,
-    command::{CommandKind, NotConfirmed},
-    counter::CounterWatch,
-    def::{DeviceDef, LineDef, LineId, ProcedureId},
-    interlock::ActuatorTracker,
-    line::Transport,
-    number::to_u16,
-    procedure::{ProcedureEnd, ProcedureRun},
-    record::{AlarmRecord, Record},
-    redefinition::{Redefinition, Renamed},
-    snapshot::LineStatus,
+use crate::{
+    plant::{
+        PlantDef,
+        command::{CommandKind, NotConfirmed},
+        counter::CounterWatch,
+        def::{DeviceDef, LineDef, LineId, ProcedureId, TagId},
+        line::Transport,
+        number::to_u16,
+        procedure::{ProcedureEnd, ProcedureRun},
+        record::{AlarmRecord, Record},
+        redefinition::{Redefinition, Renamed},
+        snapshot::LineStatus,
+    },
+    t,
 };
 
 /// What follows from another definition.
@@ -48,9 +54,7 @@ impl Plant {
         self.redefine_devices(&change, def);
         self.counters = CounterWatch::default();
         let before = std::mem::replace(&mut self.def, def.clone());
-        if !before.keeps_ids(def) || before.logic.actuators != def.logic.actuators {
-            self.actuators = ActuatorTracker::default();
-        }
+        self.actuators.redefine(&before.logic, &def.logic, |tag| change.tag(tag));
         self.run = run;
         let mut begun = self.evaluate(self.at);
         self.advance_work(self.at, &mut begun);
@@ -77,6 +81,8 @@ impl Plant {
         self.advance_restores(at, &mut effects);
         let rest = self.commands.end_pending(|kind| !goes_on(kind), why, &self.image, at);
         effects.records.extend(rest.into_iter().map(Record::Action));
+        let untested = self.end_tests(|line| !change.keeps_line(line), t!("the plant file was reloaded"));
+        effects.records.extend(untested);
         if self.procedure_at_work().is_some_and(|place| !before.keeps_procedure(def, ProcedureId(to_u16(place)))) {
             self.stop_procedures(&mut effects);
         }
@@ -84,22 +90,24 @@ impl Plant {
         // A command is shown as long as its tag, device or line has the same id.
         let keeps_ids = before.keeps_ids(def);
         self.commands.redefine(def, |kind| goes_on(kind) || keeps_ids && kind.line(&before).is_some());
-        self.procedures = self.procedures_under(def);
+        self.procedures = self.procedures_under(change, def);
         effects
     }
 
     /// The procedures as another definition shows them: one whose steps are others is shown only where its safe state is still
     /// to be written.
-    fn procedures_under(&self, def: &PlantDef) -> Vec<Option<Arc<ProcedureRun>>> {
+    fn procedures_under(&self, change: &Redefinition, def: &PlantDef) -> Vec<Option<Arc<ProcedureRun>>> {
         let before = &self.def;
         let keeps_ids = before.keeps_ids(def);
-        let shown = def.procedures.iter().map(|own| {
-            let place = before.procedures.iter().position(|was| was.name == own.name)?;
-            let run = self.procedures[place].as_ref()?;
-            if keeps_ids && before.procedures[place] == *own {
+        let tags: HashMap<TagId, TagId> =
+            def.tags.iter().filter_map(|tag| Some((change.tag(tag.id)?, tag.id))).collect();
+        let shown = def.procedures.iter().zip(before.procedures_before(def)).map(|(own, was)| {
+            let was = was?;
+            let run = self.procedures[was.index()].as_ref()?;
+            if keeps_ids && *before.procedure(was) == *own {
                 return Some(run.clone());
             }
-            let run = run.without_step(|tag| def.tag_named(&before.tag(tag).name));
+            let run = run.without_step(|tag| tags.get(&tag).copied());
             let is_shown = run.end() == Some(&ProcedureEnd::Interrupted) || run.missing().next().is_some();
             is_shown.then(|| Arc::new(run))
         });

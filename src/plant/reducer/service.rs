@@ -2,11 +2,18 @@
 
 use std::sync::Arc;
 
+use jiff::Timestamp;
+
 use super::{Effects, Plant};
-use crate::plant::{
-    command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
-    def::{LineDef, LineId},
-    line_check::valid,
+use crate::{
+    plant::{
+        command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
+        def::{LineDef, LineId},
+        diagnostics::{DiagnosticRun, DiagnosticState},
+        line_check::valid,
+        record::{ActionRecord, Record},
+    },
+    t,
 };
 
 impl Plant {
@@ -67,6 +74,25 @@ impl Plant {
         ))
     }
 
+    /// A line reports on its test.
+    pub(super) fn tested(&mut self, line: LineId, run: Arc<DiagnosticRun>, at: Timestamp) -> Option<ActionRecord> {
+        let ended = self.commands.tested(&run, &self.image, at);
+        self.lines[line.index()].test = Some(run);
+        ended
+    }
+
+    /// Ends the tests of lines that report nothing more.
+    pub(super) fn end_tests(&mut self, is_meant: impl Fn(LineId) -> bool, why: &str) -> Vec<Record> {
+        let lines = &self.lines;
+        let outcome = |line: LineId, id: CommandId| {
+            let run = lines[line.index()].test.as_deref().filter(|run| run.id == id);
+            let ended = run.map(|run| DiagnosticRun { state: DiagnosticState::Failed(why.to_owned()), ..run.clone() });
+            ended.map_or_else(|| format!("{}: {why}", t!("failed")), |run| run.outcome_text())
+        };
+        let ended = self.commands.end_tests(is_meant, outcome, &self.image, self.at);
+        ended.into_iter().map(Record::Action).collect()
+    }
+
     /// The settings in use.
     fn settings(&self, line: LineId) -> &LineDef {
         self.lines[line.index()].report.as_ref().map_or(self.def.line(line), |report| &report.settings)
@@ -84,18 +110,16 @@ impl Plant {
 mod tests {
     use std::time::Duration;
 
-    use jiff::Timestamp;
-
     use super::{super::tests::recorded, *};
     use crate::plant::{
+        PlantDef,
         command::Command,
         def::{Serial, Transport},
-        diagnostics::{Diagnostic, Scan},
+        diagnostics::{Conclusion, Diagnostic, Finding, Scan},
         event::Event,
         fixture,
         line_report::LineReport,
         port_signals::{OutputSignal, SignalTest},
-        record::ActionRecord,
     };
 
     const L1: LineId = LineId(0);
@@ -200,6 +224,61 @@ mod tests {
         let effects = command(&mut plant, 3, test);
         let record = actions(&plant.on_delivered(L1, &effects.bus[0].1));
         assert_eq!((record.len(), &*record[0].3), (1, "started"), "nothing was read back");
+    }
+
+    /// A loopback that its line has taken.
+    fn test_at_work(plant: &mut Plant) -> DiagnosticRun {
+        let (id, diagnostic) =
+            (CommandId { terminal: 1, number: 1 }, Diagnostic::Loopback { unit: 1, data: 0, count: 3 });
+        let effects = command(plant, 1, CommandKind::Test(L1, diagnostic.clone()));
+        let started = actions(&plant.on_delivered(L1, &effects.bus[0].1));
+        assert_eq!((started.len(), &*started[0].3), (1, "started"));
+        let (by, started, state, findings) = ("anna".into(), at(1), DiagnosticState::Running, Vec::new());
+        let (done, total, requests, errors, now) = (2, 4, 2, 1, None);
+        DiagnosticRun { id, by, diagnostic, started, done, total, requests, errors, now, state, findings }
+    }
+
+    fn report(plant: &mut Plant, run: &DiagnosticRun) -> Vec<(String, String, String, String)> {
+        actions(&plant.on_event(Event::Diagnostic { at: at(5), line: L1, run: Arc::new(run.clone()) }))
+    }
+
+    #[test]
+    fn a_test_has_an_outcome_of_its_own_once_it_ends() {
+        let times = (Duration::from_millis(3), Duration::from_millis(4));
+        let back = |back| vec![Finding::Conclusion(Conclusion::Loopback { back, sent: 3, times })];
+        let why = DiagnosticState::Failed("the line was closed".into());
+        for (state, requests, errors, findings, expect) in [
+            (DiagnosticState::Done, 4, 0, back(3), "passed: 4 requests, no errors; 3 of 3 came back, 3.0 to 4.0 ms"),
+            (DiagnosticState::Done, 4, 1, back(2), "failed: 4 requests, 1 error; 2 of 3 came back, 3.0 to 4.0 ms"),
+            (DiagnosticState::Cancelled, 1, 0, Vec::new(), "cancelled: 1 request, no errors"),
+            (why, 3, 2, Vec::new(), "failed: 3 requests, 2 errors; the line was closed"),
+        ] {
+            let mut plant = plant();
+            let run = test_at_work(&mut plant);
+            assert_eq!(report(&mut plant, &run), [], "it is at work");
+            let ended = report(&mut plant, &DiagnosticRun { state, requests, errors, findings, ..run.clone() });
+            let (by, action, new) = ("anna".to_owned(), "end test".to_owned(), "loopback unit 1, 3 times".to_owned());
+            assert_eq!(ended, [(by, action, new, expect.to_owned())]);
+            let again = DiagnosticRun { state: DiagnosticState::Cancelled, ..run };
+            assert_eq!(report(&mut plant, &again), [], "once");
+        }
+    }
+
+    #[test]
+    fn a_test_ends_with_its_line_and_with_its_station() {
+        let mut plant = plant();
+        let run = test_at_work(&mut plant);
+        report(&mut plant, &run);
+        let other = Arc::new(PlantDef { title: "Another".into(), ..fixture::plant() });
+        assert_eq!(actions(&plant.redefine(&other, 2, at(6)).ended), [], "its line keeps running");
+        let outcome = |effects: &Effects| actions(effects).into_iter().map(|action| action.3).collect::<Vec<_>>();
+        let stopped = outcome(&plant.clone().on_stop());
+        assert_eq!(stopped, ["failed: 2 requests, 1 error; the station stopped"]);
+        let mut slower = fixture::plant();
+        slower.lines[0].timeout += Duration::from_secs(1);
+        let ended = outcome(&plant.redefine(&Arc::new(slower), 3, at(7)).ended);
+        assert_eq!(ended, ["failed: 2 requests, 1 error; the plant file was reloaded"]);
+        assert_eq!(outcome(&plant.on_stop()), [] as [&str; 0]);
     }
 
     #[test]

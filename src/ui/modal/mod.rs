@@ -2,6 +2,7 @@
 
 pub(crate) mod choice;
 pub(crate) mod confirm;
+pub(crate) mod correction;
 pub(crate) mod audit_entry;
 pub(crate) mod entry;
 pub(crate) mod faceplate;
@@ -27,6 +28,7 @@ use ratatui::{Frame, layout::Rect};
 pub use audit_entry::AuditEntryDialog;
 pub use choice::Choice;
 pub use confirm::Confirm;
+pub use correction::Correction;
 pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use guidance::Guidance;
@@ -67,6 +69,8 @@ pub enum Modal {
     Prompt(Prompt),
     /// An action with a reason or a note.
     Reason(Box<Reason>),
+    /// The correction of a counter.
+    Correction(Box<Correction>),
     /// What there is to know about an item of the mimic.
     Faceplate(Faceplate),
     /// Words to be read: why something cannot be done now.
@@ -126,6 +130,7 @@ impl Modal {
                 | Modal::Choice(_)
                 | Modal::Prompt(_)
                 | Modal::Reason(_)
+                | Modal::Correction(_)
                 | Modal::Faceplate(_)
                 | Modal::Notice(_)
                 | Modal::Guidance(_)
@@ -149,6 +154,7 @@ impl Modal {
             Modal::Palette(palette) => palette.on_key(cx, event),
             Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
             Modal::Reason(reason) => reason.on_key(cx, event),
+            Modal::Correction(window) => window.on_key(cx, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
             Modal::Notice(notice) => notice.on_key(cx, event),
             Modal::Guidance(guidance) => guidance.on_key(cx, event),
@@ -176,6 +182,7 @@ impl Modal {
             | Modal::Entry(_)
             | Modal::Prompt(_)
             | Modal::Reason(_)
+            | Modal::Correction(_)
             | Modal::Settings(_)
             | Modal::UserForm(_) => true,
             Modal::Help(_)
@@ -203,6 +210,7 @@ impl Modal {
             | Modal::Palette(_)
             | Modal::Prompt(_)
             | Modal::Reason(_)
+            | Modal::Correction(_)
             | Modal::Settings(_)
             | Modal::TerminalSettings(_)
             | Modal::UserForm(_) => false,
@@ -216,6 +224,7 @@ impl Modal {
             Modal::Prompt(prompt) => prompt.line.paste(text),
             Modal::Palette(palette) => palette.paste(cx, text),
             Modal::Reason(reason) => reason.paste(text),
+            Modal::Correction(window) => window.paste(text),
             Modal::Settings(settings) => settings.on_paste(text),
             Modal::Confirm(confirm) => confirm.on_paste(text),
             Modal::UserForm(form) => form.paste(text),
@@ -260,6 +269,7 @@ impl Modal {
             }
             Modal::Prompt(_) => vec![Hint::in_window("⏎", t!("OK")), Hint::in_window(t!("Esc"), t!("cancel"))],
             Modal::Reason(reason) => reason.hints(),
+            Modal::Correction(window) => window.hints(),
             Modal::Faceplate(faceplate) => faceplate.hints(cx),
             Modal::Notice(_) => vec![Hint::in_window(t!("Esc"), t!("close"))],
             Modal::Guidance(guidance) => guidance.hints(cx),
@@ -289,6 +299,7 @@ impl Modal {
             Modal::Palette(palette) => palette.view(cx, frame, body),
             Modal::Prompt(prompt) => prompt.view(cx, frame, body),
             Modal::Reason(reason) => reason.view(cx, frame, body),
+            Modal::Correction(window) => window.view(cx, frame, body),
             Modal::Faceplate(faceplate) => faceplate.view(cx, frame, body),
             Modal::Notice(notice) => notice.view(cx, frame, body),
             Modal::Guidance(guidance) => guidance.view(cx, frame, body),

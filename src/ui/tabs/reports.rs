@@ -2,6 +2,7 @@
 
 pub(super) mod period;
 mod batches;
+mod counters;
 mod export;
 mod made;
 mod rows;
@@ -74,7 +75,8 @@ const KEYS: &[Key] = &[
 const BATCHES: &[Key] = &[Key::change(char('b'), "batches", "the list of batches", |reports, _| {
     (reports.batches.shown, reports.export) = (true, Export::Not);
     reports.batches.rows.query.want();
-})];
+})
+.when(|_, cx| Offer::only_if(!cx.def().batches.is_empty()))];
 const SCROLL: [Key; 6] = motions!("", Reports::scroll);
 
 /// How often the figures of a running shift are refreshed, and when an answer counts as lost (real time).
@@ -225,17 +227,15 @@ impl TabView for Reports {
 }
 
 impl KeyTable for Reports {
-    fn keys(&self, cx: &ViewContext) -> Keys<Reports> {
+    fn keys(&self, _cx: &ViewContext) -> Keys<Reports> {
         let tables: &[&'static [Key]] = if self.made.shown {
             self.made.keys()
         } else if self.rows.shown {
             rows::KEYS
         } else if self.batches.shown {
             self.batches.keys()
-        } else if cx.def().batches.is_empty() {
-            &[KEYS, &SCROLL]
         } else {
-            &[KEYS, BATCHES, &SCROLL]
+            &[KEYS, BATCHES, counters::KEYS, &SCROLL]
         };
         Keys::of(tables)
     }
@@ -247,7 +247,7 @@ impl KeyTable for Reports {
     #[cfg(test)]
     fn chords() -> keys::PageChords {
         let pages: [(_, &[&'static [Key]]); 6] = [
-            ("reports", &[KEYS, BATCHES, &SCROLL]),
+            ("reports", &[KEYS, BATCHES, counters::KEYS, &SCROLL]),
             ("rows", rows::KEYS),
             ("batches", batches::LIST),
             ("overlay", batches::OVERLAY),

@@ -37,6 +37,7 @@ pub struct PacedSlave {
     _port: File,
     /// By unit.
     served: Arc<[AtomicU64; 64]>,
+    heard: Arc<AtomicU64>,
     hasty: Arc<AtomicU64>,
     /// A bit for each unit that does not answer.
     dead: Arc<AtomicU64>,
@@ -59,9 +60,11 @@ impl PacedSlave {
         raw.make_raw();
         tcsetattr(&port, OptionalActions::Now, &raw).unwrap();
         let served = Arc::new(std::array::from_fn(|_| AtomicU64::new(0)));
-        let slave = PacedSlave { _port: port, served, hasty: Arc::default(), dead: Arc::default() };
-        let (served, hasty, dead) = (slave.served.clone(), slave.hasty.clone(), slave.dead.clone());
-        thread::spawn(move || serve(File::from(line), serial, &dead, &served, &hasty));
+        let [heard, hasty, dead]: [Arc<AtomicU64>; 3] = Default::default();
+        let slave = PacedSlave { _port: port, served, heard, hasty, dead };
+        let (served, heard) = (slave.served.clone(), slave.heard.clone());
+        let (hasty, dead) = (slave.hasty.clone(), slave.dead.clone());
+        thread::spawn(move || serve(File::from(line), serial, &dead, &served, [&heard, &hasty]));
         (path, slave)
     }
 
@@ -80,13 +83,18 @@ impl PacedSlave {
         std::array::from_fn(|unit| self.served[unit].load(Ordering::Relaxed))
     }
 
+    /// Requests that have come whole, also those that have no answer.
+    pub fn heard(&self) -> u64 {
+        self.heard.load(Ordering::Relaxed)
+    }
+
     /// Requests that began before the answer was followed by its 3.5 characters of silence: on a real line they are lost.
     pub fn hasty(&self) -> u64 {
         self.hasty.load(Ordering::Relaxed)
     }
 }
 
-fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 64], hasty: &AtomicU64) {
+fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 64], [heard, hasty]: [&AtomicU64; 2]) {
     let character = serial.char_time();
     let (mut receiver, mut bytes) = (Receiver::default(), [0; 512]);
     let (mut began, mut latest, mut quiet) = (Instant::now(), Instant::now(), Instant::now());
@@ -102,7 +110,11 @@ fn serve(mut line: File, serial: Serial, dead: &AtomicU64, served: &[AtomicU64; 
         }
         latest = now;
         receiver.push(&bytes[..count]);
-        while let Some(request) = receiver.take() {
+        // A whole request is followed by the silence that its answer waits for below.
+        if receiver.is_whole()
+            && let Some(request) = receiver.on_silent_interval()
+        {
+            heard.fetch_add(1, Ordering::Relaxed);
             let over = (began + character * request.len() as u32).max(now);
             began = over;
             let received = Some(&request[..request.len() - 2]).filter(|message| {

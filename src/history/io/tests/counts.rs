@@ -137,7 +137,7 @@ enum Fate {
 }
 
 /// PV in kWh, of which batches and control runs have their energy.
-fn making() -> Arc<PlantDef> {
+pub(super) fn making() -> Arc<PlantDef> {
     let mut def = PlantDef::clone(&def());
     def.tags[0].unit = "kWh".into();
     def.batches = vec![BatchDef {
@@ -163,7 +163,7 @@ fn making() -> Arc<PlantDef> {
     Arc::new(def)
 }
 
-fn run(from: i64, until: i64, kwh: f64) -> ControlRun {
+pub(super) fn run(from: i64, until: i64, kwh: f64) -> ControlRun {
     ControlRun {
         controller: "TIC-1".into(),
         number: 1,

@@ -8,6 +8,7 @@ mod batches;
 mod closed;
 mod compact;
 mod counts;
+mod doubled;
 pub(super) mod damage;
 mod epochs;
 mod exact;

@@ -1,11 +1,13 @@
 //! Plant files edited under standing alarms: nothing leaves without an event, and what can go on does.
 
+mod renames;
+
 use std::collections::BTreeMap;
 
 use super::*;
 use crate::plant::{
     alarm::{Succession, manager::name_of, state::AlarmStateMachine},
-    def::{Priority, TagId},
+    def::{LineId, Priority, TagId},
     fixture::{DP, FAULT, RUN, SV, TIC},
     record::AlarmIdentity,
 };
@@ -25,7 +27,15 @@ enum Edit {
     Copy(usize),
     RenameTag(TagId),
     RenameDevice,
+    RenameLine,
     RemoveTag(TagId),
+}
+
+impl Edit {
+    /// Everything is where it was, and only called otherwise?
+    fn renames(self) -> bool {
+        matches!(self, Edit::RenameTag(_) | Edit::RenameDevice | Edit::RenameLine)
+    }
 }
 
 /// What happens to alarms between two edits.
@@ -56,8 +66,9 @@ fn edit() -> impl Strategy<Value = Edit> {
         1 => place().prop_map(Edit::Latch),
         2 => place().prop_map(Edit::Remove),
         2 => place().prop_map(Edit::Copy),
-        1 => tag().prop_map(Edit::RenameTag),
-        1 => Just(Edit::RenameDevice),
+        3 => tag().prop_map(Edit::RenameTag),
+        2 => Just(Edit::RenameDevice),
+        1 => Just(Edit::RenameLine),
         1 => tag().prop_map(Edit::RemoveTag),
     ]
 }
@@ -87,6 +98,7 @@ fn edited() -> PlantDef {
         AlarmDef { latch: true, ..alarm(Subject::Tag(RUN), Condition::State { is: 1.0 }, "runs") },
         alarm(Subject::Tag(RUN), Condition::Bit { bit: 3 }, "bit"),
         alarm(Subject::Device(TIC), Condition::NotResponding, "silent"),
+        alarm(Subject::Line(LineId(0)), Condition::NotConnected, "cut"),
     ];
     numbered(def)
 }
@@ -115,6 +127,7 @@ fn apply_edit(mut def: PlantDef, edit: Edit, number: usize) -> PlantDef {
     match edit {
         Edit::RenameTag(tag) => def.tags[tag.index()].name = format!("T-{number}"),
         Edit::RenameDevice => def.devices[TIC.index()].name = format!("D-{number}"),
+        Edit::RenameLine => def.lines[0].name = format!("L-{number}"),
         Edit::RemoveTag(tag) => def.alarms.retain(|alarm| !of_tag(tag)(alarm)),
         _ if def.alarms.is_empty() => def.alarms = edited().alarms,
         Edit::Message(place) => def.alarms[at(place)].message = format!("message {number}"),
@@ -220,6 +233,12 @@ impl Station {
         all.filter(|(_, machine)| machine.stands()).map(named).collect()
     }
 
+    /// The same by place in the plant file.
+    fn standing_by_id(&self) -> Vec<(AlarmId, AlarmState)> {
+        let all = self.manager.def.alarms.iter().map(|alarm| (alarm.id, self.manager.machine(alarm.id)));
+        all.filter(|(_, machine)| machine.stands()).map(|(id, machine)| (id, machine.state())).collect()
+    }
+
     /// The same from the journal alone.
     fn journaled(&self) -> Standing {
         let mut machines: BTreeMap<(String, String), AlarmStateMachine> = BTreeMap::new();
@@ -271,12 +290,16 @@ proptest! {
         for (number, (happenings, edit, restarts)) in rounds.into_iter().enumerate() {
             happenings.into_iter().for_each(|happening| station.happens(happening));
             prop_assert_eq!(station.journaled(), station.standing(), "before {:?}", edit);
+            let before = station.standing_by_id();
             def = apply_edit(def, edit, number);
             match restarts {
                 true => station.restart(def.clone()),
                 false => station.reload(def.clone()),
             }
             prop_assert_eq!(station.journaled(), station.standing(), "after {:?}, restarted: {}", edit, restarts);
+            if edit.renames() {
+                prop_assert_eq!(before, station.standing_by_id(), "{:?}, restarted: {}", edit, restarts);
+            }
         }
     }
 }
@@ -316,24 +339,26 @@ fn an_alarm_whose_wording_changes_stands_as_it_did() {
             alarms.iter().map(of_one).collect()
         };
         assert_eq!(times(&after.active), times(&before.active), "restarts: {restarts}");
-        assert_eq!(after.suppressed[..], before.suppressed[..1], "the shelving; the device has another name");
+        assert_eq!(after.suppressed, before.suppressed, "the shelving, and the device that has another name");
         let new: Vec<_> = station.journal[journaled..]
             .iter()
             .map(|event| (&*event.subject, &*event.message, event.event, event.reason.as_deref().unwrap_or("")))
             .collect();
-        use AlarmEvent::{Acknowledged, CarriedOver, Removed, Shelved};
+        use AlarmEvent::{Acknowledged, CarriedOver, OutOfService, Removed, Shelved};
         assert_eq!(
             new,
             [
                 ("TIC-1.PV", "hot", Removed, "goes on as TIC-1.PV too hot"),
                 ("TIC-1.PV", "very hot", Removed, "goes on as TIC-1.SV far too hot"),
                 ("TIC-1.SV", "setpoint high", Removed, "goes on as TIC-1.SV setpoint too high"),
-                ("TIC-1", "silent", Removed, ""),
+                ("TIC-1", "silent", Removed, "goes on as TIC-9 silent"),
                 ("TIC-1.PV", "too hot", CarriedOver, "was TIC-1.PV hot"),
                 ("TIC-1.PV", "too hot", Acknowledged, "carried over: sensor is being changed"),
                 ("TIC-1.SV", "far too hot", CarriedOver, "was TIC-1.PV very hot"),
                 ("TIC-1.SV", "setpoint too high", CarriedOver, "was TIC-1.SV setpoint high"),
                 ("TIC-1.SV", "setpoint too high", Shelved, "carried over: sensor is being changed"),
+                ("TIC-9", "silent", CarriedOver, "was TIC-1 silent"),
+                ("TIC-9", "silent", OutOfService, "carried over: sensor is being changed"),
             ]
         );
     }

@@ -19,7 +19,7 @@ use crate::plant::{
     line_report::LineReport,
     procedure::ProcedureState,
     record::AlarmEvent,
-    sample::{Cause, Sample},
+    sample::{Cause, Quality, Sample},
     tag::{Decimals, TagDef},
     totalizer::Total,
 };
@@ -305,4 +305,25 @@ fn a_procedure_goes_on_only_where_its_lines_do() {
     let ended = redefine(&mut second, 4, changed).ended;
     assert_eq!(actions(&ended), ["anna end procedure stop interrupted, step 2 of 2"]);
     assert_eq!(state(&second), Some(ProcedureState::Ended(ProcedureEnd::Interrupted)), "its safe state can be written");
+}
+
+#[test]
+fn a_renamed_device_keeps_its_values_and_its_alarms() {
+    let mut plant = plant();
+    plant.on_tick(at(3));
+    let before = plant.snapshot();
+    assert_eq!(before.alarms[0].id, HIGH);
+    let mut def = def();
+    def.devices[TIC.index()].name = "FIC-1".into();
+    for tag in def.tags.iter_mut().filter(|tag| tag.device == TIC) {
+        tag.name = tag.name.replace("TIC-1", "FIC-1");
+    }
+    let losses: Vec<String> = before.losses(&def).iter().map(ToString::to_string).collect();
+    assert_eq!(losses, ["alarm TIC-1.PV alarm 0 (UNACK) goes on as FIC-1.PV alarm 0"]);
+    let changed = redefine(&mut plant, 4, def);
+    let after = plant.snapshot();
+    assert_eq!((&after.alarms, &after.samples, &after.devices), (&before.alarms, &before.samples, &before.devices));
+    let stored = samples(&changed.begun).into_iter().map(|(tag, _)| tag).collect::<Vec<_>>();
+    assert_eq!(stored, [PV, SV, DP, FAULT], "the history knows them by their names");
+    assert!(samples(&changed.ended).iter().all(|(_, sample)| sample.quality == Quality::Bad(Cause::Reloaded)));
 }

@@ -54,7 +54,8 @@ fn run(
     let started = now() - jiff::SignedDuration::from_secs(8);
     let serial = Some(Serial { parity: crate::plant::def::Parity::Even, ..Serial::USUAL });
     let asks = Some(DiagnosticStep::Request { unit: 17, function: 3, serial });
-    Arc::new(DiagnosticRun { id, by: "tech1".into(), diagnostic, started, done, total, now: asks, state, findings })
+    let (by, requests, errors) = ("tech1".into(), done, 0);
+    Arc::new(DiagnosticRun { id, by, diagnostic, started, done, total, requests, errors, now: asks, state, findings })
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, path::Path};
 
 use ratatui::text::{Line, Span};
 
-use super::{Export, Reports};
+use super::{Export, Reports, counters};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -259,6 +259,8 @@ pub fn lines(
         lines.push(Line::styled(format!("  {alarms_title}"), theme.dim()));
     }
     lines.extend(section(cx, t!("operator actions"), actions));
+    let steps = report.counters.iter().map(|row| counters::line(cx, row, time(row.step.at)));
+    lines.extend(section(cx, t!("counters"), steps));
     lines
 }
 

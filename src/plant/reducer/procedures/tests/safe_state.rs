@@ -217,6 +217,29 @@ fn a_plant_file_that_is_reloaded_keeps_it() {
 }
 
 #[test]
+fn a_safe_state_is_still_written_under_other_names() {
+    for (again, expect) in [(false, vec![(SV, 0.0)]), (true, vec![])] {
+        let mut plant = failed();
+        let mut def = with_alarm();
+        def.tags[SV.index()].name = "FIC-1.SV".into();
+        def.devices[TIC.index()].name = "FIC-1".into();
+        def.procedures[0].name = "warm up".into();
+        if again {
+            // Which of them it was is not certain.
+            let other = ProcedureDef { name: "again".into(), ..def.procedures[0].clone() };
+            def.procedures.push(other);
+        }
+        let becomes = if again { "ends" } else { "goes on as warm up" };
+        let losses: Vec<String> = plant.snapshot().losses(&def).iter().map(ToString::to_string).collect();
+        let loss = format!("procedure heat, whose safe state is not written, {becomes}");
+        assert!(losses.contains(&loss), "{losses:?}");
+        plant.redefine(&Arc::new(def), 2, at(60));
+        plant.on_tick(at(61));
+        assert_eq!(written(&back(&mut plant, 62)), expect);
+    }
+}
+
+#[test]
 fn what_the_device_would_round_is_no_step_but_is_safe() {
     let mut def = def();
     def.procedures[0].steps[0] = ProcedureStep::Write { tag: SV, value: 50.04 };

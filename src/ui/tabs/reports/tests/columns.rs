@@ -17,3 +17,16 @@ fn a_narrow_screen_says_that_there_are_more_columns() {
     let shown = stand.screen();
     assert!(!shown.contains("c 1/2") && shown.contains("min") && shown.contains("in alarm"), "{shown}");
 }
+
+#[test]
+fn no_size_is_too_small_to_survive() {
+    for (width, height) in
+        (0..40).flat_map(|width| (0..20).map(move |height| (width, height))).chain([(200, 60), (80, 12)])
+    {
+        let mut stand = Stand::new(Theme::FULL, width, height);
+        stand.terminal();
+        stand.answer(true);
+        stand.press("↓↓↓↓↓e");
+        assert_eq!(stand.terminal().backend().buffer().area.width, width);
+    }
+}
