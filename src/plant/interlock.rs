@@ -382,7 +382,7 @@ mod tests {
         let moved = |actuator: &ActuatorDef| ActuatorDef { output: TagId(8), command: TagId(9), ..actuator.clone() };
         let other = ActuatorDef { output: AUTO, ..before.actuators[0].clone() };
         let logic = ControlLogic { actuators: vec![other, moved(&before.actuators[0])], ..before.clone() };
-        let was = |tag: TagId| (8 <= tag.0).then(|| if tag.0 == 8 { OUTPUT } else { COMMAND });
+        let was = |tag: TagId| (8 <= tag.0).then_some(if tag.0 == 8 { OUTPUT } else { COMMAND });
         watch.redefine(&before, &logic, was);
         let lasts = [0, 1].map(|place| watch.feedback_mismatch(&logic, place, at(7)).map(|span| span.as_secs()));
         assert_eq!(lasts, [None, Some(7)]);

@@ -136,7 +136,7 @@ impl Span<'_> {
         let of_records: Vec<Vec<Leg>> =
             positions.clone().zip(ends).map(|(from, to)| between(doubled, from, to)).collect();
         let batch = batch_of(records, &of_records)?;
-        let (first, last) = (positions.clone().next()?, positions.last().filter(|_| batch.to.is_some()));
+        let (first, last) = (positions.clone().next()?, positions.clone().next_back().filter(|_| batch.to.is_some()));
         let legs = between(doubled, first, last.unwrap_or(now));
         let until = batch.to.or_else(|| instant(now.1))?;
         Some(Span { batch, until, records, of_records, legs, period: i64::MIN..i64::MAX })

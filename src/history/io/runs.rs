@@ -30,6 +30,9 @@ const COLUMNS: &str =
     decimals, band, settings, settings_changed, at_sv, steady, rise, overshoot, final_offset, iae, kwh, kwh_good, good, epoch";
 /// The last record of each run.
 const LATEST: &str = "rowid IN (SELECT max(rowid) FROM control_run GROUP BY controller, number)";
+/// Runs of a period, what lies in it of those that do not lie in it as a whole, and the span of those that are left out.
+type RunsOfPeriod = (Vec<ControlRun>, Vec<RunPart>, Option<Gap>);
+
 /// A time that is not known.
 const UNKNOWN: f64 = -1.0;
 
@@ -50,11 +53,7 @@ impl Store {
 
     /// The runs of a period for its report as they stood at its end, whenever it is made: newest first; of too many the span
     /// of those that are left out. With what lies in the period of those that do not lie in it as a whole.
-    pub(super) fn control_runs_of(
-        &self,
-        from: Timestamp,
-        until: Timestamp,
-    ) -> Result<(Vec<ControlRun>, Vec<RunPart>, Option<Gap>), HistoryError> {
+    pub(super) fn control_runs_of(&self, from: Timestamp, until: Timestamp) -> Result<RunsOfPeriod, HistoryError> {
         check_span(from, until)?;
         let sql = format!(
             "SELECT {COLUMNS} FROM control_run

@@ -6,6 +6,9 @@ use crate::plant::{
     tag::TagDef,
 };
 
+/// An edit beside the new names, and why the alarms of tag and device end then.
+type Case = (fn(&mut PlantDef), Option<&'static str>, Option<&'static str>);
+
 /// What became of the shelved alarm of SV and of the silent controller, by the reason of their ends.
 #[test]
 fn a_renamed_subject_is_known_only_where_nothing_else_is() {
@@ -28,7 +31,7 @@ fn a_renamed_subject_is_known_only_where_nothing_else_is() {
         *def = numbered(def.clone());
     };
     let (sv, tic) = (Some("goes on as FIC-1.SP setpoint high"), Some("goes on as FIC-1 silent"));
-    let cases: [(fn(&mut PlantDef), Option<&str>, Option<&str>); 7] = [
+    let cases: [Case; 7] = [
         (|_| {}, sv, tic),
         (|def| def.lines[0].name = "L9".into(), sv, tic),
         (|def| def.tags[SV.index()].point.address += 1, None, tic),
