@@ -140,7 +140,7 @@ impl Row {
                 row.table = Some(table);
             } else if let (None, Some(factor)) = (row.scale, number_of(cell).filter(|number| *number != 0.0)) {
                 row.scale = Some(factor);
-            } else if row.unit.is_empty() && is_known_unit(cell) {
+            } else if row.unit.is_empty() && is_unit(cell) {
                 row.unit.clone_from(cell);
             } else {
                 words.push(cell);
@@ -191,6 +191,12 @@ impl Row {
         let named = Named::new(table, address, kind, order, &self.name);
         Ok(Named { scale, offset: self.offset, decimals, unit, ..named })
     }
+}
+
+/// A unit among the words of a name: `m³/h`, `degC`, but neither `in` nor `hours`.
+fn is_unit(cell: &str) -> bool {
+    let is_word = cell == "in" || cell.bytes().all(|byte| byte.is_ascii_lowercase()) && unit_of(cell) != cell;
+    is_known_unit(cell) && !is_word
 }
 
 fn is_plain(text: &str) -> bool {

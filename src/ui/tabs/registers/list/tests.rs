@@ -36,6 +36,8 @@ fn columns_of_a_pdf_are_known_by_their_form() {
     assert_eq!(named, ["40001 Voltage L1 float32 ABCD 1 2 V", "40003 Power factor int16 ABCD 0.001 3 "]);
     assert_eq!(problems, ["line 1: no address"]);
     assert_eq!(read("1 40010 Tank level UINT16 /10 cm CDAB\n").0, ["40010 Tank level uint16 CDAB 0.1 1 cm"]);
+    assert_eq!(read("40010 Run hours in test h\n").0, ["40010 Run hours in test uint16 ABCD 1 0 h"]);
+    assert_eq!(read("2025-11-15 built\n"), (Vec::new(), Vec::new()), "a date is no address");
     assert_eq!(
         read("0x03EA SV x0.1 °C\n03EBH STBY\n").0,
         ["41003 SV uint16 ABCD 0.1 1 °C", "41004 STBY uint16 ABCD 1 0 "]
