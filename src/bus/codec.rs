@@ -23,7 +23,9 @@ pub fn decode(point: Point, words: &[u16]) -> Option<Exact> {
     let bytes = to_bytes(point.order, words);
     let bits = bytes.iter().fold(0u64, |bits, byte| (bits << 8) | u64::from(*byte));
     if let Some((low, width)) = point.field {
-        return Some(Exact::whole(((bits >> low) & mask(width)).into()));
+        let number = i128::from((bits >> low) & mask(width));
+        let is_negative = point.kind.is_signed_field(width) && number >> (width - 1) == 1;
+        return Some(Exact::whole(if is_negative { number - (1 << width) } else { number }));
     }
     let size = 16 * u32::from(point.kind.registers());
     let number = match point.kind.encoding() {
@@ -99,9 +101,10 @@ pub fn encode(point: Point, value: impl Into<Exact>) -> Option<Vec<u16>> {
 pub fn field_masks(point: Point, value: impl Into<Exact>) -> Option<(u16, u16)> {
     let (low, width) = point.field.filter(|_| point.kind.registers() == 1)?;
     let field = mask(width);
-    let value = value.into().as_whole().filter(|value| (0..=field.into()).contains(value))?;
+    let (least, most) = point.raw_range()?;
+    let value = value.into().as_whole().filter(|value| (least..=most).contains(value))?;
     let on_wire = |bits: u64| from_bytes(point.order, &to_u16(bits).to_be_bytes())[0];
-    Some((!on_wire(field << low), on_wire(Exact::whole(value).bits() << low)))
+    Some((!on_wire(field << low), on_wire((Exact::whole(value).bits() & field) << low)))
 }
 
 fn mask(width: u8) -> u64 {
@@ -258,6 +261,20 @@ mod tests {
         assert_eq!(decode(field, &[0x0020]), Some(2.0.into()));
         assert_eq!(encode(field, 2.0), None);
         assert_eq!(decode(Point { field: Some((0, 16)), ..field }, &[0xFFFF]), Some(65_535.0.into()));
+    }
+
+    #[test]
+    fn a_field_of_a_signed_type_has_a_sign() {
+        let field = Point { field: Some((4, 12)), ..point(DataType::I16, ByteOrder::Abcd) };
+        for (word, value) in [(0xFFF0, -1.0), (0x8000, -2_048.0), (0x7FF0, 2_047.0), (0x0010, 1.0)] {
+            assert_eq!(decode(field, &[word]), Some(value.into()), "{word:04X}");
+            assert_eq!(field_masks(field, value), Some((0x000F, word)), "{word:04X}");
+        }
+        assert_eq!(field_masks(field, 2_048.0), None);
+        let bit = Point { field: Some((15, 1)), ..field };
+        assert_eq!(decode(bit, &[0x8000]), Some(1.0.into()), "one bit is set or not");
+        let whole = Point { field: Some((0, 64)), ..point(DataType::I64, ByteOrder::Abcd) };
+        assert_eq!(decode(whole, &[0xFFFF; 4]), Some((-1.0).into()));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::plant::{
     exact::Exact,
     live::AddressSpan,
     number::to_u16,
+    scale,
     tag::{Decimals, Point, TagDef},
 };
 
@@ -86,7 +87,7 @@ pub fn best<'a>(known: &'a [Arc<PlantDef>], words: Words) -> Option<(&'a Arc<Pla
 
 /// Decimals and unit of a tag as the device says; `None` where it was not read or says nothing of use.
 pub fn scaling(def: &PlantDef, tag: &TagDef, words: Words) -> Option<(u8, String)> {
-    let value = |of| raw_of(def.tag(of).point, words);
+    let value = |of| raw_of(def.tag(of).point, words).map(|raw| scale::to_value(def.tag(of), raw, 0));
     let decimals = match tag.decimals {
         Decimals::Fixed(decimals) => decimals,
         Decimals::From(_) => tag.scaling_decimals(value)?,

@@ -6,7 +6,12 @@ use std::time::Duration;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{event::Fault, id::LineId, tag::Table};
+use super::{
+    address::{in_table, of_modicon},
+    event::Fault,
+    id::LineId,
+    tag::Table,
+};
 
 /// Most spans of one live read.
 pub const SPANS_MAX: usize = 64;
@@ -117,17 +122,12 @@ impl std::str::FromStr for AddressSpan {
     fn from_str(text: &str) -> Result<AddressSpan, String> {
         let wrong = || t!("found `{text}`, expected TABLE:ADDRESS[:COUNT] such as holding:1002:10, or 41003:10", text);
         let parts: Vec<&str> = text.split(':').collect();
-        let (table, address, count) = match parts.as_slice() {
-            [word, address, count @ ..] if word.parse::<u32>().is_err() => {
-                let table = TABLES.into_iter().find(|table| table.word() == *word).ok_or_else(wrong)?;
-                (table, number(address).ok_or_else(wrong)?, count)
-            }
-            [modicon, count @ ..] => {
-                let (table, address) = of_modicon(modicon).ok_or_else(wrong)?;
-                (table, address, count)
-            }
-            [] => return Err(wrong()),
+        let (found, count) = match parts.as_slice() {
+            [modicon, count @ ..] if modicon.parse::<u32>().is_ok() => (of_modicon(modicon), count),
+            [table, address, count @ ..] => (in_table(&format!("{table}:{address}")), count),
+            [_] | [] => (None, [].as_slice()),
         };
+        let (table, address) = found.ok_or_else(wrong)?;
         let count = match count {
             [] => 1,
             [count] => number(count).ok_or_else(wrong)?,
@@ -147,24 +147,12 @@ impl std::str::FromStr for AddressSpan {
     }
 }
 
-/// The tables in the order of their Modicon numbers.
-pub const TABLES: [Table; 4] = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
-
 /// A decimal number, or hexadecimal with `0x`.
 pub fn number(text: &str) -> Option<u16> {
     match text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")) {
         Some(hex) => u16::from_str_radix(hex, 16).ok(),
         None => text.parse().ok(),
     }
-}
-
-/// Table and wire address of a Modicon number of five or six digits.
-pub fn of_modicon(text: &str) -> Option<(Table, u16)> {
-    TABLES.into_iter().find_map(|table| {
-        let digits = text.strip_prefix(char::from(b'0' + table.digit()))?;
-        let number: u32 = digits.parse().ok().filter(|number| matches!(digits.len(), 4 | 5) && *number != 0)?;
-        Some((table, u16::try_from(number - 1).ok()?))
-    })
 }
 
 #[cfg(test)]
@@ -187,6 +175,7 @@ mod tests {
         assert_eq!(parse("holding:1002:10"), holding(1002, 10));
         assert_eq!(parse("holding:0x3EA"), holding(1002, 1));
         assert_eq!(parse("41003:10"), holding(1002, 10));
+        assert_eq!(parse("holding:32080"), holding(32_080, 1));
         assert_eq!(parse("465536"), holding(65_535, 1));
         assert_eq!(parse("31001"), Ok(AddressSpan { table: Table::Input, address: 1000, count: 1 }));
         for wrong in ["", "41003:0", "holding:5:126", "40000", "register:5", "holding", "holding:65535:2", "1:2:3:4"] {

@@ -31,6 +31,8 @@ pub mod def;
 pub(crate) mod simulate;
 pub mod bound;
 pub mod tag;
+pub mod address;
+pub mod raw_number;
 pub(crate) mod poll_class;
 pub(crate) mod confidence;
 pub(crate) mod store_policy;

@@ -36,10 +36,7 @@ pub fn to_raw(tag: &TagDef, value: impl Into<Exact>, decimals: u8) -> Option<Exa
             whole_raw(value, tag.scale, tag.offset, decimals)?
         }
     };
-    let (low, high) = match tag.point.field {
-        Some((_, bits)) => (0, (1 << bits) - 1),
-        None => tag.point.kind.whole_range()?,
-    };
+    let (low, high) = tag.point.raw_range()?;
     (low..=high).contains(&raw).then(|| Exact::whole(raw))
 }
 

@@ -17,6 +17,7 @@ use super::{
     id::{DeviceId, TagId},
     keyword::keyword_enum,
     number::to_u8,
+    raw_number::is_same,
     role::{Reauthentication, Role},
     sample::Sample,
     simulate::Simulate,
@@ -68,7 +69,7 @@ pub struct TagDef {
     /// Names of the bits of a status word.
     pub bit_labels: Vec<(u8, String)>,
     /// Raw numbers (before scaling) that mean "no value".
-    pub bad_if: Vec<i128>,
+    pub bad_if: Vec<Exact>,
     /// Another tag that makes this one bad while `value & mask != 0` (PXR 31008 for PV).
     pub quality_from: Option<(TagId, u64)>,
     /// Function code to write with; `None` picks 5/6 for one word, 16 for more.
@@ -237,7 +238,7 @@ impl TagDef {
     }
     /// Does this raw number mean "no value"?
     pub fn is_bad(&self, raw: Exact) -> bool {
-        self.bad_if.iter().any(|bad| Exact::whole(*bad) == raw)
+        self.bad_if.iter().any(|bad| is_same(*bad, raw))
     }
 }
 
@@ -252,7 +253,7 @@ pub struct Point {
     pub kind: DataType,
     /// Byte and word order.
     pub order: ByteOrder,
-    /// A field of bits inside a word: (lowest bit, number of bits).
+    /// A field of bits inside a word: (lowest bit, number of bits). That of a signed type is signed.
     pub field: Option<(u8, u8)>,
 }
 

@@ -5,13 +5,18 @@ use super::{
     reader::{At, Node, Value},
     schema::Scheme,
 };
-use crate::plant::tag::Table;
+use crate::plant::{
+    address::{TABLES, in_table, of_modicon, table_named, wire},
+    tag::Table,
+};
 
 /// An address as written.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Location {
     /// `1002`, `0x03EA` or `"0x03EA"`: 0-based, as sent.
     Wire(u16),
+    /// `"holding:1002"`: the same with its table.
+    In(Table, u16),
     /// `"V40500"`: what it means depends on the scheme.
     Name(String),
 }
@@ -23,12 +28,13 @@ pub(super) type TableAddress = (Option<Table>, u16);
 pub(super) fn locate(location: &At<Location>, scheme: Scheme, problems: &mut Problems) -> Option<TableAddress> {
     match (&location.value, scheme) {
         (Location::Wire(address), _) => Some((None, *address)),
+        (Location::In(table, address), _) => Some((Some(*table), *address)),
         (Location::Name(name), Scheme::DirectLogic) => {
             directlogic(name, location.at, problems).map(|(table, address)| (Some(table), address))
         }
         (Location::Name(name), Scheme::Modbus) => {
             let problem = problems.add(location.at, format!("`{name}` is not an address"));
-            problem.label("expected a number, 0-based as on the wire");
+            problem.label("expected a number, 0-based as on the wire, or with its table such as \"holding:1002\"");
             if memory(name).is_some() {
                 problem.help("for octal addresses of KOYO and AutomationDirect write scheme = \"directlogic\" at the top of the profile");
             }
@@ -65,6 +71,11 @@ fn memory(name: &str) -> Option<(&'static Memory, &str)> {
         let digits = name.strip_prefix(memory.prefix)?;
         digits.starts_with(|c: char| c.is_ascii_digit()).then_some((memory, digits))
     })
+}
+
+/// The table of a DirectLOGIC address.
+pub(super) fn memory_table(name: &str) -> Option<Table> {
+    memory(name).map(|(memory, _)| memory.table)
 }
 
 fn directlogic(name: &str, at: Span, problems: &mut Problems) -> Option<(Table, u16)> {
@@ -114,19 +125,68 @@ pub(super) fn check_modicon(modicon: &At<Modicon>, table: Table, address: u16, p
 fn meaning(modicon: &str) -> Option<String> {
     let digit = modicon.get(..1)?.parse::<u8>().ok()?;
     let number = modicon.get(1..)?.parse::<u32>().ok()?.checked_sub(1)?;
-    let table = Table::ALL.into_iter().find(|table| table.digit() == digit)?;
+    let table = TABLES.into_iter().find(|table| table.digit() == digit)?;
     Some(format!("{} {number} (0x{number:04X})", table.word()))
 }
 
 impl Value for Location {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
-        let Node::Text(text) = value else { return u16::read(value, at, problems).map(Location::Wire) };
-        let digits = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
-        let number = match digits {
-            Some(hex) => u16::from_str_radix(hex, 16).ok(),
-            None => text.parse().ok(),
-        };
-        Some(number.map_or_else(|| Location::Name(text.clone()), Location::Wire))
+        match value {
+            Node::Text(text) if text.split_once(':').is_some_and(|(word, _)| table_named(word.trim()).is_some()) => {
+                let found = in_table(text).map(|(table, address)| Location::In(table, address));
+                if found.is_none() {
+                    let problem = problems.add(at, format!("`{text}` is not an address"));
+                    problem.label("expected TABLE:ADDRESS such as \"holding:1002\", 0 to 65535 as on the wire");
+                }
+                found
+            }
+            Node::Text(text) => Some(wire(text).map_or_else(|| Location::Name(text.clone()), Location::Wire)),
+            Node::Whole(number) if u16::try_from(*number).is_err() && of_modicon(&number.to_string()).is_some() => {
+                let meant = meaning(&number.to_string()).unwrap_or_default();
+                let problem = problems.add(at, format!("address {number} is a Modicon number: {meant}"));
+                problem.label("expected the address as it is sent, 0 to 65535");
+                problem.help(format!("write the address that is sent, and modicon = {number} beside it"));
+                None
+            }
+            Node::Whole(_) | Node::Number(_) | Node::Flag(_) | Node::Time(_) | Node::Array(_) | Node::Table(_) => {
+                u16::read(value, at, problems).map(Location::Wire)
+            }
+        }
+    }
+}
+
+/// Addresses are always as sent; to say so settles what digits mean that could be a Modicon number.
+pub(super) fn check_base(base: Option<At<u8>>, problems: &mut Problems) {
+    if let Some(base) = base.filter(|base| base.value != 0) {
+        let problem = problems.add(base.at, "addresses are written as they are sent, from 0");
+        problem.label("expected 0").help("`modicon` may be added to a tag and is checked against its address");
+    }
+}
+
+/// Digits that are a Modicon number of their own table as well as an address: `40001` of a holding register. Hexadecimal
+/// and an address with its table are never one.
+pub(super) fn is_unclear(location: &At<Location>, table: Table, problems: &Problems) -> bool {
+    let text = problems.text(location.at.source).get(location.at.start..location.at.end).unwrap_or_default();
+    let digits = text.trim_matches(['"', '\'']);
+    matches!(location.value, Location::Wire(_)) && of_modicon(digits).is_some_and(|(meant, _)| meant == table)
+}
+
+/// Says once for a file how such digits are read.
+pub(super) fn warn_unclear(unclear: impl Iterator<Item = (Span, Table, u16)>, problems: &mut Problems) {
+    let mut said: Vec<usize> = Vec::new();
+    for (at, table, address) in unclear {
+        if said.contains(&at.source) {
+            continue;
+        }
+        said.push(at.source);
+        let (word, sent) = (table.word(), table.modicon(address));
+        let other = meaning(&address.to_string()).unwrap_or_default();
+        let problem = problems.warn(at, format!("address {address} is read as sent: {word} {address}, Modicon {sent}"));
+        problem.label(format!("as a Modicon number it would be {other}"));
+        problem.help(
+            "say once for all addresses that they are as sent: address_base = 0 at the top of the profile or in the \
+             [[device]]; for a Modicon number write the address that it means, and `modicon` beside it",
+        );
     }
 }
 

@@ -6,15 +6,15 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Names, Scope, Unique, check_number, held_number_of, number_of},
     reader::{At, Node, OptionalKey, Raw, text},
-    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, SignatureTable, Stated},
+    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, Stated},
     simulate::simulate,
-    tag::Defined,
+    tag::{Defined, range_of},
     units,
 };
 use crate::plant::{
-    def::{ActionDef, Faceplate, Limits, Probe, TagId},
+    def::{ActionDef, Faceplate, Limits, TagId},
     output::Output,
-    tag::{Access, Decimals, Point, Poll, TagDef},
+    tag::{Access, Bound, Decimals, Point, Poll, TagDef},
 };
 
 /// The keys of a device profile that stand in the plant file itself; `None` where there is no map at all.
@@ -240,10 +240,20 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
         let mut tag = defined.tag;
         for (need, what) in &defined.needs {
             let target = &all[need.value.index()];
-            let foreign = target.enum_labels.iter().find(|(_, unit)| !units::known(unit));
-            if *what == "unit_from" && (target.enum_labels.is_empty() || foreign.is_some()) {
-                let found = foreign.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is no unit"));
+            // Any text can be a unit, but where none is known they are states of something else.
+            let known = target.enum_labels.iter().find(|(_, unit)| units::is_known(unit));
+            if *what == "unit_from" && known.is_none() {
+                let first = target.enum_labels.first();
+                let found = first.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is no unit"));
                 problems.add(need.at, format!("{} gives no unit: {found}", target.name)).label("unit_from");
+            }
+            if *what == "decimals_from" && may_be_exponent(target) {
+                let message =
+                    format!("{} may hold a power of ten: it has a sign, a number of decimals has none", target.name);
+                let problem = problems.add(need.at, message);
+                problem.label("1 would be read as one decimal, and a power of ten of 1 is ten times as much");
+                problem
+                    .help("give it scale = -1 if it holds a power of ten (SunSpec), or min = 0 if it counts decimals");
             }
             if target.is_text() {
                 check_number(need.at, target, problems);
@@ -258,7 +268,8 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
             }
         }
         if let Some((target, units)) = &mut tag.unit_from {
-            *units = all[target.index()].enum_labels.clone();
+            let labels = all[target.index()].enum_labels.iter();
+            *units = labels.map(|(number, unit)| (*number, units::of(unit))).collect();
             // Until the device was asked, the first of its units stands in columns and headings.
             let first = units.first().map(|(_, unit)| unit.clone()).unwrap_or_default();
             tag.unit = Some(tag.unit).filter(|unit| !unit.is_empty()).unwrap_or(first);
@@ -277,6 +288,14 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
     defined.into_iter().map(finish).collect()
 }
 
+/// Can it be below 0? Decimals never are, a power of ten that makes decimals always is.
+fn may_be_exponent(tag: &TagDef) -> bool {
+    let is_signed = range_of(tag).is_some_and(|(low, _)| low.near() < 0.0);
+    let is_bounded = matches!(tag.min, Some(Bound::Fixed(min)) if 0.0 <= min.near());
+    let is_counted = !tag.enum_labels.is_empty() && tag.enum_labels.iter().all(|(number, _)| 0 <= *number);
+    is_signed && 0.0 < tag.scale && !is_bounded && !is_counted
+}
+
 /// The tags that the controller is operated by.
 pub(super) fn faceplate(table: &FaceplateTable, scope: &Scope, problems: &mut Problems) -> Option<Faceplate> {
     let mut find = |name: &Option<At<String>>| {
@@ -290,37 +309,6 @@ pub(super) fn faceplate(table: &FaceplateTable, scope: &Scope, problems: &mut Pr
     let sv = find(&table.sv).and_then(|_| scope.writable(&table.sv, problems));
     let tunes = table.tunes.iter().filter_map(|name| Some(scope.tag(name, problems)?.id)).collect();
     Some(Faceplate { pv: pv?, sv: sv?.id, sv_used, mv, run, mode, tune, tunes })
-}
-
-/// By what the device is recognised.
-pub(super) fn signature(table: &SignatureTable, scope: &Scope, problems: &mut Problems) -> Vec<Probe> {
-    let mut probes = Vec::new();
-    for At { value: probe, at } in &table.probes {
-        let Some(tag) = probe.tag.as_ref().and_then(|name| scope.tag(name, problems)) else { continue };
-        check_number(*at, tag, problems);
-        let bits = probe.bits.as_ref().and_then(|name| scope.tag(name, problems));
-        if let Some(bit) = bits.filter(|bit| !bit.point.table.is_bits() || tag.point.len() != 1) {
-            problems.add(*at, format!("{} and {} are no word and bit", tag.name, bit.name)).label("bits");
-        }
-        let is: Vec<f64> = probe.is.iter().map(|number| number.value as f64).collect();
-        let ranges = match (probe.range, &probe.bits, is.is_empty()) {
-            (Some(At { value: [low, high], at }), None, true) => {
-                if high < low {
-                    problems.add(at, format!("{low} to {high} is empty")).label("expected [least, greatest]");
-                }
-                vec![(low, high)]
-            }
-            (None, Some(_), true) => Vec::new(),
-            (None, None, false) => is.into_iter().map(|number| (number, number)).collect(),
-            _ => {
-                let problem = problems.add(*at, "a probe says what the raw number must be");
-                problem.label("expected one of `is`, `range` and `bits`");
-                continue;
-            }
-        };
-        probes.push(Probe { tag: tag.id, ranges, bits: bits.map(|bit| bit.id) });
-    }
-    probes
 }
 
 /// What an output is at its terminals is calculated from percent.

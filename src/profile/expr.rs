@@ -9,6 +9,7 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Defs, check_number, exact_of},
     reader::{At, Choice},
+    units,
 };
 use crate::plant::{
     calculation::OverTime,
@@ -325,7 +326,7 @@ impl<'a> Reader<'a, '_> {
             && number.is_finite()
             && tag.enum_labels.is_empty()
         {
-            if !rest.is_empty() && rest != tag.unit {
+            if !rest.is_empty() && units::of(rest) != tag.unit {
                 let problem = self.problems.add(at, format!("`{rest}` is not the unit of {}", tag.name));
                 problem.label(if tag.unit.is_empty() {
                     "it has none".into()

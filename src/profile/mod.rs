@@ -39,10 +39,12 @@ pub(crate) mod new_plant;
 mod plant;
 mod own;
 mod program;
+mod raw_pattern;
 pub(crate) mod reader;
 pub(crate) mod renamed;
 mod report;
 mod schema;
+mod signature;
 mod simulate;
 mod set_file;
 mod sets;
@@ -62,7 +64,7 @@ use std::{
 };
 
 pub(crate) use self::io::scenario;
-pub(crate) use self::units::unit_of;
+pub(crate) use self::units::{is_known as is_known_unit, of as unit_of};
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search, list, text_of},

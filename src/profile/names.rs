@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{
     diagnostic::{Problems, Span},
+    raw_pattern::is_pattern,
     reader::{At, Choice, Node, Value},
 };
 use crate::plant::{
@@ -172,7 +173,8 @@ pub(crate) fn exact_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problem
         Choice::Word(word) => {
             tag.enum_labels.iter().find(|(_, text)| text == word).map(|(number, _)| Exact::whole(*number))
         }
-        Choice::Number(number) => Some(*number).filter(|n| tag.enum_labels.is_empty() || tag.label_of(*n).is_some()),
+        Choice::Number(number) => Some(as_held(At { value: *number, at: choice.at }, tag, problems))
+            .filter(|n| tag.enum_labels.is_empty() || tag.label_of(*n).is_some()),
         Choice::Flag(flag) => Some(f64::from(u8::from(*flag)).into()).filter(|_| has_two_states(tag)),
     };
     if known.is_none() {
@@ -189,6 +191,15 @@ pub(crate) fn exact_of(choice: &At<Choice>, tag: &TagDef, problems: &mut Problem
         }
     }
     known
+}
+
+/// A number of a tag that shows its raw number; in hexadecimal it is the pattern of its bits: 0xFFFF of an int16 is -1. A
+/// decimal number beyond the type stays one that does not fit.
+fn as_held(At { value: number, at }: At<Exact>, tag: &TagDef, problems: &Problems) -> Exact {
+    let is_raw = tag.scale == 1.0 && tag.offset == 0.0 && matches!(tag.decimals, Decimals::Fixed(_));
+    let is_binary = tag.calculation.is_none() && tag.point.kind.is_binary();
+    let meant = || tag.point.raw_number(number.as_whole()?, true).number();
+    if is_raw && is_binary && is_pattern(at, problems) { meant().unwrap_or(number) } else { number }
 }
 
 /// Can a tag be true or false: a bit, states 0 and 1, or an expression?

@@ -4,9 +4,10 @@ use std::{fmt::Write, time::Duration};
 
 use toml_edit::Value;
 
-use super::{OwnProfiles, edit, units};
+use super::{OwnProfiles, edit};
 use crate::plant::{
     PlantDef,
+    address::of_modicon,
     def::{LineDef, TagId},
     live::ReplyTimes,
     tag::{Access, Bound, ByteOrder, DataType, Decimals, Poll, TagDef},
@@ -143,17 +144,19 @@ impl NewPlant {
         if device.tags.is_empty() && polled.is_empty() && device.unpolled.is_empty() {
             return writeln!(out);
         }
-        writeln!(
-            out,
-            "# value = raw · scale + offset. Read only: access = \"rw\" lets an operator write a tag.\ntag = ["
-        )?;
+        let (tags, left_out) = device.own_tags();
+        // Only then do digits need it; another reader of the file sees that it was meant.
+        if tags.iter().any(|tag| of_modicon(&tag.point.address.to_string()).is_some()) {
+            writeln!(out, "address_base = 0")?;
+        }
+        writeln!(out, "# value = raw · scale + offset. Read only: access = \"rw\" lets an operator write a tag.")?;
+        writeln!(out, "tag = [")?;
         for tag in polled {
             writeln!(out, "    {{ name = {}, poll = \"fast\" }},", quoted(&tag.short))?;
         }
         for name in &device.unpolled {
             writeln!(out, "    {{ name = {}, poll = \"never\" }},", quoted(name))?;
         }
-        let (tags, left_out) = device.own_tags();
         for tag in tags {
             writeln!(out, "    {{ {} }},", tag_text(tag))?;
         }
@@ -375,11 +378,7 @@ fn tag_text(tag: &TagDef) -> String {
         if let Decimals::Fixed(decimals) = tag.decimals {
             keys.push(format!("decimals = {decimals}"));
         }
-        // A unit that the list of units lacks stands in the words instead.
-        match units::known(&tag.unit) {
-            true => keys.extend((!tag.unit.is_empty()).then(|| format!("unit = {}", quoted(&tag.unit)))),
-            false => keys.push(format!("label = {}", quoted(&format!("{} in {}", tag.short, tag.unit)))),
-        }
+        keys.extend((!tag.unit.is_empty()).then(|| format!("unit = {}", quoted(&tag.unit))));
         if !tag.enum_labels.is_empty() {
             let labels = tag.enum_labels.iter().map(|(number, word)| format!("{number} = {}", quoted(word)));
             keys.push(format!("enum = {{ {} }}", labels.collect::<Vec<_>>().join(", ")));

@@ -6,7 +6,9 @@ use jiff::tz::TimeZone;
 use sha2::{Digest, Sha256};
 
 use super::{
-    access, alarm,
+    access,
+    address::{check_base, warn_unclear},
+    alarm,
     automatic_report::Rules,
     batch, calculated, device,
     diagnostic::{Errors, Problems},
@@ -17,6 +19,7 @@ use super::{
     report, run,
     schema::{DeviceTable, PlantFile, ProfileFile},
     sets,
+    signature::probes,
     size::is_of_size,
     tag::{self, DeviceContext},
 };
@@ -181,6 +184,9 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         def.functions = device::functions(&device.profile, &defined[first..], problems);
         devices.push(def);
     }
+    let unclear = defined.iter().filter(|defined| defined.is_unclear);
+    let unclear = unclear.filter_map(|one| Some((one.address_at?, one.tag.point.table, one.tag.point.address)));
+    warn_unclear(unclear, problems);
     let classes = defined.iter().map(|defined| defined.class).collect();
     let exprs = defined.iter().filter_map(|defined| Some((defined.tag.id, defined.expr.clone()?))).collect();
     let written = defined.iter().map(|defined| defined.in_sets).collect::<Vec<_>>();
@@ -197,7 +203,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         let program = device.profile.program.as_ref().map(|program| &program.value);
         def.program = program.and_then(|table| program::program(table, &scope, problems));
         let signature = device.profile.signature.as_ref().map(|signature| &signature.value);
-        def.signature = signature.map_or(Vec::new(), |table| device::signature(table, &scope, problems));
+        def.signature = signature.map_or(Vec::new(), |table| probes(table, &scope, problems));
         if let Some(table) = &device.table.stated {
             let listens = lines.get(def.line.index()).is_some_and(|line| line.listens);
             stated.extend(device::stated(&table.value, &scope, listens, problems));
@@ -240,6 +246,7 @@ fn known_devices<'a>(
         problems.add(file.at, "the plant has no device").label("expected a [[device]]");
     }
     for table in file.devices.iter().map(|table| &table.value) {
+        check_base(table.address_base, problems);
         let profile = match &table.profile {
             Some(_) => {
                 device::check_inline_keys(table, problems);
@@ -297,6 +304,8 @@ fn define_device<'a>(
         device_name: name,
         scheme: profile.scheme.value_or(Default::default()),
         limits,
+        has_default: profile.default.is_some(),
+        has_base: table.address_base.or(profile.address_base).is_some(),
         fast: period(table.fast, 1, problems),
         slow: period(table.slow, 10, problems),
         names,
@@ -372,10 +381,7 @@ fn profile(
         }
         Ok(Some(text)) => reader::parse(&text.file, &text.bytes, problems).map(|raw| {
             let file = ProfileFile::of(&[raw], problems);
-            if let Some(base) = file.address_base.filter(|base| base.value != 0) {
-                let problem = problems.add(base.at, "addresses are written as they are sent, from 0");
-                problem.label("expected 0").help("`modicon` may be added to a tag and is checked against its address");
-            }
+            check_base(file.address_base, problems);
             Rc::new(file)
         }),
         Ok(None) => {

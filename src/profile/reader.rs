@@ -12,8 +12,7 @@ use toml::{
     de::{DeTable, DeValue},
 };
 
-use self::value::wrong_type;
-pub(crate) use self::value::{Choice, Numbered, Texts, duration};
+pub(crate) use self::value::{Choice, Numbered, Texts, duration, wrong_type};
 use super::{
     diagnostic::{Problems, Span},
     renamed,

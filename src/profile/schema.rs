@@ -8,7 +8,7 @@ use jiff::civil::Time;
 
 pub(super) use self::device::{
     ActionTable, CheckTable, CounterKey, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Roles,
-    Scheme, SignatureTable, SimulateTable, Stated, StepTable, TagTable,
+    Scheme, SignatureTable, SimulateTable, Stated, StepTable, TagTable, TypeName,
 };
 use super::{
     condition::AlarmTable,
@@ -125,6 +125,8 @@ toml_tables! {
         /// Period of tags with `poll = "slow"`.
         opt "slow" slow: Duration,
         opt "limits" limits: Raw,
+        /// Always 0: says that addresses which could be Modicon numbers are as sent.
+        opt "address_base" address_base: u8,
         /// More tags, or other keys for the tags of the profile.
         list "tag" tags: Raw,
         /// The least role that may write the tags of a group; what the profile says of the same group does not count.

@@ -1,22 +1,24 @@
 //! One row of a register map becomes the definition of a tag, and is checked against itself and its device.
 
 mod bits;
+mod place;
 mod scaling;
 
 use std::time::Duration;
 
-pub(super) use self::{bits::named_bits, scaling::range_of};
+pub(super) use self::{bits::named_bits, place::field_of, scaling::range_of};
 use self::{
-    bits::{bit_field, bit_labels, enum_labels},
+    bits::{bit_labels, enum_labels},
+    place::place,
     scaling::check_scaling,
 };
 use super::{
-    address::{check_modicon, locate},
+    address::is_unclear as is_unclear_at,
     diagnostic::{Problems, Span},
     names::{Names, check_name, number_of},
     reader::{At, Choice, OptionalKey, Raw, either, supersede, text},
     schema::{CounterKey, PollWord, Roles, Scheme, SimulateTable, TagTable},
-    tag_keys::{check_calculated, check_text},
+    tag_keys::strip_default,
     units,
 };
 use crate::plant::{
@@ -34,6 +36,10 @@ pub(super) struct DeviceContext<'a> {
     pub device_name: &'a str,
     pub scheme: Scheme,
     pub limits: Limits,
+    /// The last layer of each row are the defaults of its profile.
+    pub has_default: bool,
+    /// It is stated how addresses count.
+    pub has_base: bool,
     pub fast: Duration,
     pub slow: Duration,
     pub names: &'a Names,
@@ -58,6 +64,8 @@ pub(super) struct Defined {
     pub in_sets: Option<At<bool>>,
     /// Where its address stands; `None` if it has no valid point.
     pub address_at: Option<Span>,
+    /// Its address could as well be a Modicon number.
+    pub is_unclear: bool,
     /// Tags that this one needs to be shown right.
     pub needs: Vec<(At<TagId>, &'static str)>,
     /// Where the unlock value stands, which is resolved when the other tag is known.
@@ -69,13 +77,8 @@ pub(super) struct Defined {
 }
 
 /// Builds a tag from its layers. Where something is wrong a placeholder stands, and the problems keep it from getting out.
-pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, problems: &mut Problems) -> Defined {
-    for (first, second) in [("min", "min_from"), ("max", "max_from"), ("decimals", "decimals_from")] {
-        either(&mut layers, first, second, problems);
-    }
-    // A plant file that moves a tag need not repeat the number of the manual.
-    supersede(&mut layers, "address", "modicon");
-    let row = TagTable::of(&layers, problems);
+pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, problems: &mut Problems) -> Defined {
+    let (row, has_default_marks) = row_of(layers, context, problems);
     let (point, kind, is_text) = place(&row, context, problems);
     let links = links(&row, context, problems);
     let decimals = match links.decimals {
@@ -96,7 +99,7 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         scale: row.scale.value_or(1.0),
         offset: row.offset.value_or(0.0),
         decimals,
-        unit: row.unit.as_ref().map(|unit| units::check(unit, problems)).unwrap_or_default(),
+        unit: row.unit.as_ref().map(|unit| units::of(&unit.value)).unwrap_or_default(),
         unit_from: links.unit.map(|tag| (tag, Vec::new())),
         min: links.min.map(Bound::From).or(fixed(&row.min)),
         max: links.max.map(Bound::From).or(fixed(&row.max)),
@@ -105,9 +108,9 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         confirm: row.confirm.as_ref().map(|confirm| confirm.value.clone()),
         reauthenticate: row.reauthenticate.map(|kind| kind.value),
         role: row.role.map_or_else(|| context.role_of(&text(&row.group)), |role| role.value.0),
-        enum_labels: enum_labels(&row, kind, problems),
+        enum_labels: enum_labels(&row, point.filter(|_| row.expr.is_none()), problems),
         bit_labels: bit_labels(&row.bits, kind, problems),
-        bad_if: row.bad_if.iter().map(|raw| raw.value).collect(),
+        bad_if: bad_if(&row, point, has_default_marks, problems),
         quality_from: links.quality.map(|tag| (tag, row.quality_mask.value_or(u64::MAX))),
         write_fc: row.write_fc.map(|fc| fc.value),
         group: text(&row.group),
@@ -131,12 +134,42 @@ pub(super) fn define(id: TagId, mut layers: Vec<Raw>, context: &DeviceContext, p
         tag,
         class: row.poll_class.map(|class| class.value),
         in_sets: row.in_sets,
+        is_unclear: !context.has_base && is_unclear(&row, point, problems),
         address_at: point.and(row.address.map(|address| address.at)),
         expr: row.expr,
         needs: links.needs,
         unlock: links.unlock,
         simulate: row.simulate.map(|simulate| simulate.value),
     }
+}
+
+/// The row of its layers, and whether its marks of no value are those of the defaults.
+fn row_of(mut layers: Vec<Raw>, context: &DeviceContext, problems: &mut Problems) -> (TagTable, bool) {
+    for (first, second) in [("min", "min_from"), ("max", "max_from"), ("decimals", "decimals_from")] {
+        either(&mut layers, first, second, problems);
+    }
+    // A plant file that moves a tag need not repeat the number of the manual.
+    supersede(&mut layers, "address", "modicon");
+    let mut default_marks = None;
+    if let Some(defaults) = layers.pop_if(|_| context.has_default) {
+        let defaults = strip_default(defaults, &layers, context.scheme);
+        default_marks = defaults.table.get("bad_if").map(|(_, node)| node.at);
+        layers.push(defaults);
+    }
+    let row = TagTable::of(&layers, problems);
+    let has_default_marks = row.bad_if.as_ref().is_some_and(|marks| Some(marks.at) == default_marks);
+    (row, has_default_marks)
+}
+
+fn bad_if(row: &TagTable, point: Option<Point>, is_default: bool, problems: &mut Problems) -> Vec<Exact> {
+    let Some((marks, point)) = row.bad_if.as_ref().zip(point) else { return Vec::new() };
+    marks.value.of(point, is_default, problems)
+}
+
+/// Could its address as well be a Modicon number?
+fn is_unclear(row: &TagTable, point: Option<Point>, problems: &Problems) -> bool {
+    let Some((location, point)) = row.address.as_ref().zip(point) else { return false };
+    row.modicon.is_none() && is_unclear_at(location, point.table, problems)
 }
 
 /// The shortest interval at which an unchanged value may be stored.
@@ -182,104 +215,6 @@ fn links(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Li
 
 /// Raw type and, for a field, its number of bits.
 type Raws = (DataType, Option<u8>);
-
-/// Where it lies, its raw numbers, and whether it is a text.
-fn place(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> (Option<Point>, Option<Raws>, bool) {
-    if let Some(expr) = &row.expr {
-        check_calculated(row, expr.at, problems);
-    }
-    let point = point(row, context, problems);
-    let kind = point.filter(|_| row.expr.is_none()).map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
-    let is_text = point.is_some_and(|point| matches!(point.kind, DataType::Text(_)));
-    if let Some(point) = point.filter(|_| is_text) {
-        check_text(row, point, problems);
-    }
-    (point, kind, is_text)
-}
-
-fn point(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Option<Point> {
-    if row.expr.is_some() {
-        return Some(Point { kind: DataType::F64, ..NOWHERE });
-    }
-    if row.address.is_none() && row.valid {
-        problems.add(row.at, "a tag needs `address`").label("missing here").help("or `expr`, if it is calculated");
-    }
-    let location = row.address.as_ref().filter(|_| row.valid)?;
-    let (named, address) = locate(location, context.scheme, problems)?;
-    let table = table(row, named, problems)?;
-    if let Some(modicon) = &row.modicon {
-        check_modicon(modicon, table, address, problems);
-    }
-    let kind = match (row.kind, table.is_bits()) {
-        (Some(kind), true) if kind.value.0 != DataType::Bool => {
-            problems.add(kind.at, format!("a {} is one bit", table.word())).label("expected type = \"bool\"");
-            return None;
-        }
-        (None, true) => DataType::Bool,
-        (Some(kind), _) => kind.value.0,
-        (None, false) => {
-            problems
-                .add(row.at, "a tag in a register needs `type`")
-                .label("missing here")
-                .help("for example type = \"int16\"");
-            return None;
-        }
-    };
-    let field = match &row.field {
-        Some(field) => Some(bit_field(field, kind, table, problems)?),
-        None => None,
-    };
-    let point = Point { table, address, kind, order: row.order.value_or(Default::default()), field };
-    check_place(point, location.at, context.limits, problems).then_some(point)
-}
-
-fn table(row: &TagTable, named: Option<Table>, problems: &mut Problems) -> Option<Table> {
-    match (row.table, named) {
-        // V memory answers to both register functions, so the table may be named for it.
-        (Some(written), Some(Table::Holding)) if !written.value.is_bits() => Some(written.value),
-        (Some(written), Some(named)) if written.value != named => {
-            let problem =
-                problems.add(written.at, format!("this address is a {}, not a {}", named.word(), written.value.word()));
-            problem.label("leave it out: the address defines it");
-            None
-        }
-        (Some(written), _) => Some(written.value),
-        (None, Some(named)) => Some(named),
-        (None, None) => {
-            problems.add(row.at, "a tag needs `table`").label("missing here").help("coil, discrete, input or holding");
-            None
-        }
-    }
-}
-
-/// Checks that the registers exist, fit into one request and lie where the device wants them.
-fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) -> bool {
-    let words = point.len();
-    if u32::from(point.address) + u32::from(words) > 0x1_0000 {
-        problems.add(at, "the value extends past the last address").label("the last is 65535");
-        return false;
-    }
-    if words > 1 && !point.address.is_multiple_of(limits.alignment.max(1)) {
-        let alignment = limits.alignment;
-        let problem = problems.add(
-            at,
-            format!("a value of {words} registers at address {} breaks alignment = {alignment}", point.address),
-        );
-        problem.label(format!("expected a multiple of {alignment}"));
-    }
-    if !point.table.is_bits() && words > limits.read_registers_max {
-        let max = limits.read_registers_max;
-        problems
-            .add(at, format!("the value takes {words} registers, the device reads at most {max}"))
-            .label("too long");
-    }
-    true
-}
-
-/// Bits inside the word of another tag.
-pub(super) fn field_of(field: &At<Choice>, point: Point, problems: &mut Problems) -> Option<(u8, u8)> {
-    bit_field(field, point.kind, point.table, problems)
-}
 
 /// Decimals to show if the row does not say: as many as the scale has, two for floats.
 fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {

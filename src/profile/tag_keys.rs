@@ -1,10 +1,15 @@
 //! Keys that a tag which holds text, or is calculated, does not have.
 
 use super::{
+    address::memory_table,
     diagnostic::{Problems, Span},
-    schema::TagTable,
+    reader::{Node, Raw},
+    schema::{Scheme, TagTable},
 };
-use crate::plant::tag::{Access, ByteOrder, Point, StorePolicy};
+use crate::plant::{
+    address::{in_table, table_named},
+    tag::{Access, ByteOrder, Point, StorePolicy},
+};
 
 /// Keys that a text does not have.
 #[rustfmt::skip]
@@ -20,6 +25,39 @@ const FOR_REGISTERS: [&str; 26] = [
     "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_unlock", "poll",
     "poll_class", "simulate", "default", "set",
 ];
+
+/// The defaults of a profile without those that its kind of tag does not have: a type of registers is no coil's, a scale no
+/// text's.
+pub(super) fn strip_default(mut defaults: Raw, own: &[Raw], scheme: Scheme) -> Raw {
+    let written = |layers: &[Raw], key: &str| {
+        let node = layers.iter().find_map(|layer| layer.table.get(key)).map(|(_, node)| &node.value);
+        node.and_then(|node| if let Node::Text(text) = node { Some(text.clone()) } else { None })
+    };
+    let of_default = std::slice::from_ref(&defaults);
+    let address = written(own, "address").unwrap_or_default();
+    let by_address = in_table(&address).map(|(table, _)| table);
+    let by_name = || memory_table(&address).filter(|_| scheme == Scheme::DirectLogic);
+    let named = written(own, "table").or_else(|| written(of_default, "table").filter(|_| by_address.is_none()));
+    let table = by_address.or_else(by_name).or_else(|| named.and_then(|word| table_named(&word)));
+    let kind = written(own, "type").or_else(|| written(of_default, "type")).unwrap_or_default();
+    let mut foreign: Vec<&str> = Vec::new();
+    if own.iter().any(|layer| layer.table.contains_key("expr")) {
+        foreign.extend(FOR_REGISTERS);
+    } else if table.is_some_and(|table| table.is_bits()) {
+        foreign.extend(["type", "order", "field"].into_iter().chain(FOR_NUMBERS));
+    } else if kind.starts_with("string") {
+        foreign.extend(FOR_NUMBERS);
+        // Only the bytes of a text have an order.
+        foreign.extend(written(of_default, "order").filter(|order| order == ByteOrder::Cdab.word()).map(|_| "order"));
+    }
+    if by_address.is_some() {
+        foreign.push("table");
+    }
+    foreign.into_iter().for_each(|key| {
+        defaults.table.remove(key);
+    });
+    defaults
+}
 
 /// What is calculated is neither read nor written.
 pub(super) fn check_calculated(row: &TagTable, expr: Span, problems: &mut Problems) {

@@ -99,3 +99,16 @@ fn decimals_and_unit_are_those_that_the_device_says() {
     assert_eq!((device(40, 0), device(1, 7)), (None, None), "it says nothing of use");
     assert_eq!(scaling(pxr, sv, &|_| Vec::new()), None, "it was not read");
 }
+
+#[test]
+fn a_power_of_ten_scales_as_its_own_tag_says() {
+    let text = "vendor = \"a\"\nmodel = \"b\"\nstatus = \"manual\"\nsource = \"c\"\n\
+        tag = [{ name = \"W\", table = \"holding\", address = 0, type = \"int16\", unit = \"W\", decimals_from = \"SF\" },\n\
+        { name = \"SF\", table = \"holding\", address = 1, type = \"int16\", scale = -1 }]\n\
+        [signature]\nprobe = [{ tag = \"W\", range = [0, 9] }]\n";
+    let known = OwnProfiles::of_text("sun", text).recognisable();
+    let def = known.iter().find(|def| def.name == "sun").expect("it is recognisable");
+    let scaled = |exponent: i16| scaling(def, &def.tags[0], &|_| vec![exponent.cast_unsigned()]);
+    assert_eq!(scaled(-1), Some((1, "W".to_owned())));
+    assert_eq!(scaled(1), None, "411 would be shown as 41.1 where 4110 is meant");
+}

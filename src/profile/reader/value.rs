@@ -190,7 +190,7 @@ impl Value for Choice {
     }
 }
 
-pub(super) fn wrong_type<T>(value: &Node, at: Span, expected: &str, problems: &mut Problems) -> Option<T> {
+pub(crate) fn wrong_type<T>(value: &Node, at: Span, expected: &str, problems: &mut Problems) -> Option<T> {
     let found = match value {
         Node::Text(_) => "a string",
         Node::Whole(_) => "a whole number",

@@ -13,6 +13,7 @@ use crate::{
     profile::{
         address::{Location, Modicon},
         diagnostic::{Problems, Span},
+        raw_pattern::{BadIf, RawPattern},
         reader::{At, Choice, Node, Numbered, Raw, Value, toml_tables},
         simulate::Choices,
     },
@@ -57,7 +58,7 @@ toml_tables! {
     /// What the raw number of a tag must be.
     ProbeTable, "a probe" {
         need "tag" tag: String,
-        list "is" is: i64,
+        list "is" is: RawPattern,
         opt "range" range: [f64; 2],
         /// The first of 16 coils or discrete inputs that the word holds once more.
         opt "bits" bits: String,
@@ -113,7 +114,7 @@ toml_tables! {
         opt "role" role: WriteRole,
         opt "enum" enum_labels: Numbered,
         opt "bits" bits: Numbered,
-        list "bad_if" bad_if: i128,
+        opt "bad_if" bad_if: BadIf,
         opt "quality_from" quality_from: String,
         opt "quality_mask" quality_mask: u64,
         opt "write_fc" write_fc: u8,

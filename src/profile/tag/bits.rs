@@ -1,20 +1,35 @@
 //! Fields of bits in a register, and the names of numbers and bits.
 
-use super::{Raws, scaling::raw_range};
+use super::Raws;
 use crate::{
     plant::{
+        exact::Exact,
         number::to_u8,
-        tag::{DataType, Table},
+        raw_number::RawNumber,
+        tag::{DataType, Point, Table},
     },
     profile::{
-        diagnostic::Problems,
+        diagnostic::{Problems, Span},
         reader::{At, Choice, Numbered},
         schema::TagTable,
     },
 };
 
 /// `"5-4"` or `3`: lowest bit and number of bits.
-pub(super) fn bit_field(field: &At<Choice>, kind: DataType, table: Table, problems: &mut Problems) -> Option<(u8, u8)> {
+pub(super) fn bit_field(
+    field: &At<Choice>,
+    (kind, kind_at): (DataType, Option<Span>),
+    table: Table,
+    problems: &mut Problems,
+) -> Option<(u8, u8)> {
+    let is_whole = !table.is_bits() && (kind.is_binary() || kind == DataType::Bool);
+    if !is_whole {
+        let found = if table.is_bits() { format!("a {}", table.word()) } else { format!("type {kind}") };
+        let problem = problems.add(kind_at.unwrap_or(field.at), format!("{found} has no field of bits"));
+        problem.label("expected a whole number in a register, such as uint16, or int16 where the field has a sign");
+        problem.also(field.at, "the field");
+        return None;
+    }
     let bounds = match &field.value {
         Choice::Number(bit) if bit.as_whole().is_some_and(|bit| (0..64).contains(&bit)) => {
             Some((to_u8(bit.near()), to_u8(bit.near())))
@@ -26,8 +41,7 @@ pub(super) fn bit_field(field: &At<Choice>, kind: DataType, table: Table, proble
         },
     };
     let size = kind.registers() * 16;
-    let whole = !table.is_bits() && (kind.is_binary() || kind == DataType::Bool);
-    let valid = bounds.filter(|(high, low)| low <= high && u16::from(*high) < size && whole);
+    let valid = bounds.filter(|(high, low)| low <= high && u16::from(*high) < size);
     if valid.is_none() {
         let problem = problems.add(field.at, "this is not a field of bits");
         problem.label(format!("expected \"HIGH-LOW\" or one bit, 0 to {} of a whole number", size - 1));
@@ -35,18 +49,26 @@ pub(super) fn bit_field(field: &At<Choice>, kind: DataType, table: Table, proble
     valid.map(|(high, low)| (low, high - low + 1))
 }
 
-pub(super) fn enum_labels(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> Vec<(i128, String)> {
+/// The names of raw numbers. A number of a signed register may be written as its pattern of bits.
+pub(super) fn enum_labels(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Vec<(i128, String)> {
     let Some(Numbered(rows)) = row.enum_labels.as_ref().map(|labels| &labels.value) else { return Vec::new() };
-    let range = kind.and_then(raw_range);
+    let mut labels: Vec<(i128, String)> = Vec::new();
     for (number, text) in rows {
-        let outside = range.filter(|(low, high)| !(low..=high).contains(&&number.value));
-        if let Some((low, high)) = outside {
+        let meant =
+            point.map_or(RawNumber::Is(Exact::whole(number.value)), |point| point.raw_number(number.value, false));
+        if let (RawNumber::Impossible, Some((low, high))) = (meant, point.and_then(Point::raw_range)) {
             let problem =
                 problems.add(number.at, format!("enum value {} ({text}) does not fit the type", number.value));
             problem.label(format!("the type holds {low} to {high}"));
         }
+        let meant = meant.number().and_then(Exact::as_whole).unwrap_or(number.value);
+        if labels.iter().any(|(other, _)| *other == meant) {
+            problems.add(number.at, format!("enum value {} is {meant} once more", number.value)).label("again");
+        }
+        labels.push((meant, text.clone()));
     }
-    rows.iter().map(|(number, text)| (number.value, text.clone())).collect()
+    labels.sort_by_key(|(number, _)| *number);
+    labels
 }
 
 pub(super) fn bit_labels(

@@ -80,8 +80,5 @@ fn value_range(kind: Raws, scale: f64, offset: f64) -> Option<(Exact, Exact)> {
 }
 
 pub(super) fn raw_range((kind, field): Raws) -> Option<(i128, i128)> {
-    if let Some(bits) = field {
-        return Some((0, (1 << bits) - 1));
-    }
-    kind.whole_range()
+    kind.raw_range(field)
 }

@@ -53,7 +53,7 @@ fn all_problems_come_at_once_and_in_file_order() {
         ("Asia/Bangkok", "Mars/Base"),
         ("unit = 2", "unit = 0"),
         ("V2000", "V2008"),
-        ("°C", "C"),
+        ("min = 0", "min = 200"),
         ("baud = 9600", "baud = 9601"),
     ]);
     let lines: Vec<String> = errors.lines().collect();
@@ -62,7 +62,7 @@ fn all_problems_come_at_once_and_in_file_order() {
     small.toml:8:8: 9601 is not a usual baud rate
     small.toml:22:8: unit 0 is a broadcast, which no unit answers: PLC.STEP can never be read
     small.toml:27:1: unknown key `deadbnd` in an alarm
-    meter.toml:16:8: unknown unit `C`
+    meter.toml:19:7: max 100 is not above min 200
     plc.toml:9:16: `V2008` does not exist: DirectLOGIC counts in octal
     ");
 }

@@ -25,7 +25,7 @@ fn a_text_takes_no_key_that_is_for_numbers() {
         ("max = 5", "`max` is for numbers"),
         ("enum = { 0 = \"a\" }", "`enum` is for numbers"),
         ("bad_if = [0]", "`bad_if` is for numbers"),
-        ("field = 3", "this is not a field of bits"),
+        ("field = 3", "type string(8) has no field of bits"),
         ("order = \"CDAB\"", "the words of a text cannot be reversed"),
         ("access = \"rw\"", "a text can only be read"),
         ("store = \"always\"", "the history keeps numbers, this is a text"),

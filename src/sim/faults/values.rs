@@ -49,7 +49,7 @@ impl Values {
             if !tag.point.table.is_bits() && tag.point.len() == 2 {
                 values.pairs.push(tag.point);
             }
-            let mark = tag.bad_if.first().and_then(|mark| codec::encode(tag.point, *mark as f64));
+            let mark = tag.bad_if.first().and_then(|mark| codec::encode(tag.point, *mark));
             values.marks.extend(mark.map(|words| (tag.point, words)));
         }
         values
@@ -200,7 +200,7 @@ mod tests {
 
     fn tag(table: Table, address: u16, kind: DataType, access: Access) -> TagDef {
         let point = Point { table, address, kind, order: ByteOrder::Abcd, field: None };
-        TagDef { access, bad_if: vec![0x7FFF], ..TagDef::new(TagId(0), DeviceId(0), "D-1.T", point) }
+        TagDef { access, bad_if: vec![32_767.0.into()], ..TagDef::new(TagId(0), DeviceId(0), "D-1.T", point) }
     }
 
     /// A float at 10, a setpoint at 12, a sensor at 13, all in one block, and a measured bit.

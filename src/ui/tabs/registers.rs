@@ -35,7 +35,8 @@ use self::{cells::Cells, names::Names, recognise::Recognition};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        live::{AddressSpan, LiveReading, ReplyTimes, TABLES},
+        address::{AddressBase, TABLES},
+        live::{AddressSpan, LiveReading, ReplyTimes},
         tag::{ByteOrder, Table},
     },
     profile::OwnProfiles,
@@ -44,17 +45,6 @@ use crate::{
 
 /// An answer that is not there after so long is asked for again: the line has dropped it.
 const LOST_AFTER: SignedDuration = SignedDuration::from_secs(15);
-/// How an address is written.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Base {
-    /// Modicon number.
-    Modicon,
-    /// From 0, as on the wire.
-    Zero,
-    /// From 1, as in many manuals.
-    One,
-}
-
 /// State of this tab.
 #[derive(Debug)]
 pub struct Registers {
@@ -67,7 +57,7 @@ pub struct Registers {
     first: u16,
     selected: u16,
     order: ByteOrder,
-    base: Base,
+    base: AddressBase,
     period: SignedDuration,
     /// When the next read of the rhythm is due; one that a key asked for before that changes nothing of it.
     due: Option<Timestamp>,
@@ -81,8 +71,12 @@ pub struct Registers {
     recognition: Recognition,
     /// Of the user.
     pub profiles: OwnProfiles,
-    /// What came of a pasted list.
+    /// What came of a log, said with the next snapshot.
     said: Option<UiAction>,
+    /// A list that was loaded and is not taken yet.
+    preview: Option<import::preview::Preview>,
+    /// A list that was pasted, which is read with the next snapshot.
+    pasted: Option<String>,
     /// Number and steady time of the read on its way, and what it reads.
     on_way: Option<(u32, Timestamp, AddressSpan)>,
     /// Of the last query of the tab.
@@ -127,7 +121,7 @@ impl TabView for Registers {
             first: 0,
             selected: 0,
             order: ByteOrder::Abcd,
-            base: Base::Modicon,
+            base: AddressBase::Modicon,
             period: SignedDuration::from_secs(1),
             due: None,
             paused: false,
@@ -138,6 +132,8 @@ impl TabView for Registers {
             recognition: Recognition::default(),
             profiles: OwnProfiles::default(),
             said: None,
+            preview: None,
+            pasted: None,
             on_way: None,
             number: 0,
             relearn: false,
@@ -163,14 +159,18 @@ impl TabView for Registers {
     }
 
     fn back(&mut self, _cx: &ViewContext) -> bool {
-        self.watch.close_graph()
+        self.watch.close_graph() || self.preview.take().is_some()
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         if self.watch.has_graph() {
             return watch::graph::view(self, cx, frame, area);
         }
-        view::view(self, cx, &mut Canvas::new(frame.buffer_mut(), area));
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
+        match self.preview {
+            Some(_) => import::preview::view(self, cx, &mut canvas),
+            None => view::view(self, cx, &mut canvas),
+        }
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
@@ -185,6 +185,9 @@ impl TabView for Registers {
         actions.extend(self.recognise(cx));
         // A window closes when a session begins.
         actions.extend(self.said.take_if(|_| cx.session.who.is_some()));
+        if let Some(text) = self.pasted.take_if(|_| cx.session.who.is_some()) {
+            actions.extend(self.load_list(cx, &text));
+        }
         if !self.paused && (self.on_way.is_none() || wanted) {
             actions.extend(self.ask(cx, None));
         }
@@ -262,16 +265,15 @@ impl TabView for Registers {
     }
 
     fn on_loaded(&mut self, cx: &ViewContext, result: Result<String, String>) -> Vec<UiAction> {
-        let said = match result {
-            Ok(text) => self.load_list(&text),
-            Err(why) => UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![why]))),
-        };
-        std::iter::once(said).chain(self.read_now(cx)).collect()
+        match result {
+            Ok(text) => self.load_list(cx, &text),
+            Err(why) => vec![save::no_list(why)],
+        }
     }
 
-    /// A list that was copied; what came of it is said with the next snapshot.
+    /// A list that was copied; it is shown with the next snapshot.
     fn on_paste(&mut self, text: &str) {
-        self.said = Some(self.load_list(text));
+        self.pasted = Some(text.to_owned());
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {

@@ -1,28 +1,25 @@
 //! Where something is: an address as it is typed, and a value among what was read.
 
-use super::{Base, Registers, view};
+use super::{Registers, view};
 use crate::{
     plant::{
-        live::{AddressSpan, number, of_modicon},
+        address::{AddressBase, AddressContext},
+        live::number,
         tag::Table,
     },
     t,
 };
 
 impl Registers {
-    /// `1002`, `0x3EA`: in this table, by its base; `41003`, `input:1000`: in any.
+    /// `1002`, `0x3EA`, `41003`: in this table and by its base; `input:1000`: as sent, in any.
     pub(super) fn parse_address(&self, text: &str) -> Result<(Table, u16), String> {
-        if let Some(modicon) = of_modicon(text) {
-            return Ok(modicon);
-        }
-        match (number(text), self.base) {
-            (Some(address), Base::One) if !text.starts_with("0x") => address
-                .checked_sub(1)
-                .map(|address| (self.table, address))
-                .ok_or_else(|| t!("the first is 1").to_owned()),
-            (Some(address), _) => Ok((self.table, address)),
-            (None, _) => text.parse::<AddressSpan>().map(|span| (span.table, span.address)),
-        }
+        let of = AddressContext { table: self.table, is_stated: false, base: self.base };
+        of.parse(text).ok_or_else(|| {
+            if self.base == AddressBase::One && number(text) == Some(0) {
+                return t!("the first is 1").to_owned();
+            }
+            t!("found `{text}`, expected an address such as 1002, 0x3EA, 41003 or holding:1002", text)
+        })
     }
 
     /// The next address behind the selected one that holds a value, alone or with those that follow it, raw or with one

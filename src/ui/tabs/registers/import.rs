@@ -1,36 +1,44 @@
 //! Register lists of other programs: the JSON of MTUI, and the CSV that Wingpath's ModMaster and Modsak export. Their scales
-//! are not those of a manual: read as such a list they would give wrong values.
+//! are not those of a manual: read as such a list they would give wrong values. What is known to be something else is refused
+//! with its name.
+
+mod foreign;
+pub(super) mod preview;
 
 use serde::Deserialize;
 
 use super::{
-    list::{self, List},
+    list::{self, List, ListContext, words},
     names::Named,
 };
 use crate::{
-    plant::tag::{ByteOrder, DataType, Table},
+    plant::{
+        address::AddressContext,
+        exact::Exact,
+        tag::{ByteOrder, DataType, Table},
+    },
     profile::unit_of,
     t,
 };
 
-/// The list of another program; `None` where it is none of these.
-pub fn parse(text: &str, table: Table, first: u16) -> Option<List> {
-    let text = text.trim_start_matches('\u{FEFF}').trim();
-    if text.starts_with('{') {
-        return Some(mtui(text));
-    }
-    let (head, _) = text.split_once('\n')?;
-    let is_export = ["Address", "Name", "Type", "Radix", "Offset", "Scale"].iter().all(|column| head.contains(column));
-    is_export.then(|| wingpath(text, table, first))
+/// Reads a list of any form that is known; else says what it is and what can be read.
+pub fn parse(text: &str, context: &ListContext) -> List {
+    let text = text.trim_start_matches('\u{FEFF}').trim_start();
+    let list = match foreign::form(text) {
+        Some(form) => List::refused(t!("it is {form}", form)),
+        None if text.starts_with('{') => mtui(text),
+        None if is_wingpath(text) => wingpath(text, context),
+        None => list::parse(text, context),
+    };
+    let known = t!(
+        "What can be read: CSV and other text with a heading (address, name, type, scale, unit, table, in any order), columns of a PDF, tables of Markdown, lists of ioBroker, the JSON of MTUI, and exports of ModMaster and Modsak."
+    );
+    List { refused: list.refused.map(|why| format!("{why}. {known}")), ..list }
 }
 
-impl List {
-    fn push(&mut self, place: &str, named: Result<Named, String>) {
-        match named {
-            Ok(named) => self.named.push(named),
-            Err(why) => self.problems.push(format!("{place}: {why}")),
-        }
-    }
+fn is_wingpath(text: &str) -> bool {
+    let head = text.lines().next().unwrap_or_default();
+    ["Address", "Name", "Type", "Radix", "Offset", "Scale"].iter().all(|column| head.contains(column))
 }
 
 /// `config.json` of MTUI, or the part of it that it takes as a paste: since its version 1 `registers` with everything of an
@@ -101,12 +109,17 @@ fn mtui(text: &str) -> List {
     let read: Mtui = match serde_json::from_str::<serde_json::Value>(text).and_then(serde_json::from_value) {
         Ok(read) => read,
         Err(error) => {
-            list.problems
-                .push(t!("found JSON, expected the registers, labels or custom_rules of MTUI: {error}", error));
-            return list;
+            return List::refused(t!(
+                "it is JSON, but not the registers, labels or custom_rules of MTUI: {error}",
+                error
+            ));
         }
     };
-    let usual = read.device.word_order.as_deref().and_then(list::order_of).unwrap_or_default();
+    let all = [&read.registers, &read.labels, &read.custom_rules];
+    if Table::ALL.iter().all(|table| all.iter().all(|tables| tables.of(*table).is_empty())) {
+        return List::refused(t!("it is JSON without the registers, labels or custom_rules of MTUI").to_owned());
+    }
+    let usual = read.device.word_order.as_deref().and_then(words::order_of).unwrap_or_default();
     for table in [Table::Holding, Table::Input, Table::Coil, Table::Discrete] {
         let entries = [&read.registers, &read.labels, &read.custom_rules].map(|tables| tables.of(table));
         let mut addresses: Vec<u16> =
@@ -148,7 +161,7 @@ impl Rule {
 
     fn named(self, table: Table, address: u16, usual: ByteOrder, name: &str) -> Result<Named, String> {
         let repr = self.repr.as_deref().unwrap_or("U16");
-        let kind = list::kind_of(repr).ok_or_else(|| t!("`{repr}` is not a known type", repr))?;
+        let kind = words::kind_of(repr).ok_or_else(|| t!("`{repr}` is not a known type", repr))?;
         let kind = if table.is_bits() { DataType::Bool } else { kind };
         if !self.bits.is_empty() {
             return Err(t!("names of bits cannot be taken").to_owned());
@@ -156,7 +169,7 @@ impl Rule {
         if self.next.iter().zip(1u16..).any(|(next, n)| address.checked_add(n) != Some(*next)) {
             return Err(t!("its words do not stand beside each other").to_owned());
         }
-        let order = self.word_order.as_deref().map_or(Some(usual), list::order_of);
+        let order = self.word_order.as_deref().map_or(Some(usual), words::order_of);
         let order = order.ok_or_else(|| t!("unknown word order").to_owned())?;
         let (mut scale, mut offset) = (1.0, 0.0);
         for op in &self.ops {
@@ -172,47 +185,49 @@ impl Rule {
             }
         }
         let suffix = self.suffix.trim();
-        let unit = unit_of(suffix).map_or(suffix.to_owned(), str::to_owned);
-        let enum_labels = self.labels.into_iter().map(|Label { value, text }| (value.into(), text)).collect();
-        let decimals = self.decimals.unwrap_or_else(|| list::decimals_of(scale, kind));
-        Ok(Named { scale, offset, decimals, unit, enum_labels, ..Named::new(table, address, kind, order, name) })
+        let unit = unit_of(suffix);
+        let plain = Named::new(table, address, kind, order, name);
+        let raw = |value: i64| plain.point().raw_number(value.into(), false).number().and_then(Exact::as_whole);
+        let label = |Label { value, text }| raw(value).map(|raw| (raw, text));
+        let enum_labels = self.labels.into_iter().filter_map(label).collect();
+        let decimals = self.decimals.unwrap_or_else(|| words::decimals_of(scale, kind));
+        Ok(Named { scale, offset, decimals, unit, enum_labels, ..plain })
     }
 }
 
 /// "Export Registers" of ModMaster and Modsak: their displayed value is (raw + offset) / scale.
-fn wingpath(text: &str, table: Table, first: u16) -> List {
-    let mut list = List::default();
+fn wingpath(text: &str, context: &ListContext) -> List {
     let mut reader = csv::ReaderBuilder::new().flexible(true).has_headers(false).from_reader(text.as_bytes());
-    let mut columns: Option<csv::StringRecord> = None;
-    for (n, record) in reader.records().enumerate() {
-        let place = t!("line {number}", number = n + 1);
-        let Ok(record) = record else {
-            list.problems.push(t!("{place}: it is no CSV", place));
-            continue;
-        };
-        let Some(columns) = &columns else {
-            columns = Some(record);
-            continue;
-        };
-        let cell = |name: &str| {
-            let at = columns.iter().position(|column| column.trim() == name);
-            at.and_then(|at| record.get(at)).unwrap_or_default().trim()
-        };
-        list.push(&place, exported(cell, table, first));
+    // A text in memory is read to its end.
+    let mut records = reader.records().filter_map(Result::ok);
+    let columns = records.next().unwrap_or_default();
+    let cell = |record: &csv::StringRecord, name: &str| {
+        let at = columns.iter().position(|column| column.trim() == name);
+        at.and_then(|at| record.get(at)).unwrap_or_default().trim().to_owned()
+    };
+    let rows: Vec<csv::StringRecord> = records.collect();
+    let written: Vec<String> = rows.iter().map(|row| cell(row, "Address")).collect();
+    let written: Vec<(&str, Option<Table>)> = written.iter().map(|text| (text.as_str(), None)).collect();
+    let (base, unclear) = list::base_of(&written, context);
+    let mut list = List { unclear, ..List::default() };
+    for row in &rows {
+        let place = t!("line {number}", number = row.position().map_or(0, csv::Position::line));
+        let of = AddressContext { table: context.table, is_stated: false, base };
+        list.push(&place, exported(|name| cell(row, name), of));
     }
     list
 }
 
-fn exported<'a>(cell: impl Fn(&str) -> &'a str, table: Table, first: u16) -> Result<Named, String> {
+fn exported(cell: impl Fn(&str) -> String, of: AddressContext) -> Result<Named, String> {
     let (written, name, word) = (cell("Address"), cell("Name"), cell("Type"));
     // A discrete value stands in a table of bits.
-    let table = if word == "int1" && !table.is_bits() { Table::Coil } else { table };
-    let found = list::address_of(written, table, first);
+    let table = if word == "int1" && !of.table.is_bits() { Table::Coil } else { of.table };
+    let found = AddressContext { table, ..of }.parse(&written);
     let (table, address) = found.ok_or_else(|| t!("`{written}` is not an address", written))?;
     if name.is_empty() {
         return Err(t!("{written}: no name", written));
     }
-    let kind = if word == "int1" { Some(DataType::Bool) } else { list::kind_of(word) };
+    let kind = if word == "int1" { Some(DataType::Bool) } else { words::kind_of(&word) };
     let kind = kind.filter(|kind| table.is_bits() == (*kind == DataType::Bool));
     let kind = kind.ok_or_else(|| t!("{written}: `{word}` is not a known type", written, word))?;
     let number = |name: &str, usual: f64| {
@@ -227,19 +242,24 @@ fn exported<'a>(cell: impl Fn(&str) -> &'a str, table: Table, first: u16) -> Res
     if divisor == 0.0 {
         return Err(t!("{written}: `{text}` is not a scale", written, text = cell("Scale")));
     }
-    let (scale, unit) = (1.0 / divisor, cell("Unit"));
-    let unit = unit_of(unit).map_or(unit.to_owned(), str::to_owned);
-    let decimals = list::decimals_of(scale, kind);
+    let (scale, unit) = (1.0 / divisor, unit_of(&cell("Unit")));
+    let decimals = words::decimals_of(scale, kind);
     let order = ByteOrder::Abcd;
-    Ok(Named { scale, offset: offset / divisor, decimals, unit, ..Named::new(table, address, kind, order, name) })
+    Ok(Named { scale, offset: offset / divisor, decimals, unit, ..Named::new(table, address, kind, order, &name) })
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
 
+    fn context() -> ListContext {
+        ListContext { table: Table::Holding, base: None, order: ByteOrder::Abcd, unit: 1, means: BTreeMap::new() }
+    }
+
     fn read(text: &str) -> (Vec<String>, Vec<String>) {
-        let list = parse(text, Table::Holding, 0).expect("a list of another program");
+        let list = parse(text, &context());
         let shown = |named: &Named| {
             let (place, kind, order) = (named.table.modicon(named.address), named.kind.name(), named.order.word());
             let (name, unit) = (&named.name, &named.unit);
@@ -264,7 +284,7 @@ mod tests {
         ];
         assert_eq!(named, expect);
         assert_eq!(problems, ["line 5: 8: `int8` is not a known type", "line 6: 9: `0` is not a scale"]);
-        assert_eq!(parse("Address,Name,Scale\n5,a,10\n", Table::Holding, 0), None, "a list of a manual");
+        assert_eq!(read("Address,Name,Scale\n5,a,10\n").0, ["40006 a uint16 ABCD 10 0 0 "], "a list of a manual");
     }
 
     #[test]
@@ -298,7 +318,7 @@ mod tests {
             "custom_rules": { "inputs": [{ "a": 7, "repr": "I16", "ops": ["/10"], "decimals": 1, "suffix": " C" }] } }"#;
         let expect = ["30008 temperature int16 ABCD 0.1 0 1 °C", "30010 plain uint16 ABCD 1 0 0 "];
         assert_eq!(read(text), (expect.map(str::to_owned).to_vec(), Vec::new()));
-        let (named, problems) = read("{ \"holdings\": ");
-        assert!(named.is_empty() && problems[0].contains("expected the registers"), "{problems:?}");
+        let broken = parse("{ \"holdings\": ", &context()).refused.expect("a reason");
+        assert!(broken.contains("not the registers") && broken.contains("What can be read: CSV"), "{broken}");
     }
 }

@@ -36,7 +36,7 @@ const LOOK: &[Key] = &[
         registers.order = next(&ByteOrder::ALL, registers.order);
     }),
     Key::change(char('b'), "base", "addresses as Modicon numbers, from 0 or from 1", |registers, _| {
-        registers.base = next(&[Base::Modicon, Base::Zero, Base::One], registers.base);
+        registers.base = next(&[AddressBase::Modicon, AddressBase::Zero, AddressBase::One], registers.base);
     }),
     Key::change(char(' '), "pause", "pause or resume reading", |registers, _| registers.paused = !registers.paused),
     Key::change(char('+'), "", "read more often", |registers, _| registers.change_period(-1)),
@@ -109,6 +109,7 @@ impl KeyTable for Registers {
             (true, _) if self.watch.is_shown_log() => Keys::below(&GRAPH),
             (true, true) => Keys::below(&GRAPH).and(Keys::of(&[LOG, BACK])),
             (true, false) => Keys::below(&GRAPH).and(Keys::of(&[BACK])),
+            (false, _) if self.preview.is_some() => Keys::of(import::preview::KEYS),
             (false, true) => Keys::of(BENCH),
             (false, false) => Keys::of(PLANT),
         }
@@ -124,7 +125,8 @@ impl KeyTable for Registers {
             let log = Keys::of(&[LOG]).chords();
             ("graph", [chords, log].concat())
         });
-        [("registers", Keys::of(BENCH).chords())].into_iter().chain(graph).collect()
+        let list = ("list", Keys::of(import::preview::KEYS).chords());
+        [("registers", Keys::of(BENCH).chords()), list].into_iter().chain(graph).collect()
     }
 }
 

@@ -1,44 +1,42 @@
-//! A register list from a manual becomes names: CSV, or columns as they are copied from a PDF, recognised by their heading
-//! or, without one, by their form.
+//! A register list from a manual becomes names: CSV, Markdown, or columns as they are copied from a PDF, recognised by their
+//! heading or, without one, by their form. What is not sure is not taken, and said by line.
 
+mod cells;
+mod columns;
+mod row;
+pub mod words;
+
+use std::collections::BTreeMap;
+
+pub use self::columns::Column;
+use self::{
+    cells::Cells,
+    columns::{Columns, first_of, is_address, is_heading},
+    row::{Assumed, Row},
+};
 use super::names::Named;
 use crate::{
     plant::{
-        live::of_modicon,
-        tag::{ByteOrder, DataType, Table},
+        address::{AddressBase, AddressContext, of_modicon},
+        tag::{ByteOrder, Table},
     },
-    profile::unit_of,
     t,
 };
 
-/// Most lines of a list.
-const LINES_MAX: usize = 10_000;
-
-/// What a column holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Column {
-    Address,
-    Name,
-    Type,
-    Scale,
-    Divisor,
-    Unit,
-    Table,
-    Order,
+/// What a list does not say itself, or what its reader has decided.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ListContext {
+    /// Table of an address that names none.
+    pub table: Table,
+    /// How plain numbers count; `None`: that is not said.
+    pub base: Option<AddressBase>,
+    /// Order of what takes several registers.
+    pub order: ByteOrder,
+    /// The unit whose registers are shown.
+    pub unit: u8,
+    /// What columns mean other than it seems.
+    pub means: BTreeMap<usize, Option<Column>>,
 }
-
-/// Words of headings, in small letters; the first that stands in a cell counts.
-#[rustfmt::skip]
-const HEADINGS: [(Column, &[&str]); 8] = [
-    (Column::Divisor, &["divisor", "divide"]),
-    (Column::Scale, &["scale", "scaling", "factor", "multiplier", "gain", "resolution"]),
-    (Column::Order, &["order", "endian", "swap"]),
-    (Column::Unit, &["unit", "units", "uom", "dimension"]),
-    (Column::Type, &["type", "format", "datatype"]),
-    (Column::Table, &["table", "function", "area", "fc"]),
-    (Column::Address, &["address", "addr", "addr.", "register", "reg", "reg.", "modicon", "hex"]),
-    (Column::Name, &["name", "parameter", "description", "tag", "label", "signal", "variable", "meaning"]),
-];
 
 /// What was read of a list, and what was not, by line.
 #[derive(Debug, Default, PartialEq)]
@@ -47,306 +45,140 @@ pub struct List {
     pub named: Vec<Named>,
     /// `line 7: no address`.
     pub problems: Vec<String>,
+    /// It is no list at all: why.
+    pub refused: Option<String>,
+    /// Digits that two registers have, and both.
+    pub unclear: Option<Unclear>,
+    /// Heading of each column, and what it means.
+    pub columns: Vec<(String, Option<Column>)>,
 }
 
-/// Reads a list. A plain number is an address of `table`; `first` is 1 where numbers count from 1.
-pub fn parse(text: &str, table: Table, first: u16) -> List {
-    let mut list = List::default();
-    let mut heading: Option<Vec<Option<Column>>> = None;
-    for (n, line) in text.lines().enumerate().take(LINES_MAX) {
-        let cells = cells(line);
-        if cells.iter().all(|cell| cell.is_empty()) || line.trim_start().starts_with('#') {
-            continue;
-        }
-        if let Some(columns) = columns(&cells) {
-            heading = Some(columns);
-            continue;
-        }
-        let row = match &heading {
-            // A line with other columns than the heading is taken by its form.
-            Some(columns) if columns.len() == cells.len() => headed(columns, &cells),
-            Some(_) | None => by_form(&cells),
-        };
-        let named = row.named(table, first).and_then(|named| {
-            let taken = list.named.iter().any(|old| (old.table, old.address) == (named.table, named.address));
-            if taken { Err(t!("{name}: this address has a name already", name = named.name)) } else { Ok(named) }
+/// The first address of a list that can be read in two ways.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unclear {
+    /// As written.
+    pub written: String,
+    /// As a Modicon number.
+    pub modicon: (Table, u16),
+    /// As sent.
+    pub sent: (Table, u16),
+}
+
+impl List {
+    /// No list: why.
+    pub fn refused(why: String) -> List {
+        List { refused: Some(why), ..List::default() }
+    }
+
+    /// Adds what a row gave.
+    pub fn push(&mut self, place: &str, named: Result<Named, String>) {
+        let free = named.and_then(|named| {
+            let is_taken = self.named.iter().any(|old| (old.table, old.address) == (named.table, named.address));
+            if is_taken { Err(t!("{name}: this address has a name already", name = named.name)) } else { Ok(named) }
         });
-        match named {
-            Ok(named) => list.named.push(named),
-            Err(why) => list.problems.push(t!("line {number}: {why}", number = n + 1, why)),
+        match free {
+            Ok(named) => self.named.push(named),
+            Err(why) => self.problems.push(format!("{place}: {why}")),
         }
+    }
+}
+
+/// Reads a list.
+pub fn parse(text: &str, context: &ListContext) -> List {
+    let separator = cells::separator(text);
+    let all = cells::rows(text, separator);
+    let mut list = List::default();
+    let rows = match all.iter().position(|row| is_heading(&row.cells)) {
+        Some(first) => {
+            let above = all[..first].iter().map(|row| Row::without_cells(row.line));
+            above.chain(below_headings(&all[first..], separator.is_some(), context, &mut list)).collect()
+        }
+        None => match by_form(&all, separator.is_some()) {
+            Ok(rows) => rows,
+            Err(why) => return List::refused(why),
+        },
+    };
+    let written: Vec<(&str, Option<Table>)> =
+        rows.iter().filter_map(|row| Some((first_of(row.address.as_ref()?), row.table))).collect();
+    let (base, unclear) = base_of(&written, context);
+    list.unclear = unclear;
+    let assumed = Assumed { table: context.table, base, order: context.order };
+    for row in rows {
+        list.push(&t!("line {number}", number = row.line), row.named(assumed));
     }
     list
 }
 
-/// The cells of a line: at tabs, else semicolons, else commas, else two blanks, else every blank.
-fn cells(line: &str) -> Vec<String> {
-    let line = line.trim_matches(['\u{FEFF}', '\r']);
-    let separator = ['\t', ';', ','].into_iter().find(|separator| line.contains(*separator));
-    let decimal_comma = separator == Some(',') && line.matches(',').count() == 1;
-    match separator.filter(|_| !decimal_comma) {
-        Some(separator) => quoted_cells(line, separator),
-        None if line.trim().contains("  ") => {
-            line.split("  ").map(|cell| cell.trim().to_owned()).filter(|cell| !cell.is_empty()).collect()
+/// The rows below each heading.
+fn below_headings(all: &[Cells], is_separated: bool, context: &ListContext, list: &mut List) -> Vec<Row> {
+    let mut rows = Vec::new();
+    let starts: Vec<usize> = (0..all.len()).filter(|n| is_heading(&all[*n].cells)).collect();
+    for (n, start) in starts.iter().enumerate() {
+        let end = starts.get(n + 1).copied().unwrap_or(all.len());
+        let (heading, below) = (&all[*start].cells, &all[start + 1..end]);
+        let mut columns = Columns::new(heading, below);
+        for (place, mean) in &context.means {
+            columns.means.iter_mut().skip(*place).take(1).for_each(|old| *old = *mean);
         }
-        None => line.split_whitespace().map(str::to_owned).collect(),
-    }
-}
-
-fn quoted_cells(line: &str, separator: char) -> Vec<String> {
-    let mut reader = csv::ReaderBuilder::new();
-    let reader = reader.has_headers(false).delimiter(u8::try_from(separator).unwrap_or(b',')).trim(csv::Trim::All);
-    let record = reader.from_reader(line.as_bytes()).into_records().next();
-    // A line of text in memory is a record.
-    record.and_then(Result::ok).map_or(Vec::new(), |cells| cells.iter().map(str::to_owned).collect())
-}
-
-/// The columns of a heading: at least an address and one more, and no number.
-fn columns(cells: &[String]) -> Option<Vec<Option<Column>>> {
-    let of = |cell: &String| {
-        let cell = cell.to_lowercase();
-        let words: Vec<&str> = cell.split([' ', '_', '(', ')', '/']).collect();
-        HEADINGS.iter().find(|(_, known)| known.iter().any(|known| words.contains(known))).map(|(column, _)| *column)
-    };
-    let columns: Vec<Option<Column>> = cells.iter().map(of).collect();
-    let known = columns.iter().flatten().count();
-    let numbers = cells.iter().any(|cell| address_of(cell, Table::Holding, 0).is_some());
-    (columns.contains(&Some(Column::Address)) && 2 <= known && !numbers).then_some(columns)
-}
-
-/// The cells of a row by what they hold.
-#[derive(Debug, Default)]
-struct Row {
-    address: Option<String>,
-    name: String,
-    kind: Option<String>,
-    scale: Option<f64>,
-    wrong_scale: Option<String>,
-    unit: String,
-    table: Option<Table>,
-    order: ByteOrder,
-}
-
-fn headed(columns: &[Option<Column>], cells: &[String]) -> Row {
-    let mut row = Row::default();
-    for (column, cell) in columns.iter().zip(cells).filter(|(_, cell)| !cell.is_empty()) {
-        match column {
-            // Of two addresses (register and hex) the first that can be read counts.
-            Some(Column::Address) if row.address.is_none() => row.address = Some(cell.clone()),
-            Some(Column::Name) if row.name.is_empty() => row.name.clone_from(cell),
-            Some(Column::Type) => row.kind = Some(cell.clone()),
-            Some(Column::Scale | Column::Divisor) => {
-                let factor = number_of(cell).filter(|number| *number != 0.0);
-                row.scale = if *column == Some(Column::Divisor) { factor.map(|by| 1.0 / by) } else { factor };
-                row.wrong_scale = factor.is_none().then(|| cell.clone()).filter(|cell| cell != "-");
-            }
-            Some(Column::Unit) => row.unit.clone_from(cell),
-            Some(Column::Table) => row.table = table_of(cell),
-            Some(Column::Order) => row.order = order_of(cell).unwrap_or_default(),
-            Some(Column::Address | Column::Name) | None => {}
+        let undecided = columns.undecided_factor(below, &context.means);
+        if n == 0 {
+            list.columns = columns.headings.iter().cloned().zip(columns.means.iter().copied()).collect();
+        }
+        for row in below {
+            // A line of a PDF with other columns than the heading is taken by its form.
+            let read = if is_separated || row.cells.len() == heading.len() {
+                Row::headed(&columns, row, context.unit)
+            } else {
+                Row::by_form(row.line, &row.cells)
+            };
+            rows.push(if undecided { read.with_undecided_factor() } else { read });
         }
     }
-    row
+    rows
 }
 
-/// Without a heading: an address, a type, a unit, a scale and an order are known by their form; the rest is the name.
-fn by_form(cells: &[String]) -> Row {
-    let mut row = Row::default();
-    let is_address = |cell: &&String| address_of(cell, Table::Holding, 0).is_some();
-    // A Modicon number or hexadecimal is one anywhere; a plain number, which may be a page or count the rows, only in front.
-    let sure = cells.iter().find(|cell| is_address(cell) && (of_modicon(cell).is_some() || !plain(cell)));
-    row.address = sure.or_else(|| cells.first().filter(is_address)).cloned();
-    let mut words: Vec<&str> = Vec::new();
-    let counts = |n: usize, cell: &String| n == 0 && plain(cell);
-    let rest = cells.iter().enumerate().filter(|(n, cell)| !cell.is_empty() && !counts(*n, cell)).map(|(_, cell)| cell);
-    let rest = rest.filter(|cell| Some(*cell) != row.address.as_ref());
-    for cell in rest.cloned().collect::<Vec<_>>().iter() {
-        if row.kind.is_none() && kind_of(cell).is_some() {
-            row.kind = Some(cell.clone());
-        } else if let Some(order) = order_of(cell) {
-            row.order = order;
-        } else if let (None, Some(table)) = (row.table, table_of(cell).filter(|_| number_of(cell).is_none())) {
-            row.table = Some(table);
-        } else if let (None, Some(factor)) = (row.scale, number_of(cell).filter(|number| *number != 0.0)) {
-            row.scale = Some(factor);
-        } else if row.unit.is_empty() && unit_of(cell).is_some() && !cell.is_empty() {
-            row.unit.clone_from(cell);
-        } else if let Some(known) = cells.iter().find(|known| *known == cell) {
-            words.push(known);
-        }
+/// Rows without a heading; `Err` where they are no list.
+fn by_form(all: &[Cells], is_separated: bool) -> Result<Vec<Row>, String> {
+    let Some(first) = all.first() else { return Err(t!("there is nothing in it").to_owned()) };
+    if is_separated && !first.cells.iter().any(|cell| is_address(cell)) {
+        let heading = first.cells.join(", ");
+        return Err(t!("its heading has no column of addresses: {heading}", heading));
     }
-    row.name = words.join(" ");
-    row
-}
-
-impl Row {
-    fn named(self, table: Table, first: u16) -> Result<Named, String> {
-        let Some(written) = self.address else { return Err(t!("no address").to_owned()) };
-        let found = address_of(&written, self.table.unwrap_or(table), first);
-        let (table, address) = found.ok_or_else(|| t!("`{written}` is not an address", written))?;
-        if self.name.is_empty() {
-            return Err(t!("{written}: no name", written));
-        }
-        if let Some(wrong) = self.wrong_scale {
-            return Err(t!("{written}: `{wrong}` is not a scale", written, wrong));
-        }
-        let kind = match self.kind {
-            _ if table.is_bits() => DataType::Bool,
-            None => DataType::U16,
-            Some(word) => kind_of(&word).ok_or_else(|| t!("{written}: `{word}` is not a known type", written, word))?,
-        };
-        let scale = self.scale.unwrap_or(1.0);
-        let decimals = decimals_of(scale, kind);
-        let unit = unit_of(&self.unit).map_or(self.unit, str::to_owned);
-        Ok(Named { scale, decimals, unit, ..Named::new(table, address, kind, self.order, &self.name) })
+    let rows: Vec<Row> = all.iter().map(|row| Row::by_form(row.line, &row.cells)).collect();
+    let (found, count) = (rows.iter().filter(|row| row.address.is_some()).count(), rows.len());
+    if 2 * found < count {
+        return Err(t!("only {found} of its {count} lines have an address", found, count));
     }
+    Ok(rows)
 }
 
-/// Decimals that show what a scale leaves of a raw number.
-pub fn decimals_of(scale: f64, kind: DataType) -> u8 {
-    let fraction = format!("{scale}").split_once('.').map_or(0, |(_, digits)| digits.len().min(6));
-    let float = matches!(kind, DataType::F32 | DataType::F64);
-    u8::try_from(if float { fraction.max(2) } else { fraction }).unwrap_or(0)
-}
-
-fn plain(text: &str) -> bool {
-    text.chars().all(|c| c.is_ascii_digit())
-}
-
-/// `41003`, `0x3EA`, `03EAH`, `1002`; of `41003-41004` the first.
-pub fn address_of(text: &str, table: Table, first: u16) -> Option<(Table, u16)> {
-    let text = text.split(['-', '–', '…']).next()?.trim();
-    let hex = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X"));
-    let hex =
-        hex.or_else(|| text.strip_suffix(['h', 'H']).filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit())));
-    match hex {
-        Some(hex) => u16::from_str_radix(hex, 16).ok().map(|address| (table, address)),
-        None if !plain(text) || text.is_empty() => None,
-        None => {
-            of_modicon(text).or_else(|| text.parse::<u16>().ok()?.checked_sub(first).map(|address| (table, address)))
-        }
+/// How the plain numbers of a list count: as its reader has said, else as its own numbers prove; else it is unclear. Each is
+/// given as written, with the table that its row states.
+pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (AddressBase, Option<Unclear>) {
+    if let Some(base) = context.base {
+        return (base, None);
     }
-}
-
-/// `0.1`, `0,1`, `x0.1`, `/10`, `÷10`, `1/10`.
-fn number_of(text: &str) -> Option<f64> {
-    let text = text.trim().replace(',', ".");
-    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
-    if let Some((one, by)) = text.split_once(['/', '÷', ':']) {
-        let one = if one.trim().is_empty() { 1.0 } else { number(one)? };
-        return number(by).filter(|by| *by != 0.0).map(|by| one / by);
+    let is_plain = |text: &str| text.len() == 5 && text.bytes().all(|byte| byte.is_ascii_digit());
+    let is_of =
+        |text: &str, of: Option<Table>| of_modicon(text).is_some_and(|(table, _)| of.is_none_or(|of| of == table));
+    // 52000 is no Modicon number, and 16299 none of a holding register.
+    let is_sent = written.iter().any(|(text, of)| is_plain(text) && !is_of(text, *of));
+    // Six digits are too many for what is sent.
+    let is_modicon = written.iter().any(|(text, _)| text.len() == 6 && of_modicon(text).is_some());
+    match (is_sent, is_modicon) {
+        (true, false) => return (AddressBase::Zero, None),
+        (false, true) => return (AddressBase::Modicon, None),
+        (true, true) | (false, false) => {}
     }
-    number(text.trim_start_matches(['x', 'X', '*', '×']))
-}
-
-fn table_of(text: &str) -> Option<Table> {
-    let text = text.to_lowercase();
-    let is = |words: &[&str]| words.iter().any(|word| text.contains(word));
-    match text.trim_start_matches("fc").trim().trim_start_matches('0') {
-        "1" => Some(Table::Coil),
-        "2" => Some(Table::Discrete),
-        "3" => Some(Table::Holding),
-        "4" => Some(Table::Input),
-        _ if is(&["coil"]) => Some(Table::Coil),
-        _ if is(&["discrete"]) => Some(Table::Discrete),
-        _ if is(&["holding"]) => Some(Table::Holding),
-        _ if is(&["input reg"]) || text == "input" => Some(Table::Input),
-        _ => None,
-    }
-}
-
-pub fn order_of(text: &str) -> Option<ByteOrder> {
-    ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(text))
-}
-
-/// The type that a manual means by a word.
-pub fn kind_of(text: &str) -> Option<DataType> {
-    let word: String = text.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
-    let text_bytes =
-        ["string", "char", "ascii"].iter().find_map(|prefix| word.strip_prefix(prefix)?.parse::<u8>().ok());
-    if let Some(bytes) = text_bytes.filter(|bytes| (1..=DataType::TEXT_MAX).contains(bytes)) {
-        return Some(DataType::Text(bytes));
-    }
-    Some(match word.as_str() {
-        "int16" | "i16" | "s16" | "sint16" | "int" | "short" | "signed" | "signed16" | "signed16bit" | "signedint" => {
-            DataType::I16
-        }
-        "uint16" | "u16" | "word" | "uint" | "ushort" | "unsigned" | "unsigned16" | "unsigned16bit" | "unsignedint" => {
-            DataType::U16
-        }
-        "int32" | "i32" | "s32" | "sint32" | "dint" | "long" | "signed32" | "signed32bit" => DataType::I32,
-        "uint32" | "u32" | "dword" | "udint" | "ulong" | "unsigned32" | "unsigned32bit" => DataType::U32,
-        "int64" | "i64" | "s64" | "lint" => DataType::I64,
-        "uint64" | "u64" | "ulint" | "qword" => DataType::U64,
-        "float" | "float32" | "f32" | "real" | "single" | "ieee754" | "floatingpoint" | "32bitfloat" => DataType::F32,
-        "double" | "float64" | "f64" | "lreal" => DataType::F64,
-        "bcd" | "bcd16" => DataType::Bcd16,
-        "bcd32" => DataType::Bcd32,
-        "bool" | "boolean" | "bit" => DataType::Bool,
-        _ => return None,
-    })
+    let unclear = written.iter().find_map(|(text, of)| {
+        let [modicon, sent] = [AddressBase::Modicon, AddressBase::Zero].map(|base| {
+            AddressContext { table: of.unwrap_or(context.table), is_stated: of.is_some(), base }.parse(text)
+        });
+        let (modicon, sent) = (modicon?, sent?);
+        (modicon != sent).then(|| Unclear { written: (*text).to_owned(), modicon, sent })
+    });
+    (AddressBase::Modicon, unclear)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(text: &str) -> (Vec<String>, Vec<String>) {
-        let list = parse(text, Table::Holding, 0);
-        let shown = |named: &Named| {
-            let (place, kind, order) = (named.table.modicon(named.address), named.kind.name(), named.order.word());
-            format!("{place} {} {kind} {order} {} {} {}", named.name, named.scale, named.decimals, named.unit)
-        };
-        (list.named.iter().map(shown).collect(), list.problems)
-    }
-
-    #[test]
-    fn a_csv_with_a_heading_is_read_in_any_order_of_columns() {
-        let csv = "Name;Unit;Register Address;Data type;Scaling\n\"SV; wanted\";degC;41003;INT16;0,1\n\nEnergy;kWh;31001;float32;\n";
-        let expect = ["41003 SV; wanted int16 ABCD 0.1 1 °C", "31001 Energy float32 ABCD 1 2 kWh"];
-        assert_eq!(read(csv), (expect.map(str::to_owned).to_vec(), Vec::new()));
-        let fc = "address,name,function code,type,divisor\n0x0010,Speed,04,u16,10\n12,Run,1,,\n";
-        assert_eq!(read(fc).0, ["30017 Speed uint16 ABCD 0.1 1 ", "00013 Run bool ABCD 1 0 "]);
-    }
-
-    #[test]
-    fn columns_of_a_pdf_are_known_by_their_form() {
-        let columns = "Modbus map, page 7\n40001   Voltage L1   float  V\n40003   Power factor   int16   0.001\n";
-        let (named, problems) = read(columns);
-        assert_eq!(named, ["40001 Voltage L1 float32 ABCD 1 2 V", "40003 Power factor int16 ABCD 0.001 3 "]);
-        assert_eq!(problems, ["line 1: no address"]);
-        assert_eq!(read("1 40010 Tank level UINT16 /10 cm CDAB\n").0, ["40010 Tank level uint16 CDAB 0.1 1 cm"]);
-        assert_eq!(
-            read("0x03EA SV x0.1 °C\n03EBH STBY\n").0,
-            ["41003 SV uint16 ABCD 0.1 1 °C", "41004 STBY uint16 ABCD 1 0 "]
-        );
-    }
-
-    #[test]
-    fn what_cannot_be_read_is_said_by_line() {
-        let (named, problems) = read(
-            "address,name,type,scale\n5,a,int16,1\n5,b,int16,1\nx,c,int16,1\n6,d,quux,1\n7,,int16,1\n8,e,int16,ten\n",
-        );
-        assert_eq!(named, ["40006 a int16 ABCD 1 0 "]);
-        let expect = [
-            "line 3: b: this address has a name already",
-            "line 4: `x` is not an address",
-            "line 5: 6: `quux` is not a known type",
-            "line 6: 7: no name",
-            "line 7: 8: `ten` is not a scale",
-        ];
-        assert_eq!(problems, expect);
-    }
-
-    #[test]
-    fn a_quoted_cell_keeps_its_separators_and_quotes() {
-        assert_eq!(quoted_cells("5,\"a, \"\"b\"\"\",10\" pipe,", ','), ["5", "a, \"b\"", "10\" pipe", ""]);
-    }
-
-    #[test]
-    fn plain_numbers_count_from_one_where_the_manual_does() {
-        let list = parse("1  first\n0  none\n", Table::Input, 1);
-        assert_eq!((list.named[0].table, list.named[0].address, list.named.len()), (Table::Input, 0, 1));
-        assert_eq!(list.problems, ["line 2: `0` is not an address"]);
-    }
-}
+mod tests;

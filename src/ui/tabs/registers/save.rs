@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{Asking, Base, Registers, import, list, names::Named};
+use super::{Asking, Registers, names::Named};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -13,9 +13,6 @@ use crate::{
     profile::new_plant::{NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
     ui::Effect,
 };
-
-/// Lines of a list that are said not to be read.
-const PROBLEMS_MAX: usize = 10;
 
 impl Registers {
     /// Asks for the file, where there is something to keep.
@@ -80,28 +77,15 @@ impl Registers {
 }
 
 impl Registers {
-    /// Gives the names of a register list, in place of those that were there; says what could not be read, by line.
-    pub(super) fn load_list(&mut self, text: &str) -> UiAction {
-        let first = u16::from(self.base == Base::One);
-        let list = import::parse(text, self.table, first).unwrap_or_else(|| list::parse(text, self.table, first));
-        let mut words = vec![t!("{count} names read", count = list.named.len())];
-        if let Some(first) = list.named.first() {
-            let (name, place) = (&first.name, first.table.modicon(first.address));
-            words.push(t!(
-                "The first is {name} at {place}. Wrong? Change table or base (b), load it again.",
-                name,
-                place
-            ));
-            (self.table, self.first, self.selected) = (first.table, first.address, first.address);
-        }
-        let more = list.problems.len().saturating_sub(PROBLEMS_MAX);
-        words.extend(list.problems.into_iter().take(PROBLEMS_MAX));
-        if more != 0 {
-            words.push(t!("and {more} more lines that could not be read", more));
-        }
-        list.named.into_iter().for_each(|named| self.names.put(named));
-        UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), words)))
+    /// Shows a register list before it is taken; or says why it is none.
+    pub(super) fn load_list(&mut self, cx: &ViewContext, text: &str) -> Vec<UiAction> {
+        self.preview(cx, text).unwrap_or_else(|why| vec![no_list(why)])
     }
+}
+
+/// Why nothing is loaded.
+pub fn no_list(why: String) -> UiAction {
+    UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![why])))
 }
 
 /// What became of the file.

@@ -201,12 +201,18 @@ fn addresses_are_taken_in_every_form_and_wrong_ones_refused() {
         ("0x3EA", Table::Holding, 1002),
         ("31001", Table::Input, 1000),
         ("coil:7", Table::Coil, 7),
+        ("holding:32080", Table::Holding, 32_080),
+        ("03EAH", Table::Holding, 1002),
     ] {
         bench.model.tabs.registers.table = Table::Holding;
         bench.keys(&format!("j{typed}⏎"));
         let tab = &bench.model.tabs.registers;
         assert_eq!((tab.table, tab.selected), (table, address), "{typed}");
     }
+    bench.keys("⎋bj40080⏎");
+    assert_eq!(bench.model.tabs.registers.selected, 40_080, "from 0, five digits are as sent");
+    bench.keys("bj0X10⏎");
+    assert_eq!(bench.model.tabs.registers.selected, 16, "hexadecimal is as sent, also where numbers count from 1");
     bench.keys("j70000⏎");
     assert!(bench.screen(80, 24).contains("found `70000`"));
     bench.keys("⎋");

@@ -1,7 +1,7 @@
 //! How the registers are drawn: a row each, and the selected one below in every meaning.
 
 use super::{
-    Base, Registers,
+    Registers,
     advice::advice,
     cells::Cell,
     compare, detail,
@@ -13,9 +13,9 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     bus::interpret,
     plant::{
+        address::{AddressBase, TABLES},
         diagnostics::{Diagnostic, DiagnosticState},
         event::LineState,
-        live::TABLES,
         tag::{ByteOrder, DataType},
     },
 };
@@ -146,9 +146,9 @@ pub fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
 fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let (theme, at) = (cx.theme, layout(canvas.width()));
     let base = match tab.base {
-        Base::Modicon => t!("Modicon"),
-        Base::Zero => t!("from 0"),
-        Base::One => t!("from 1"),
+        AddressBase::Modicon => t!("Modicon"),
+        AddressBase::Zero => t!("from 0"),
+        AddressBase::One => t!("from 1"),
     };
     canvas.text(2, 2, &fit(&format!("{base}/{}", t!("wire")), 14), theme.dim());
     if let Some(comparison) = &tab.comparison {
@@ -183,9 +183,9 @@ fn columns(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
 /// An address as the operator wants it, and as it is on the wire.
 fn address_text(tab: &Registers, address: u16) -> String {
     let shown = match tab.base {
-        Base::Modicon => tab.table.modicon(address),
-        Base::Zero => address.to_string(),
-        Base::One => (u32::from(address) + 1).to_string(),
+        AddressBase::Modicon => tab.table.modicon(address),
+        AddressBase::Zero => address.to_string(),
+        AddressBase::One => (u32::from(address) + 1).to_string(),
     };
     format!("{shown:>6} / {address:04X}")
 }

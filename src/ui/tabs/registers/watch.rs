@@ -19,6 +19,7 @@ use crate::{
         sample::{Cause, Quality, Sample},
         tag::{ByteOrder, DataType, Table},
     },
+    profile::unit_of,
     report::value_log,
     text::file,
     ui::{Effect, widgets::spark},
@@ -316,7 +317,7 @@ fn named(text: &str, plain: Named) -> Result<Named, String> {
                 (named.scale, named.decimals) = (scale, decimals);
             }
             (.., Ok(_)) => return Err(t!("found `{word}`, expected a scale other than 0", word)),
-            (None, None, Err(_)) if named.unit.is_empty() => named.unit = word.to_owned(),
+            (None, None, Err(_)) if named.unit.is_empty() => named.unit = unit_of(word),
             (None, None, Err(_)) => return Err(t!("found `{word}`, expected one unit at the end", word)),
         }
     }
@@ -374,6 +375,7 @@ mod tests {
         assert_eq!((sv.kind, sv.scale, sv.decimals, sv.unit.as_str()), (DataType::I16, 0.1, 1, "°C"));
         let energy = parse("energy CDAB float32 kWh").expect("a name");
         assert_eq!((energy.kind, energy.order, energy.unit.as_str()), (DataType::F32, ByteOrder::Cdab, "kWh"));
+        assert_eq!(parse("T degC").map(|named| named.unit), Ok("°C".to_owned()));
         assert_eq!(parse("run").map(|named| named.kind), Ok(DataType::U16));
         assert!(parse("SV 0").is_err() && parse("SV a b").is_err());
         let bit = Named { table: Table::Coil, kind: DataType::Bool, ..plain.clone() };

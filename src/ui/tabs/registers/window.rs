@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Registers, view};
+use super::{Registers, import::preview::Preview, view};
 use crate::{
     access::right::needs_for_query,
     plant::{
@@ -65,7 +65,8 @@ impl Registers {
         }
         let span = self.span(cx);
         let relearn = std::mem::take(&mut self.relearn);
-        let spans = std::iter::once(span).chain(self.watched_spans(span)).collect();
+        let spans = std::iter::once(span).chain(self.watched_spans(span));
+        let spans = spans.chain(self.preview.iter().flat_map(Preview::spans)).collect();
         let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
         let silent = cx.def().listens_on(self.line).then(|| Refusal::OnlyListens.to_string());
         if let Some(why) = silent.or_else(|| rights::lacks(cx, needs_for_query(&query))) {

@@ -1,7 +1,10 @@
 //! Fields of a request: numbers, registers, bits and addresses as they are typed.
 
 use super::*;
-use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::address::{AddressBase, AddressContext},
+    ui::tabs::prelude::*,
+};
 
 /// `123`, `-5`, `0x3EA`.
 pub(super) fn number(text: &str, what: &str, range: RangeInclusive<i64>) -> Result<i64, String> {
@@ -26,26 +29,24 @@ pub(super) fn bit(text: &str) -> Result<bool, String> {
     }
 }
 
-/// The wire address: `41003` is a Modicon number of its table, `1002` and `0x03EA` are as sent. Five digits or more that
-/// begin with the digit of a table are a Modicon number; a wire address as great as that is written in hexadecimal.
+/// The wire address: `41003` is a Modicon number of its table, `1002`, `0x03EA` and `holding:41003` are as sent.
 pub fn address(text: &str, table: Table) -> Result<u16, String> {
     let digits = text.trim();
-    let modicon = matches!(digits.len(), 5 | 6) && digits.bytes().all(|byte| byte.is_ascii_digit());
-    let named =
-        TABLES.into_iter().find(|table| digits.starts_with(char::from(b'0' + table.digit()))).filter(|_| modicon);
-    let Some(named) = named else { return number(digits, t!("address"), 0..=65_535).map(to_u16) };
-    if named != table {
-        return Err(t!(
-            "address: {digits} belongs to the table {named}, this is {table}",
-            digits,
-            named = translate(named.word()),
-            table = translate(table.word())
-        ));
+    let is_zero = matches!(digits.len(), 5 | 6) && digits.get(1..).is_some_and(|rest| rest.bytes().all(|b| b == b'0'));
+    if is_zero && digits.starts_with(char::from(b'0' + table.digit())) {
+        return Err(t!("address: {digits} does not exist, the first is {modicon}", digits, modicon = table.modicon(0)));
     }
-    let place = digits[1..].parse::<u32>().ok().and_then(|number| u16::try_from(number.checked_sub(1)?).ok());
-    place.ok_or_else(|| {
-        t!("address: {digits} does not exist, the first is {modicon}", digits, modicon = table.modicon(0))
-    })
+    match (AddressContext { table, is_stated: false, base: AddressBase::Modicon }).parse(digits) {
+        Some((found, address)) if found == table => Ok(address),
+        Some((found, _)) => Err(t!(
+            "address: {digits} belongs to the table {named}, this is {table}; as sent it is {sent}",
+            digits,
+            named = translate(found.word()),
+            table = translate(table.word()),
+            sent = format!("{}:{}", table.word(), digits.rsplit(':').next().unwrap_or_default())
+        )),
+        None => number(digits, t!("address"), 0..=65_535).map(to_u16),
+    }
 }
 
 /// All settings that devices are found with; RTU needs eight data bits.

@@ -16,9 +16,14 @@ fn addresses_are_read_as_manuals_write_them() {
     check("0x3EA", Table::Holding, Ok(1002));
     check("0xA02B", Table::Holding, Ok(41_003));
     check("20000", Table::Holding, Ok(20_000));
-    check("41003", Table::Coil, Err("address: 41003 belongs to the table holding, this is coil"));
+    check("holding:41003", Table::Holding, Ok(41_003));
+    check(
+        "41003",
+        Table::Coil,
+        Err("address: 41003 belongs to the table holding, this is coil; as sent it is coil:41003"),
+    );
     check("40000", Table::Holding, Err("address: 40000 does not exist, the first is 40001"));
-    check("465537", Table::Holding, Err("address: 465537 does not exist, the first is 40001"));
+    check("465537", Table::Holding, Err("address: found `465537`, expected 0 to 65535"));
     check("x", Table::Holding, Err("address: found `x`, expected 0 to 65535"));
 }
 

@@ -123,7 +123,7 @@ fn registers_named_by_hand_are_saved_as_tags_of_the_plant_file() {
     let sv = &def.tags[2];
     assert_eq!((sv.point.address, sv.scale, sv.unit.as_str()), (1002, 0.1, "°C"));
     assert_eq!(sv.access, crate::plant::tag::Access::Read, "read only until the plant file says otherwise");
-    assert_eq!(def.tags[3].label, "way in furlong");
+    assert_eq!(def.tags[3].unit, "furlong", "any text is a unit");
     assert_eq!(def.tags[4].label_of(1.0), Some("on"));
 }
 
@@ -140,17 +140,68 @@ fn a_list_from_a_manual_gives_names() {
     bench.keys("Nlist.csv⏎");
     let list = "address;name;type;scale;unit\n41003;SV;int16;0.1;°C\nsee page 9\n";
     bench.send(Msg::Loaded(Tab::Registers, Ok(list.to_owned())));
+    let read = bench.answer(1, |address| device_of_a_manual(Table::Holding, address));
+    assert!(read.spans.iter().any(|span| span.address == 1002), "what the list names is read: {read:?}");
     let shown = bench.screen(80, 24);
-    assert!(shown.contains("1 names read") && shown.contains("line 3: no address"), "{shown}");
+    assert!(shown.contains("1 registers can be taken, 1 lines cannot") && shown.contains("70.0 °C"), "{shown}");
+    assert!(shown.contains("41003: holding 1002 (Modicon) or holding 41003 (as sent)? b says which"), "{shown}");
+    assert!(shown.contains("line 3: ") && bench.model.tabs.registers.names.is_empty(), "nothing is taken yet: {shown}");
+    bench.keys("b⏎");
+    assert!(bench.screen(80, 24).contains("1 names taken"), "{}", bench.screen(80, 24));
     bench.keys("⎋");
     bench.answer(1, |address| device_of_a_manual(Table::Holding, address));
     assert!(bench.screen(80, 24).contains("SV  70.0 °C"), "{}", bench.screen(80, 24));
     bench.send(Msg::Paste("40005  speed  uint16  rpm\n".to_owned()));
     bench.send(Msg::Tick { silent: Duration::ZERO });
-    assert!(bench.screen(80, 24).contains("The first is speed at 40005"), "{}", bench.screen(80, 24));
+    assert!(bench.screen(80, 24).contains("speed"), "{}", bench.screen(80, 24));
     bench.keys("⎋");
+    assert!(!bench.screen(80, 24).contains("speed"), "nothing of it was taken");
     bench.send(Msg::Loaded(Tab::Registers, Err("list.csv: it is not there".to_owned())));
     assert!(bench.screen(80, 24).contains("it is not there"));
+}
+
+#[test]
+fn a_list_that_can_be_read_in_two_ways_asks_before_it_is_taken() {
+    let mut bench = Bench::at_unit(|_, _| None);
+    let list = "address;name;type\n40080;W;int16\n40083;VA;int16\n".to_owned();
+    bench.send(Msg::Loaded(Tab::Registers, Ok(list)));
+    let shown = bench.screen(120, 24);
+    let both = "40080: holding 79 (Modicon) or holding 40080 (as sent)? b says which";
+    assert!(shown.contains(both), "{shown}");
+    bench.keys("⏎");
+    assert!(bench.screen(80, 24).contains("say first which with b"), "{}", bench.screen(80, 24));
+    bench.keys("⎋bb⏎");
+    assert!(bench.model.tabs.registers.names.get(Table::Holding, 40_080).is_some());
+    assert!(bench.model.tabs.registers.names.get(Table::Holding, 79).is_none());
+}
+
+#[test]
+fn the_meaning_of_a_column_is_changed_by_a_key() {
+    let mut bench = Bench::at_unit(|_, _| None);
+    bench.send(Msg::Loaded(Tab::Registers, Ok("address;name;factor\n5;W;10\n6;VA;100\n".to_owned())));
+    bench.answer(1, |address| Some(address * 10));
+    assert!(bench.screen(120, 24).contains("×10 "), "{}", bench.screen(120, 24));
+    bench.keys("→→m");
+    let shown = bench.screen(120, 24);
+    assert!(shown.contains("factor: divisor") && shown.contains("×0.1"), "{shown}");
+    bench.keys("⏎");
+    assert_eq!(bench.model.tabs.registers.names.get(Table::Holding, 6).map(|named| named.scale), Some(0.01));
+}
+
+#[test]
+fn a_file_that_is_no_list_is_refused_with_what_can_be_read() {
+    let mut bench = Bench::at_unit(|_, _| None);
+    for (text, name) in [
+        ("{ \"group\": { \"points\": [] } }", "a model of SunSpec"),
+        ("modbus:\n  - name: hub\n    type: tcp\n", "Home Assistant"),
+        ("Mode\tCode\nWait\t0\nOn\t1\n", "no column of addresses"),
+    ] {
+        bench.send(Msg::Loaded(Tab::Registers, Ok(text.to_owned())));
+        let shown = bench.screen(120, 40);
+        assert!(shown.contains(name) && shown.contains("What can be"), "{shown}");
+        bench.keys("⎋");
+        assert!(bench.model.tabs.registers.names.is_empty());
+    }
 }
 
 fn device_of_a_manual(table: Table, address: u16) -> Option<u16> {

@@ -1,0 +1,95 @@
+//! Raw numbers of a profile, as numbers or as patterns of bits, and what they mean to a tag.
+
+use super::{
+    diagnostic::{Problems, Span},
+    reader::{At, Node, Raw, Value, wrong_type},
+    schema::TypeName,
+};
+use crate::plant::{
+    exact::Exact,
+    raw_number::RawNumber,
+    tag::{DataType, Point},
+};
+
+/// A raw number: `-32768`, or a pattern of bits, `0x8000`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RawPattern {
+    pub number: i128,
+    /// Written with `0x`, `0o` or `0b`.
+    pub is_pattern: bool,
+}
+
+impl Value for RawPattern {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let number = i128::read(value, at, problems)?;
+        Some(RawPattern { number, is_pattern: is_pattern(at, problems) })
+    }
+}
+
+/// Is a number written as bits: with `0x`, `0o` or `0b`?
+pub(super) fn is_pattern(at: Span, problems: &Problems) -> bool {
+    let text = problems.text(at.source).get(at.start..at.end).unwrap_or_default();
+    ["0x", "0o", "0b"].iter().any(|prefix| text.starts_with(prefix))
+}
+
+/// The raw numbers that mean "no value": of every tag that has this key, or by type, for `[default]`.
+#[derive(Debug, Clone)]
+pub(crate) struct BadIf(pub Vec<(Option<DataType>, Vec<At<RawPattern>>)>);
+
+impl Value for BadIf {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let numbers = |value: &Node, at: Span, problems: &mut Problems| match value {
+            Node::Array(items) => {
+                let read = items.iter().filter_map(|item| {
+                    RawPattern::read(&item.value, item.at, problems).map(|value| At { value, at: item.at })
+                });
+                Some(read.collect())
+            }
+            _ => wrong_type(value, at, "an array of raw numbers", problems),
+        };
+        let Node::Table(_) = value else { return Some(BadIf(vec![(None, numbers(value, at, problems)?)])) };
+        let raw = Raw::read(value, at, problems)?;
+        let mut of_type = |(word, (key, node)): (&String, &(Span, At<Node>))| {
+            let TypeName(kind) = TypeName::read(&Node::Text(word.clone()), *key, problems)?;
+            Some((Some(kind), numbers(&node.value, node.at, problems)?))
+        };
+        Some(BadIf(raw.table.iter().filter_map(&mut of_type).collect()))
+    }
+}
+
+impl BadIf {
+    /// The raw numbers of a tag. One that it can never hold is a warning, unless it is for all tags of the profile.
+    pub fn of(&self, point: Point, is_default: bool, problems: &mut Problems) -> Vec<Exact> {
+        let of_type = self.0.iter().filter(|(kind, _)| kind.is_none_or(|kind| kind == point.kind));
+        let mut found = Vec::new();
+        for mark in of_type.flat_map(|(_, marks)| marks) {
+            let RawPattern { number, is_pattern } = mark.value;
+            let meant = point.raw_number(number, is_pattern);
+            if meant == RawNumber::Impossible && !is_default {
+                let problem = problems.warn(mark.at, format!("{} never reads as this", type_of(point)));
+                problem.label(held_words(point));
+            }
+            found.extend(meant.number());
+        }
+        found
+    }
+}
+
+/// `an int16`, `a field of 4 bits`.
+fn type_of(point: Point) -> String {
+    match point.field {
+        Some((_, bits)) => format!("a field of {bits} bits of {}", point.kind),
+        None => format!("type {}", point.kind),
+    }
+}
+
+fn held_words(point: Point) -> String {
+    let bits = point.field.map_or(16 * point.kind.registers(), |(_, bits)| u16::from(bits));
+    match point.raw_range() {
+        Some((low, high)) if low < 0 => {
+            format!("it holds {low} to {high}, as patterns 0 to 0x{:X}", (1_i128 << bits) - 1)
+        }
+        Some((low, high)) => format!("it holds {low} to {high}"),
+        None => format!("expected a number that it can hold, or a pattern of {bits} bits such as 0x7FC00000"),
+    }
+}

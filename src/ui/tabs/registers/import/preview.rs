@@ -1,0 +1,225 @@
+//! A list before anything of it is taken: its first rows with what they hold now, what its columns mean, and what is left out.
+
+use super::super::{
+    Registers,
+    list::{Column, List, ListContext, Unclear},
+    next,
+    view::named_text,
+};
+use crate::plant::{
+    address::{AddressBase, TABLES},
+    live::AddressSpan,
+    tag::{ByteOrder, Table},
+};
+use crate::ui::tabs::prelude::*;
+
+/// Rows above the list: what can be taken, addresses, columns, heading.
+const HEAD: u16 = 4;
+/// Rows that are read beside the window.
+const READ_MAX: usize = 24;
+
+/// A list that was loaded and is not taken yet.
+#[derive(Debug)]
+pub struct Preview {
+    text: String,
+    context: ListContext,
+    list: List,
+    /// The selected column.
+    column: usize,
+    /// The first row on the screen.
+    top: usize,
+}
+
+/// A row of the tables here.
+type Key = keys::Key<Registers>;
+
+const SCROLL: [Key; 6] = motions!("", Registers::scroll_list);
+const LIST: &[Key] = &[
+    Key::new(code(KeyCode::Enter), "take", "take the registers of this list", |registers, _| registers.take_list()),
+    Key::change(char('b'), "base", "plain numbers are Modicon numbers, as sent, or counted from 1", |registers, _| {
+        registers.change_list(Preview::next_base)
+    }),
+    Key::change(code(KeyCode::Right), "column", "next column", |registers, _| {
+        registers.change_list(|preview| preview.next_column(1))
+    }),
+    Key::change(code(KeyCode::Left), "", "previous column", |registers, _| {
+        registers.change_list(|preview| preview.next_column(-1))
+    }),
+    Key::change(char('m'), "meaning", "what the selected column means", |registers, _| {
+        registers.change_list(Preview::change_meaning)
+    }),
+    Key::change(char('t'), "table", "table of the addresses that name none", |registers, _| {
+        registers.change_list(|preview| preview.context.table = next(&TABLES, preview.context.table))
+    }),
+    Key::change(char('o'), "order", "byte order of the rows that name none", |registers, _| {
+        registers.change_list(|preview| preview.context.order = next(&ByteOrder::ALL, preview.context.order))
+    }),
+];
+const CANCEL: &[Key] = &[Key::elsewhere(code(KeyCode::Esc), "cancel", "take nothing of this list")];
+
+/// All keys.
+pub const KEYS: &[&[keys::Key<Registers>]] = &[&SCROLL, LIST, CANCEL];
+
+impl Preview {
+    fn new(text: String, context: ListContext) -> Preview {
+        let list = super::parse(&text, &context);
+        Preview { text, context, list, column: 0, top: 0 }
+    }
+
+    fn read_again(&mut self) {
+        self.list = super::parse(&self.text, &self.context);
+    }
+
+    /// Rows and lines that are left out.
+    fn count(&self) -> usize {
+        self.list.named.len() + self.list.problems.len()
+    }
+
+    /// What is read beside the window, so that the rows on the screen have values.
+    pub fn spans(&self) -> impl Iterator<Item = AddressSpan> {
+        let shown = self.list.named.iter().skip(self.top).take(READ_MAX);
+        let span = shown.map(|named| AddressSpan { table: named.table, address: named.address, count: named.len() });
+        span.filter(|span| span.range().end <= 0x1_0000)
+    }
+
+    fn change_meaning(&mut self) {
+        let Some((_, now)) = self.list.columns.get(self.column) else { return };
+        let all: Vec<Option<Column>> = Column::ALL.into_iter().map(Some).chain([None]).collect();
+        self.context.means.insert(self.column, next(&all, *now));
+    }
+
+    fn next_base(&mut self) {
+        let bases = [AddressBase::Modicon, AddressBase::Zero, AddressBase::One];
+        // The first press settles what is unclear.
+        self.context.base = Some(self.context.base.map_or(AddressBase::Modicon, |now| next(&bases, now)));
+    }
+
+    fn next_column(&mut self, by: isize) {
+        self.column = around(self.column, by, self.list.columns.len().max(1));
+    }
+}
+
+impl Registers {
+    /// Shows what a list has before it is taken; `Err` says why it is none.
+    pub fn preview(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        let base = Some(self.base).filter(|base| *base != AddressBase::Modicon);
+        let (table, order, unit) = (self.table, self.order, self.unit);
+        let context = ListContext { table, base, order, unit, means: Default::default() };
+        let preview = Preview::new(text.to_owned(), context);
+        if let Some(why) = preview.list.refused {
+            return Err(why);
+        }
+        self.preview = Some(preview);
+        Ok(self.read_now(cx))
+    }
+
+    /// Changes how the list is read.
+    fn change_list(&mut self, change: impl FnOnce(&mut Preview)) {
+        let Some(preview) = &mut self.preview else { return };
+        change(preview);
+        preview.read_again();
+    }
+
+    fn scroll_list(&mut self, cx: &ViewContext, motion: Motion) {
+        let Some(preview) = &mut self.preview else { return };
+        let room = usize::from(cx.area.height.saturating_sub(HEAD));
+        preview.top = motion.to(preview.top, preview.count(), room);
+    }
+
+    /// Takes the names, in place of those that were there.
+    fn take_list(&mut self) -> Vec<UiAction> {
+        let Some(preview) = self.preview.take_if(|preview| preview.list.unclear.is_none()) else {
+            let words = t!("Its addresses can be read in two ways: say first which with b.").to_owned();
+            return vec![UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![words])))];
+        };
+        let list = preview.list;
+        let taken = t!("{count} names taken", count = list.named.len());
+        if let Some(first) = list.named.first() {
+            (self.table, self.first, self.selected) = (first.table, first.address, first.address);
+        }
+        list.named.into_iter().for_each(|named| self.names.put(named));
+        vec![UiAction::Open(Modal::Notice(Notice::list(
+            t!("load a register list"),
+            std::iter::once(taken).chain(list.problems).collect(),
+        )))]
+    }
+}
+
+/// `holding 79`.
+fn place((table, address): (Table, u16)) -> String {
+    format!("{} {address}", translate(table.word()))
+}
+
+fn base_words(context: &ListContext) -> &'static str {
+    match context.base {
+        None | Some(AddressBase::Modicon) => t!("Modicon numbers"),
+        Some(AddressBase::Zero) => t!("as sent, from 0"),
+        Some(AddressBase::One) => t!("counted from 1"),
+    }
+}
+
+/// Draws it.
+pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
+    let (Some(Preview { context, list, column, top, .. }), theme) = (&tab.preview, cx.theme) else { return };
+    let room = canvas.width().saturating_sub(2);
+    let (count, left) = (list.named.len(), list.problems.len());
+    let words = t!("{count} registers can be taken, {left} lines cannot. Are the values right?", count, left);
+    canvas.text(1, 0, &fit_words(&words, room), theme.strong());
+    let (words, style) = match &list.unclear {
+        Some(Unclear { written, modicon, sent }) => {
+            let (modicon, sent) = (place(*modicon), place(*sent));
+            (
+                t!("{written}: {modicon} (Modicon) or {sent} (as sent)? b says which", written, modicon, sent),
+                theme.trouble(),
+            )
+        }
+        None => {
+            let (base, table) = (base_words(context), translate(context.table.word()));
+            let order = context.order.word();
+            (t!("plain numbers: {base}; where nothing is said: {table}, {order}", base, table, order), theme.normal())
+        }
+    };
+    canvas.text(1, 1, &fit_words(&words, room), style);
+    columns(canvas, cx, &list.columns, *column);
+    let (place_end, name_end, type_end) = (9, 33, 49);
+    for (x, words) in
+        [(1, t!("address")), (place_end + 2, t!("name")), (name_end + 2, t!("type")), (type_end + 2, t!("factor"))]
+    {
+        canvas.text(x, HEAD - 1, words, theme.dim());
+    }
+    canvas.text_right(room, HEAD - 1, t!("now"), theme.dim());
+    let rows = usize::from(canvas.height().saturating_sub(HEAD));
+    for (y, named) in (HEAD..).zip(list.named.iter().skip(*top).take(rows)) {
+        let (value, is_good) = named_text(tab, cx, named);
+        canvas.text_right(place_end, y, &named.table.modicon(named.address), theme.normal());
+        canvas.text(place_end + 2, y, &fit(&named.name, name_end - place_end - 2), theme.strong());
+        canvas.text(
+            name_end + 2,
+            y,
+            &fit(&format!("{} {}", named.kind, named.order.word()), type_end - name_end - 2),
+            theme.normal(),
+        );
+        let offset = if named.offset == 0.0 { String::new() } else { format!(" {:+}", named.offset) };
+        canvas.text(type_end + 2, y, &format!("×{}{offset}", named.scale), theme.normal());
+        canvas.text_right(room, y, &value, if is_good { theme.strong() } else { theme.dim() });
+    }
+    let shown = list.named.len().saturating_sub(*top).min(rows);
+    let problems = list.problems.iter().skip(top.saturating_sub(list.named.len())).take(rows - shown);
+    for (y, problem) in (HEAD + to_u16(shown)..).zip(problems) {
+        canvas.text(1, y, &fit_words(problem, room), theme.trouble());
+    }
+}
+
+/// Each column with what it means, the selected one in sight.
+fn columns(canvas: &mut Canvas, cx: &ViewContext, columns: &[(String, Option<Column>)], selected: usize) {
+    if columns.is_empty() {
+        canvas.text(1, 2, t!("no heading: what a cell is shows in its form"), cx.theme.dim());
+        return;
+    }
+    let mut x = 1;
+    for (n, (heading, means)) in columns.iter().enumerate().skip(selected.saturating_sub(2)) {
+        let means = means.map_or("–", |means| translate(means.label()));
+        let style = if n == selected { cx.theme.focus() } else { cx.theme.dim() };
+        x = canvas.text(x, 2, &format!("{}: {means}", fit(heading, 16)), style) + 2;
+    }
+}

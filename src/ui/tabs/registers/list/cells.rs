@@ -1,0 +1,113 @@
+//! A text becomes rows of cells: at one separator for the whole text where its heading has one, else line by line.
+
+/// Most rows of a list.
+const ROWS_MAX: usize = 10_000;
+/// A cell may have several lines; one with more has lost its closing quote.
+const CELL_LINES_MAX: usize = 40;
+
+/// A row of a list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cells {
+    /// Number of its first line, from 1.
+    pub line: usize,
+    /// Trimmed.
+    pub cells: Vec<String>,
+    /// It has swallowed what follows.
+    pub is_unclosed: bool,
+}
+
+/// The separator that the rows have in common: tab, semicolon, bar or comma, as in most of its first lines.
+pub fn separator(text: &str) -> Option<char> {
+    let first: Vec<&str> =
+        text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).take(20).collect();
+    ['\t', ';', '|', ','].into_iter().find(|separator| {
+        // A single comma may be that of a decimal number.
+        let least = if matches!(separator, ',' | '|') { 2 } else { 1 };
+        let has = first.iter().filter(|line| least <= line.matches(*separator).count()).count();
+        0 < has && first.len() <= 2 * has
+    })
+}
+
+/// The rows of a text with what separates its cells; blank rows and those of Markdown's rule are left out.
+pub fn rows(text: &str, separator: Option<char>) -> Vec<Cells> {
+    let all = match separator {
+        Some(separator) => separated(text, separator),
+        None => text.lines().zip(1..).map(|(line, number)| row(number, by_blanks(line))).collect(),
+    };
+    let is_rule = |cells: &[String]| cells.iter().all(|cell| cell.chars().all(|sign| "-: ".contains(sign)));
+    let is_comment = |cells: &[String]| cells.first().is_some_and(|cell| cell.starts_with('#'));
+    all.into_iter().filter(|row| !is_rule(&row.cells) && !is_comment(&row.cells)).take(ROWS_MAX).collect()
+}
+
+fn row(line: usize, cells: Vec<String>) -> Cells {
+    Cells { line, cells, is_unclosed: false }
+}
+
+fn separated(text: &str, separator: char) -> Vec<Cells> {
+    let mut reader = csv::ReaderBuilder::new();
+    let delimiter = u8::try_from(separator).unwrap_or(b',');
+    let reader = reader.has_headers(false).flexible(true).delimiter(delimiter).trim(csv::Trim::All);
+    let records = reader.from_reader(text.as_bytes()).into_records();
+    // A text in memory is read to its end.
+    let rows = records.filter_map(Result::ok).map(|record| {
+        // It begins before the blank lines that are passed over.
+        let line = record.position().map_or(0, |at| {
+            let place = |number: u64| usize::try_from(number).unwrap_or(0);
+            let rest = text.get(place(at.byte())..).unwrap_or_default();
+            place(at.line()) + rest.lines().take_while(|line| line.trim().is_empty()).count()
+        });
+        let is_unclosed = record.iter().any(|cell| CELL_LINES_MAX < cell.lines().count());
+        let mut cells: Vec<String> = record.iter().map(one_line).collect();
+        if separator == '|' {
+            // Markdown has one at both ends.
+            cells.pop_if(|last| last.is_empty());
+            cells.drain(..usize::from(cells.first().is_some_and(String::is_empty)));
+        }
+        Cells { line, cells, is_unclosed }
+    });
+    rows.collect()
+}
+
+fn one_line(cell: &str) -> String {
+    cell.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The cells of a line of a PDF: at two blanks, else at every blank; or at what separates them in this line alone.
+fn by_blanks(line: &str) -> Vec<String> {
+    let line = line.trim_matches(['\u{FEFF}', '\r']);
+    let separator = ['\t', ';', ','].into_iter().find(|separator| line.contains(*separator));
+    let decimal_comma = separator == Some(',') && line.matches(',').count() == 1;
+    match separator.filter(|_| !decimal_comma) {
+        Some(separator) => separated(line, separator).into_iter().next().map_or(Vec::new(), |row| row.cells),
+        None if line.trim().contains("  ") => {
+            line.split("  ").map(|cell| cell.trim().to_owned()).filter(|cell| !cell.is_empty()).collect()
+        }
+        None => line.split_whitespace().map(str::to_owned).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quoted_cell_keeps_its_separators_quotes_and_lines() {
+        let text = "a,b,c\n5,\"a, \"\"b\"\"\",10\" pipe\n\n6,\"two\nlines\",x\n";
+        let rows = rows(text, separator(text));
+        let cells: Vec<(usize, Vec<String>)> = rows.into_iter().map(|row| (row.line, row.cells)).collect();
+        let row = |cells: [&str; 3]| cells.map(str::to_owned).to_vec();
+        let expect =
+            [(1, row(["a", "b", "c"])), (2, row(["5", "a, \"b\"", "10\" pipe"])), (4, row(["6", "two lines", "x"]))];
+        assert_eq!(cells, expect);
+        let open = format!("a;b\n1;\"{}", "x;y\n".repeat(60));
+        assert!(super::rows(&open, separator(&open))[1].is_unclosed);
+    }
+
+    #[test]
+    fn a_table_of_markdown_has_rows() {
+        let text = "| Address | Name |\n|---|:--|\n| 5 | Run |\n";
+        let rows = rows(text, separator(text));
+        assert_eq!(rows.iter().map(|row| row.cells.join("+")).collect::<Vec<_>>(), ["Address+Name", "5+Run"]);
+        assert_eq!(separator("40010 Tank 0,1 cm\n40011 Flow 0,1 l\n"), None, "a decimal comma");
+    }
+}
