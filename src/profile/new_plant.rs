@@ -92,7 +92,7 @@ impl NewPlant {
             out,
             "# Made by sightglass from what was found on the line. `sightglass check FILE` checks it after a change;"
         )?;
-        writeln!(out, "# `sightglass profiles` lists the device profiles, `sightglass help format` explains each key.\n")?;
+        writeln!(out, "# `sightglass profiles` lists device profiles, `sightglass help format` explains each key.\n")?;
         writeln!(out, "title = {}", quoted(&self.title))?;
         writeln!(
             out,

@@ -100,7 +100,7 @@ fn power(written: &str, spelled: &Spelled) -> Option<String> {
 
 /// In the letters of a unit, or by one of its names.
 fn exactly(written: &str) -> Option<String> {
-    let named = |atom: &&Atom| atom.spellings.iter().any(|spelling| *spelling == written);
+    let named = |atom: &&Atom| atom.spellings.contains(&written);
     if let Some(atom) = ATOMS.iter().find(named) {
         return Some(atom.spellings[0].to_owned());
     }
