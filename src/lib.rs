@@ -127,7 +127,7 @@
 //! | a theme | a column of the table in `ui/theme/palette.rs` |
 //! | a report format | its file in `report`, its row in `report/mod.rs`, its name in `plant/report.rs` |
 //! | a tab | its file in `ui/tabs`, its row in `ui/tabs/mod.rs` |
-//! | a key of a tab | its row in the tab's table of keys, which the footer, the help and the clash check read; its action in the tab |
+//! | a key of a tab | its row in the tab's table of keys, with the function that it calls; footer, help, palette and clash check read the row |
 //! | a renamed TOML key | its row in `profile/renamed.rs` |
 //! | a column of the history | one numbered migration |
 //! | a language | a copy of `text/en.toml` with other values, its row in `text.rs` |
