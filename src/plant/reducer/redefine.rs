@@ -12,20 +12,17 @@ use std::{
 use jiff::Timestamp;
 
 use super::{Effects, Plant};
-use crate::{
-    plant::{
-        PlantDef,
-        command::{CommandKind, NotConfirmed},
-        counter::CounterWatch,
-        def::{DeviceDef, LineDef, LineId, ProcedureId, TagId},
-        line::Transport,
-        number::to_u16,
-        procedure::{ProcedureEnd, ProcedureRun},
-        record::{AlarmRecord, Record},
-        redefinition::{Redefinition, Renamed},
-        snapshot::LineStatus,
-    },
-    t,
+use crate::plant::{
+    PlantDef,
+    command::{CommandKind, NotConfirmed},
+    counter::CounterWatch,
+    def::{DeviceDef, LineDef, LineId, ProcedureId, TagId},
+    line::Transport,
+    number::to_u16,
+    procedure::{ProcedureEnd, ProcedureRun},
+    record::{AlarmRecord, Record},
+    redefinition::{Redefinition, Renamed},
+    snapshot::LineStatus,
 };
 
 /// What follows from another definition.
@@ -81,7 +78,7 @@ impl Plant {
         self.advance_restores(at, &mut effects);
         let rest = self.commands.end_pending(|kind| !goes_on(kind), why, &self.image, at);
         effects.records.extend(rest.into_iter().map(Record::Action));
-        let untested = self.end_tests(|line| !change.keeps_line(line), t!("the plant file was reloaded"));
+        let untested = self.end_tests(|line| !change.keeps_line(line), "the plant file was reloaded");
         effects.records.extend(untested);
         if self.procedure_at_work().is_some_and(|place| !before.keeps_procedure(def, ProcedureId(to_u16(place)))) {
             self.stop_procedures(&mut effects);
