@@ -21,11 +21,12 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    command::{CommandId, NotConfirmed, Outcome},
+    command::{CommandId, CommandKind, NotConfirmed, Outcome},
     def::PlantDef,
     expr::Expr,
-    id::{DeviceId, TagId},
+    id::{DeviceId, ProcedureId, TagId},
     number::digits,
+    record::ActionRecord,
 };
 use crate::t;
 
@@ -39,6 +40,20 @@ pub const ABORT: &str = "abort procedure";
 pub const END: &str = "end procedure";
 /// The recorded word for what is written before its end: a station that is killed meanwhile leaves that to its successor.
 pub const WRITE_SAFE_STATE: &str = "write safe state";
+/// Is it the record of a start, of what is written before an end, or of an end? The last of them says what a station that was
+/// killed has left. A refused start is none.
+pub fn is_transition(record: &ActionRecord) -> bool {
+    match &*record.action {
+        START => {
+            let done = CommandKind::StartProcedure(ProcedureId(0)).label();
+            // So it was called before.
+            *record.outcome == *done || *record.outcome == *Outcome::Verified.label()
+        }
+        WRITE_SAFE_STATE | END => true,
+        _ => false,
+    }
+}
+
 /// In the outcome of that, before the writes that are missing.
 const NOT_SAFE: &str = "safe state NOT complete";
 /// How the outcome of that begins where the station stopped meanwhile.

@@ -169,7 +169,7 @@ fn begin(
         plant.on_fault(StationFault::UsersFile, state);
     }
     audit_queue.put_start(&def.name, file.as_ref(), users, clock.utc());
-    let past = Some(Past::new(history.restored.take(), from_journal));
+    let past = Some(Past::new(history.restored.take(), from_journal, recorder.opened.procedure.clone()));
     let (records, audit) = (Some(records), Some(audit_queue));
     let (sets, found) = (Some(sets), Some(found));
     let persistence = Persistence { records, store, past, audit, sets, found, observer, succession, file_since };

@@ -4,7 +4,10 @@ use std::{collections::HashSet, time::Duration};
 
 use tokio::sync::oneshot;
 
-use crate::{history::io::open::Restored, plant::record::AlarmRecord};
+use crate::{
+    history::io::open::Restored,
+    plant::record::{ActionRecord, AlarmRecord},
+};
 
 /// Where the journal alone knows the state of the alarms, the plant waits this long before it evaluates any.
 pub const WAIT_MAX: Duration = Duration::from_millis(500);
@@ -20,19 +23,25 @@ pub struct Past {
     pub from_journal: bool,
     /// The station has just started, else it goes on under another definition of its plant.
     pub at_start: bool,
+    /// The last start or end of a procedure by the audit log, which is written before the history.
+    procedure: Option<ActionRecord>,
     /// Alarm events since the start.
     early: Vec<AlarmRecord>,
 }
 
 impl Past {
     /// Everything is still to come.
-    pub fn new(restored: Option<oneshot::Receiver<Restored>>, from_journal: bool) -> Past {
-        Past { restored, from_journal, at_start: true, early: Vec::new() }
+    pub fn new(
+        restored: Option<oneshot::Receiver<Restored>>,
+        from_journal: bool,
+        procedure: Option<ActionRecord>,
+    ) -> Past {
+        Past { restored, from_journal, at_start: true, procedure, early: Vec::new() }
     }
 
     /// Only what the plant did not follow before is still to come.
     pub fn of_new_definition(restored: oneshot::Receiver<Restored>) -> Past {
-        Past { at_start: false, ..Past::new(Some(restored), false) }
+        Past { at_start: false, ..Past::new(Some(restored), false, None) }
     }
 
     /// An event of an alarm, before the past is known.
@@ -61,7 +70,21 @@ impl Past {
         let changed: HashSet<_> = self.early.iter().map(name).collect();
         restored.events.retain(|event| self.from_journal && !changed.contains(&name(event)));
         restored.recent.events.extend(self.early);
+        restored.procedure = last(self.procedure, restored.procedure.take());
         restored
+    }
+}
+
+/// The later one: by its number in the audit log, or by time where the log does not have the other.
+fn last(logged: Option<ActionRecord>, stored: Option<ActionRecord>) -> Option<ActionRecord> {
+    let number = |record: &ActionRecord| record.chain_hash.map(|hash| hash.number);
+    let is_later = |stored: &ActionRecord, logged: &ActionRecord| match (number(stored), number(logged)) {
+        (Some(stored), Some(logged)) => logged < stored,
+        (None, _) | (_, None) => logged.at < stored.at,
+    };
+    match (logged, stored) {
+        (Some(logged), Some(stored)) => Some(if is_later(&stored, &logged) { stored } else { logged }),
+        (logged, stored) => logged.or(stored),
     }
 }
 
@@ -72,8 +95,13 @@ mod tests {
 
     use super::*;
     use crate::{
+        access::audit_log,
         history::io::alarm_metrics::Recent,
-        plant::{def::Priority, record::AlarmEvent},
+        plant::{
+            def::Priority,
+            procedure,
+            record::{AlarmEvent, ChainHash},
+        },
     };
 
     fn event(second: i64, text: &str, event: AlarmEvent) -> AlarmRecord {
@@ -87,11 +115,33 @@ mod tests {
         let restored = Restored { events: before.clone(), recent, entries: None, ..Restored::default() };
         let now = event(9, "low", AlarmEvent::ReturnedToNormal);
         for from_journal in [true, false] {
-            let mut past = Past::new(None, from_journal);
+            let mut past = Past::new(None, from_journal, None);
             past.note(&now);
             let joined = past.join(restored.clone());
             assert_eq!(joined.events, if from_journal { vec![before[0].clone()] } else { vec![] });
             assert_eq!(joined.recent.events, [before[0].clone(), before[1].clone(), now.clone()], "all are counted");
+        }
+    }
+
+    #[test]
+    fn a_start_that_only_the_audit_log_has_is_not_forgotten() {
+        let record = |second: i64, number: Option<u64>, action: &str| ActionRecord {
+            chain_hash: number.map(|number| ChainHash { number, ..audit_log::START }),
+            ..ActionRecord::new(Timestamp::from_second(second).unwrap(), "anna", action, "fill", "done")
+        };
+        let (end, start) = (record(9, Some(3), procedure::END), record(5, Some(4), procedure::START));
+        let unchained = record(11, None, procedure::END);
+        for (logged, stored, expect) in [
+            (Some(&start), Some(&end), Some(&start)),
+            (Some(&start), None, Some(&start)),
+            (Some(&end), Some(&start), Some(&start)),
+            (None, Some(&end), Some(&end)),
+            (Some(&start), Some(&unchained), Some(&unchained)),
+            (None, None, None),
+        ] {
+            let past = Past::new(None, false, logged.cloned());
+            let restored = Restored { procedure: stored.cloned(), ..Restored::default() };
+            assert_eq!(past.join(restored).procedure.as_ref(), expect, "{logged:?} {stored:?}");
         }
     }
 }

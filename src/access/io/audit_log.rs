@@ -18,7 +18,10 @@ use crate::{
         sealing::{self, Key},
     },
     history::io::chain::CHAIN_HASHES_MAX,
-    plant::record::{ActionRecord, ChainHash},
+    plant::{
+        procedure,
+        record::{ActionRecord, ChainHash},
+    },
     profile::io::{atomic, regular},
 };
 
@@ -134,6 +137,8 @@ pub struct Opened {
     pub plant_file_since: Option<Timestamp>,
     /// The hash of the users that was recorded last.
     pub users_file: Option<Arc<str>>,
+    /// The last start or end of a procedure.
+    pub procedure: Option<ActionRecord>,
     /// The latest sound entries, with their chain hashes, oldest first: to compare the history with, and to complete it.
     pub tail: VecDeque<ActionRecord>,
 }
@@ -160,7 +165,11 @@ impl AuditLog {
                 opened.users_file.clone_from(&entry.new);
             }
             last_seal = sealing::number(&entry).map(|number| (number, entry.n)).or(last_seal);
-            opened.tail.push_back(entry.chained(chain_hash));
+            let record = entry.chained(chain_hash);
+            if procedure::is_transition(&record) {
+                opened.procedure = Some(record.clone());
+            }
+            opened.tail.push_back(record);
             if CHAIN_HASHES_MAX < opened.tail.len() {
                 opened.tail.pop_front();
             }
