@@ -42,11 +42,14 @@ impl Exact {
         Exact { near, rest: None }
     }
 
-    /// The nearest `f64`, and what it lacks, as they are stored.
+    /// The nearest `f64`, and what it lacks, as they are stored. A number has one form only: that of up to 15 digits is the
+    /// `f64` alone, whichever way it was computed.
     pub fn of_parts(near: f64, rest: Option<f64>) -> Exact {
         let least = |rest: &f64| if *rest == 0.0 { PLAIN } else { SMALL };
         let tells = |rest: &f64| rest.is_finite() && (least(rest)..LARGEST).contains(&near.abs());
-        Exact { near, rest: rest.filter(tells) }
+        let long = Exact { near, rest: rest.filter(tells) };
+        let is_short = long.rest.and_then(|_| long.as_decimal()).is_some_and(|(mantissa, _)| is_short(mantissa));
+        if is_short { Exact::plain(near) } else { long }
     }
 
     /// A whole number.
@@ -63,7 +66,7 @@ impl Exact {
     /// `mantissa · 10^-decimals`; `None` where that is not known exactly.
     pub(super) fn decimal(mantissa: i128, decimals: u32) -> Option<Exact> {
         let near: f64 = format!("{mantissa}e-{decimals}").parse().ok()?;
-        if (mantissa as f64).abs() < PLAIN {
+        if is_short(mantissa) {
             return Some(Exact::plain(near));
         }
         let (whole, part) = shifted(near, decimals)?;
@@ -94,6 +97,15 @@ impl Exact {
 
     /// Its multiple of `10^-decimals`, rounded; `None` where there is none.
     pub(crate) fn mantissa(self, decimals: u32) -> Option<i128> {
+        let shown = || decimal_of(&self.near.to_string()).filter(|(mantissa, _)| is_short(*mantissa));
+        if self.rest.is_none()
+            && PLAIN <= (self.near * 10f64.powi(i32::try_from(decimals).ok()?)).abs()
+            && let Some((mantissa, shown)) = shown()
+            && shown <= decimals
+        {
+            // What the `f64` has beyond its 15 digits is none of the number.
+            return mantissa.checked_mul(10i128.checked_pow(decimals - shown)?);
+        }
         let (whole, part) = shifted(self.near, decimals)?;
         let rest = self.rest.unwrap_or(0.0) * 10f64.powi(i32::try_from(decimals).ok()?);
         whole.checked_add(rounded(part + rest))
@@ -308,6 +320,11 @@ impl From<Exact> for serde_json::Value {
             None => exact.near.into(),
         }
     }
+}
+
+/// Does an `f64` give back all digits of it, wherever its decimal point is?
+fn is_short(mantissa: i128) -> bool {
+    (mantissa as f64).abs() < PLAIN
 }
 
 /// The whole number in `near · 10^decimals`, and what is over.

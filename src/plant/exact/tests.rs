@@ -53,6 +53,17 @@ fn an_ordinary_number_is_no_longer_than_before() {
     assert_eq!(postcard::to_stdvec(&Exact::from(72.4)).map(|bytes| bytes.len()), Ok(9));
 }
 
+#[test]
+fn a_number_has_one_form_only() {
+    let short = exact("85369191335237.9");
+    let quotient = exact("8536919133523790") / 100.0.into();
+    let sum = exact("85369191335237.96") - exact("0.06");
+    for same in [short, exact("85369191335237.90"), quotient, sum, Exact::of_parts(short.near(), Some(-0.00625))] {
+        assert_eq!((same, same.rest(), same.mantissa(2)), (short, None, Some(8_536_919_133_523_790)));
+        assert_eq!(same.to_string(), "85369191335237.9");
+    }
+}
+
 proptest! {
     #[test]
     fn every_64_bit_number_comes_back(number in any::<u64>(), decimals in 0_u32..7) {
