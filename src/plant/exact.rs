@@ -45,8 +45,7 @@ impl Exact {
     /// The nearest `f64`, and what it lacks, as they are stored. A number has one form only: that of up to 15 digits is the
     /// `f64` alone, whichever way it was computed.
     pub fn of_parts(near: f64, rest: Option<f64>) -> Exact {
-        let least = |rest: &f64| if *rest == 0.0 { PLAIN } else { SMALL };
-        let tells = |rest: &f64| rest.is_finite() && (least(rest)..LARGEST).contains(&near.abs());
+        let tells = |rest: &f64| rest.is_finite() && (SMALL..LARGEST).contains(&near.abs());
         let long = Exact { near, rest: rest.filter(tells) };
         let is_short = long.rest.and_then(|_| long.as_decimal()).is_some_and(|(mantissa, _)| is_short(mantissa));
         if is_short { Exact::plain(near) } else { long }
@@ -91,8 +90,8 @@ impl Exact {
 
     /// It as an `f64` for other programs; `None` where that, as they print it, would not have all the digits that are known.
     pub fn as_f64(self) -> Option<f64> {
-        let is_whole = !self.is_rounded() && (self.rest.is_none() || self.near.abs() <= WHOLE);
-        is_whole.then_some(self.near)
+        let is_whole = !self.is_rounded() && self.near.abs() <= WHOLE && self.near.fract() == 0.0;
+        (self.rest.is_none() || is_whole).then_some(self.near)
     }
 
     /// Its multiple of `10^-decimals`, rounded; `None` where there is none.

@@ -62,6 +62,10 @@ fn a_number_has_one_form_only() {
         assert_eq!((same, same.rest(), same.mantissa(2)), (short, None, Some(8_536_919_133_523_790)));
         assert_eq!(same.to_string(), "85369191335237.9");
     }
+    // An `f64` is it to the last digit, but would be written with fewer.
+    let binary = exact("156777777344796.28125");
+    assert_eq!((binary.near(), binary.rest()), (156_777_777_344_796.281_25, Some(0.0)));
+    assert_eq!((binary.to_string().as_str(), binary.as_f64()), ("156777777344796.28125", None));
 }
 
 proptest! {
