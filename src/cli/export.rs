@@ -300,6 +300,11 @@ mod tests {
                 assert_eq!(bytes.starts_with("\u{feff}".as_bytes()), dialect.bom, "{sql}");
                 let rows = import::parse(&def, &*bytes, Timestamp::UNIX_EPOCH, to);
                 assert_eq!(rows.as_ref(), Ok(&expect), "{zone}, {dialect:?}: {sql}");
+                let file = folder.path().join("parquet");
+                let sql = if sql.contains("FROM stored") { raw(&[], (from, to), Format::Parquet) } else { sql };
+                tables.write(&sql, &file, Format::Parquet).expect("it writes");
+                let rows = import::read_rows(&file, &def, Timestamp::UNIX_EPOCH, to);
+                assert_eq!(rows.as_ref(), Ok(&expect), "{zone}, as Parquet: {sql}");
             }
         }
     }

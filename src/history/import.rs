@@ -1,4 +1,4 @@
-//! Samples from a CSV file of another program: what is accepted, line by line, and which of them fill a gap.
+//! Samples from a CSV or Parquet file of another program: what is accepted, line by line, and which of them fill a gap.
 //!
 //! A row is one sample: `tag`, `time` (with offset, or a local time of the plant), `value`, and if there is such a column
 //! `quality`, in any order. Where there is a column `exact`, as SQL gives it, what it holds is the value. Or a row is one
@@ -91,19 +91,29 @@ struct Series {
     held: Option<Timestamp>,
 }
 
-/// A row of a file with the line on which it begins; or why it is none.
+/// What comes before the rows of a file.
+#[derive(Debug)]
+pub struct Header {
+    /// The names of its columns.
+    pub columns: csv::StringRecord,
+    /// What stands between cells.
+    pub separator: u8,
+    /// What its rows are counted in: `line`, or `row` where it has no lines.
+    pub counted_in: &'static str,
+}
+
+/// A row of a file with its number, that of the line on which it begins; or why it is none.
 pub type Record = (u64, Result<csv::StringRecord, String>);
 
-/// Reads the rows behind a header with this mark between its cells. `Err`: every problem with its line; nothing of the file is
-/// used then. Times lie from `oldest` up to `now`. Rows of one instant keep their order.
+/// Reads the rows behind a header. `Err`: every problem with its line; nothing of the file is used then. Times lie from `oldest` up to `now`. Rows of one instant keep their order.
 pub fn parse(
     def: &PlantDef,
-    header: &csv::StringRecord,
-    separator: u8,
+    header: &Header,
     records: impl Iterator<Item = Record>,
     [oldest, now]: [Timestamp; 2],
 ) -> Result<Rows, Vec<String>> {
-    let mut columns = columns(def, header, separator).map_err(|why| vec![format!("line 1: {why}")])?;
+    let Header { columns: names, separator, counted_in } = header;
+    let mut columns = columns(def, names, *separator).map_err(|why| vec![format!("line 1: {why}")])?;
     let (mut rows, mut problems, mut wrong, mut count) = (Rows::new(), Vec::new(), 0, 0);
     for (line, record) in records {
         let mut add = |tag, sample| {
@@ -113,7 +123,7 @@ pub fn parse(
         let read = record.and_then(|record| columns.row(def, line, &record, [oldest, now], &mut add));
         if let Err(why) = read {
             wrong += 1;
-            problems.extend((problems.len() < PROBLEMS_MAX).then(|| format!("line {line}: {why}")));
+            problems.extend((problems.len() < PROBLEMS_MAX).then(|| format!("{counted_in} {line}: {why}")));
         }
         if ROWS_MAX < count {
             return Err(vec![format!("found more than {ROWS_MAX} samples: split the file")]);

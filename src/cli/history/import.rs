@@ -36,14 +36,14 @@ use crate::{
     quality, unit and exact, whose number is the value. Or each row is an instant: a time, and a column for each tag by its \
     name, `TIC-1.PV` or `TIC-1.PV °C`, and perhaps one `TIC-1.PV quality`, as export writes them. Between the cells stand commas, semicolons or tabs. Times have an \
     offset, or are UTC where the column has utc in its name, else local times of the plant. A file has one decimal mark, that \
-    of its first number, and none between thousands; between commas it is a point. What export --raw and sql --csv write is \
+    of its first number, and none between thousands; between commas it is a point. What export --raw, sql --csv and --parquet write is \
     read as it was stored. Rows for which a value is in force already are left out; one error, and nothing is stored. An \
     import that was interrupted is completed by the same command."
 )]
 pub struct Args {
     #[command(flatten)]
     plant: StoredPlant,
-    /// A CSV file with a row for each sample
+    /// A CSV or Parquet file with a row for each sample or instant
     file: PathBuf,
 }
 

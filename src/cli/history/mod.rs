@@ -41,7 +41,7 @@ enum Command {
     Verify(verify::Args),
     /// Archive what is due now and shrink the database file; not while the station runs
     Compact(compact::Args),
-    /// Fill gaps with the samples of a CSV file, marked as imported, while the station runs or without it
+    /// Fill gaps with the samples of a CSV or Parquet file, marked as imported, while the station runs or without it
     Import(import::Args),
     /// Write a backup of database, archive, audit log, users and parameter sets, while the station runs or without it
     Backup(backup::Args),

@@ -1,5 +1,7 @@
 //! Stores samples of a file, marked as such.
 
+mod parquet;
+
 use std::{
     collections::{HashMap, HashSet},
     ffi::OsString,
@@ -20,7 +22,7 @@ use super::{
 use crate::{
     history::{
         HistoryError,
-        import::{self, Filler, Import, Rows, Stored},
+        import::{self, Filler, Header, Import, Rows, Stored},
         tiers::Tier,
     },
     plant::{def::PlantDef, sample::Sample},
@@ -138,12 +140,16 @@ fn rows_of(
 ) -> Result<Rows, Vec<String>> {
     let named = |problem: String| format!("{}: {problem}", path.display());
     let failed = |error: std::io::Error| vec![named(error.to_string())];
-    let file = opened.map_err(failed)?;
+    let mut file = opened.map_err(failed)?;
     if BYTES_MAX < file.metadata().map_err(failed)?.len() {
         return Err(vec![named(format!("expected at most {} MiB: split the file", BYTES_MAX >> 20))]);
     }
-    let text = BufReader::new(file.take(BYTES_MAX));
-    parse(def, text, oldest, now).map_err(|problems| problems.into_iter().map(named).collect())
+    let read = if parquet::is_one(&mut file).map_err(failed)? {
+        parquet::read(&file, def, [oldest, now])
+    } else {
+        parse(def, BufReader::new(file.take(BYTES_MAX)), oldest, now)
+    };
+    read.map_err(|problems| problems.into_iter().map(named).collect())
 }
 
 /// The same of what is in a file, row by row.
@@ -156,9 +162,10 @@ pub fn parse(def: &PlantDef, mut text: impl BufRead, oldest: Timestamp, now: Tim
     let separator = [b';', b'\t'].into_iter().find(|mark| first.contains(mark)).unwrap_or(b',');
     let text = LineEnds { text: first.chain(text), before: b'\n', written: b'\n' };
     let mut reader = csv::ReaderBuilder::new().delimiter(separator).flexible(true).from_reader(text);
-    let mut header = reader.headers().map_err(|error| first_line(error.to_string()))?.clone();
-    header.trim();
-    import::parse(def, &header, separator, records(reader), [oldest, now])
+    let mut columns = reader.headers().map_err(|error| first_line(error.to_string()))?.clone();
+    columns.trim();
+    let header = Header { columns, separator, counted_in: "line" };
+    import::parse(def, &header, records(reader), [oldest, now])
 }
 
 /// The rows of a file, each with the line on which it begins: what ends a line is counted behind it, and may stand in cells.

@@ -177,3 +177,43 @@ fn an_import_that_reaches_into_an_archived_hour_is_in_it() {
     let (got, expect) = ((minutes(&store), hours(&store)), (minutes(&plain), hours(&plain)));
     assert_eq!(got, expect, "hot it was {before:?}");
 }
+
+#[test]
+fn a_parquet_file_of_another_program_is_read_or_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let db = duckdb::Connection::open_in_memory().unwrap();
+    let read = |select: &str| {
+        let file = folder.path().join("others.parquet");
+        db.execute_batch(&format!("COPY ({select}) TO '{}' (FORMAT parquet)", file.display())).unwrap();
+        crate::history::io::import::read_rows(&file, &def(), sec(0), sec(60 * HOUR_S))
+    };
+    let sample = |second, value| Sample::good(value, sec(second));
+    let expect: Rows = [(PV, vec![sample(3_600, 20.5), sample(3_601, 21.0)])].into();
+    // A row a sample, and a row an instant; instants that are UTC by their type, by their name, by their zone.
+    for select in [
+        "SELECT 'TIC-1.PV' AS tag, make_timestamptz(3600000000 + i * 1000000) AS time, 20.5 + i * 0.5 AS value FROM range(2) t(i)",
+        "SELECT 'TIC-1.PV' AS tag, make_timestamp_ns(3600000000000 + i * 1000000000) AS utc, (20.5 + i * 0.5)::FLOAT AS value FROM range(2) t(i)",
+        "SELECT make_timestamp(3600000000 + i * 1000000) AS utc, 20.5::DOUBLE + i * 0.5 AS 'TIC-1.PV', NULL AS 'TIC-1.PV quality' FROM range(2) t(i)",
+        "SELECT '1970-01-01T0' || (1 + i) || ':00:00+0' || i || ':00' AS time, 'TIC-1.PV' AS tag, 20.5 AS value FROM range(1) t(i)
+            UNION ALL SELECT '1970-01-01T01:00:01Z', 'TIC-1.PV', 21",
+    ] {
+        assert_eq!(read(select).as_ref(), Ok(&expect), "{select}");
+    }
+    for (select, why) in [
+        ("SELECT 'TIC-1.PV' AS tag, 'noon' AS utc, 1 AS value", "row 1: found the time `noon`"),
+        ("SELECT 'TIC-1.PV' AS tag, make_timestamp(0) AS utc, 'warm' AS value", "row 1: TIC-1.PV: found `warm`"),
+        ("SELECT 1 AS a, [1, 2] AS b", "line 1: column 1 is none of samples"),
+        ("SELECT 'x' AS tag, make_timestamp(0) AS utc, 1 AS value WHERE false", "found no row"),
+    ] {
+        assert!(read(select).is_err_and(|problems| problems[0].contains(why)), "{select}: {:?}", read(select));
+    }
+    let file = folder.path().join("others.parquet");
+    let whole = std::fs::read(&file).unwrap();
+    for damaged in
+        [&whole[..4], &whole[..whole.len() / 2], &[&whole[..whole.len() - 12], b"\xff\xff\xff\x7fPAR1"].concat()]
+    {
+        std::fs::write(&file, damaged).unwrap();
+        let read = crate::history::io::import::read_rows(&file, &def(), sec(0), sec(60 * HOUR_S));
+        assert!(read.is_err_and(|problems| problems[0].contains("others.parquet: cannot be read as Parquet")));
+    }
+}
