@@ -34,9 +34,9 @@ pub const DECIDED_AFTER: Duration = Duration::from_secs(1_800);
 const SLACK: Duration = Duration::from_secs(300);
 /// A counter has rolled over within this share of its range.
 const ROLLS_WITHIN: f64 = 0.25;
-/// While no hour is over, so many of its greatest steps are not too much to have rolled over.
+/// While no hour is over, this many of its greatest steps are not too much to have rolled over.
 const NO_HISTORY: f64 = 100.0;
-/// Without any history, what a reset counter shows is at most this share of what it showed, or so many last digits.
+/// Without any history, what a reset counter shows is at most this share of what it showed, or this many last digits.
 const NEAR_ZERO: (f64, f64) = (0.01, 10.0);
 
 keyword_enum! {
@@ -131,6 +131,11 @@ impl Counter {
     /// Has anything been read?
     pub fn is_known(&self) -> bool {
         self.last.is_some()
+    }
+
+    /// What it showed is not what it goes on from: how fast it counts is still known.
+    pub fn forget(&mut self) {
+        (self.last, self.held, self.left) = (None, None, None);
     }
 
     /// What is not decided yet.

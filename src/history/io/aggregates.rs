@@ -31,6 +31,15 @@ use crate::{
     },
 };
 
+/// What of aggregates is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Detail {
+    /// What a curve shows: neither the first value nor what was counted. The rest is not read: a third less to do.
+    Curve,
+    /// All of it.
+    Whole,
+}
+
 impl Store {
     /// Hands over the good values of some different tags in a span, each tag's parts in order of time, with the place of
     /// the tag in `tags`; aggregates of `widest` at most. Returns what could not be read.
@@ -38,7 +47,7 @@ impl Store {
         &self,
         tags: &[TagId],
         (from, to): (Timestamp, Timestamp),
-        widest: Tier,
+        (widest, detail): (Tier, Detail),
         mut each: impl FnMut(usize, CurvePart),
     ) -> Result<Vec<Gap>, HistoryError> {
         let pieces = self.pieces(from.as_microsecond()..to.as_microsecond(), widest)?;
@@ -52,7 +61,7 @@ impl Store {
         let mut gaps = Vec::new();
         for piece in pieces {
             let (Some(from), Some(to)) = (instant(piece.from), instant(piece.to)) else { continue };
-            gaps.extend(self.each_part_of(tags, (from, to), piece.tier, &mut each)?);
+            gaps.extend(self.each_part_of(tags, (from, to), (piece.tier, detail), &mut each)?);
         }
         Ok(gaps)
     }
@@ -83,11 +92,11 @@ impl Store {
         &self,
         tags: &[TagId],
         (from, to): (Timestamp, Timestamp),
-        tier: Tier,
+        (tier, detail): (Tier, Detail),
         mut each: impl FnMut(usize, CurvePart),
     ) -> Result<Vec<Gap>, HistoryError> {
         if tier != Tier::Raw {
-            self.each_aggregate(tags, tier, (from, to), &mut each)?;
+            self.each_aggregate(tags, (tier, detail), (from, to), &mut each)?;
             return Ok(Vec::new());
         }
         let finest = self.finest(from)?;
@@ -96,7 +105,7 @@ impl Store {
             let (begin, end) = (from.as_microsecond(), to.as_microsecond());
             let whole = (instant(floor(begin, step)), instant(floor(end + step - 1, step)));
             let (Some(whole_from), Some(whole_to)) = whole else { return Ok(Vec::new()) };
-            self.each_aggregate(tags, finest, (whole_from, whole_to), &mut |place, part| {
+            self.each_aggregate(tags, (finest, detail), (whole_from, whole_to), &mut |place, part| {
                 if let CurvePart::Aggregate(row) = part {
                     each(place, CurvePart::Aggregate(row.share(begin..end, step)));
                 }
@@ -116,8 +125,8 @@ impl Store {
     ) -> Result<Vec<Gap>, HistoryError> {
         let (Some(from), Some(to)) = (instant(leg.from), instant(leg.to)) else { return Ok(Vec::new()) };
         match &leg.epochs {
-            Epochs::All => self.each_part(tags, (from, to), widest, each),
-            _ if self.deleted_until(Tier::Raw)?.is_some_and(|until| from < until) => Ok(Vec::new()),
+            Epochs::All => self.each_part(tags, (from, to), (widest, Detail::Whole), each),
+            _ if self.is_deleted(leg.from)? => Ok(Vec::new()),
             of @ (Epochs::One(_) | Epochs::Without(_)) => self.each_held(tags, (from, to), of, each),
         }
     }
@@ -146,17 +155,17 @@ impl Store {
     fn each_aggregate(
         &self,
         tags: &[TagId],
-        tier: Tier,
+        (tier, detail): (Tier, Detail),
         (from, to): (Timestamp, Timestamp),
         each: &mut impl FnMut(usize, CurvePart),
     ) -> Result<(), HistoryError> {
         let wanted = self.wanted(tags);
         let files = self.files(Some((tier, from.as_microsecond()..to.as_microsecond())))?;
-        let read = self.read_aggregates(&files, &wanted, (from, to), each);
+        let read = self.read_aggregates(&files, (&wanted, detail), (from, to), each);
         if let Err(error) = &read
             && error.is_damage_of_file()
         {
-            self.avoid_damaged(&files, &wanted, (from, to))?;
+            self.avoid_damaged(&files, (&wanted, detail), (from, to))?;
             // The query is answered once more, from what lies beneath.
             self.changed.set(true);
         }
@@ -167,7 +176,7 @@ impl Store {
     fn avoid_damaged(
         &self,
         files: &[ArchiveFile],
-        wanted: &Wanted,
+        wanted: (&Wanted, Detail),
         span: (Timestamp, Timestamp),
     ) -> Result<(), HistoryError> {
         for file in files {
@@ -187,7 +196,7 @@ impl Store {
     fn read_aggregates(
         &self,
         files: &[ArchiveFile],
-        wanted: &Wanted,
+        (wanted, detail): (&Wanted, Detail),
         (from, to): (Timestamp, Timestamp),
         each: &mut impl FnMut(usize, CurvePart),
     ) -> Result<(), HistoryError> {
@@ -195,7 +204,7 @@ impl Store {
             return Ok(());
         }
         let rests = any_rests(files);
-        let sql = sql::aggregates(&self.parquet(files, rests), &wanted.tags, rests);
+        let sql = sql::aggregates(&self.parquet(files, rests), &wanted.tags, rests, detail == Detail::Whole);
         let mut statement = self.db.prepare(&sql).map_err(engine)?;
         // By `step`, see `samples`.
         let _ = statement.stream_arrow(params![utc(from), utc(to)]).map_err(engine)?;

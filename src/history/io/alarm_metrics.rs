@@ -1,14 +1,15 @@
 //! How good the alarm system was: the journal, day by day, through the monitor that also measures the running plant.
 
-use std::{collections::HashSet, sync::Arc, time::Duration};
+use std::{collections::HashSet, time::Duration};
 
 use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{ROWS_MAX, alarm, check_span, shared, within},
+    read::{ROWS_MAX, check_span, within},
     sql,
     store::{Store, engine, instant, utc},
+    stored::Stored,
 };
 use crate::{
     history::{
@@ -82,8 +83,11 @@ impl Store {
 
     /// The raising events of the alarms that were active at an instant and not suppressed: a suppressed alarm is not stale.
     pub(super) fn standing_at(&self, at: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        let standing =
-            self.whole_list(&sql::standing_at(&Epochs::All.before()), params![utc(at), ROWS_MAX + 1], alarm)?;
+        let standing = self.whole_list(
+            &sql::standing_at(&Epochs::All.before()),
+            params![utc(at), ROWS_MAX + 1],
+            AlarmRecord::read,
+        )?;
         self.without_lost(standing, &Epochs::All, at)
     }
 
@@ -100,12 +104,13 @@ impl Store {
         if raised.iter().all(is_known) {
             return Ok(raised);
         }
-        let named = |row: &duckdb::Row| Ok((shared(row, 0)?, shared(row, 1)?));
-        let later: HashSet<(Arc<str>, Arc<str>)> = self
+        let named = |row: &duckdb::Row| Ok((row.get(0)?, row.get(1)?));
+        let later: HashSet<(String, String)> = self
             .whole_list(&sql::named_since(&epochs.before()), params![utc(at), ROWS_MAX + 1], named)?
             .into_iter()
             .collect();
-        raised.retain(|event| is_known(event) || later.contains(&(event.subject.clone(), event.message.clone())));
+        raised
+            .retain(|event| is_known(event) || later.contains(&(event.subject.to_string(), event.message.to_string())));
         Ok(raised)
     }
 
@@ -126,13 +131,13 @@ impl Store {
             let (Some(begin), Some(end)) = (instant(from), instant(to)) else { continue };
             let from = began.and_then(instant).map_or(begin, |began| began.max(begin));
             let until = ended.and_then(instant).map_or(end, |ended| ended.min(end));
-            let before = |sql: &str| self.whole_list(sql, params![utc(from), ROWS_MAX + 1], alarm);
+            let before = |sql: &str| self.whole_list(sql, params![utc(from), ROWS_MAX + 1], AlarmRecord::read);
             let mut active = self.without_lost(before(&sql::active_at(&epochs.before()))?, &epochs, from)?;
             let mut suppressing = before(&sql::suppressing_at(&epochs.before()))?;
             // By another setting of the clock.
             active.iter_mut().chain(&mut suppressing).for_each(|event| event.at = event.at.min(from));
             let sql = sql::journal(&epochs.condition(), sql::OLDEST);
-            let events = self.whole_list(&sql, params![utc(begin), utc(end), ROWS_MAX + 1], alarm)?;
+            let events = self.whole_list(&sql, params![utc(begin), utc(end), ROWS_MAX + 1], AlarmRecord::read)?;
             all.push(EventLeg { from, until, active, suppressing, events });
         }
         Ok(all)

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
-use duckdb::{Row, params};
+use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{self, ROWS_MAX, check_span, maybe_shared, shared, within},
+    read::{ROWS_MAX, check_span, within},
     store::{Store, instant, utc},
+    stored::Stored,
 };
 use crate::{
     history::{
@@ -16,29 +17,38 @@ use crate::{
         recorded::{Doubled, Leg},
     },
     plant::{
-        batch::{self as rules, Batch, BatchEvent, BatchRecord},
-        keyword::Keyword,
+        batch::{self as rules, Batch, BatchRecord},
         record::AlarmEvent,
     },
     report::batch::{self, BatchReport},
 };
 
-/// The records of the batches that ran in a span, newest batch first, of at most so many batches, each with the epoch of its clock.
-const BATCHES: &str = "SELECT utc, name, number, place, event, phase, epoch FROM batch JOIN (
+/// The records of the batches that ran in a span, newest batch first, of a limited number of batches, each with the epoch of its clock.
+fn records_of() -> String {
+    format!(
+        "SELECT {}, epoch FROM batch JOIN (
     SELECT name, number, first(epoch ORDER BY place) AS since, first(utc ORDER BY place) AS begun,
         last(utc ORDER BY place) AS changed, bool_or(event IN ('ended', 'found ended')) AS over
     FROM batch GROUP BY name, number HAVING begun < $2 AND (NOT over OR $1 < changed)
     ORDER BY since DESC, begun DESC, name, number LIMIT $3) USING (name, number)
-    ORDER BY since DESC, begun DESC, name, number, place";
+    ORDER BY since DESC, begun DESC, name, number, place",
+        BatchRecord::columns()
+    )
+}
+
 /// The last record of each name.
-const LATEST_BATCHES: &str = "SELECT utc, name, number, place, event, phase FROM batch
-    QUALIFY row_number() OVER (PARTITION BY name ORDER BY number DESC, place DESC) = 1";
+fn latest() -> String {
+    format!(
+        "SELECT {} FROM batch QUALIFY row_number() OVER (PARTITION BY name ORDER BY number DESC, place DESC) = 1",
+        BatchRecord::columns()
+    )
+}
 
 /// A record with the epoch of its clock.
 type Dated = (u16, BatchRecord);
 
 impl Store {
-    /// The batches that ran between two instants, newest first, at most so many; without figures where these are more than
+    /// The batches that ran between two instants, newest first, up to a limit; without figures where these are more than
     /// [`BATCHES_MAX`].
     pub(super) fn batches(
         &self,
@@ -73,7 +83,7 @@ impl Store {
         let period = from.as_microsecond()..until.as_microsecond();
         let asked = widened(&doubled, period.clone());
         let (Some(begin), Some(end)) = (instant(asked.start), instant(asked.end)) else { return Ok(Vec::new()) };
-        let mut records = self.list(BATCHES, params![utc(begin), utc(end), limit], dated)?;
+        let mut records = self.list(&records_of(), params![utc(begin), utc(end), limit], BatchRecord::read_dated)?;
         within(records.len() as u64, ROWS_MAX)?;
         records.retain(is_known);
         let now = end_of_period(&doubled, now.as_microsecond());
@@ -92,7 +102,7 @@ impl Store {
 
     /// The last record of the batches of each name.
     pub(super) fn latest_batches(&self) -> Result<Vec<BatchRecord>, HistoryError> {
-        self.list(LATEST_BATCHES, &[], record)
+        self.list(&latest(), &[], BatchRecord::read)
     }
 
     fn batch(&self, span: Span) -> Result<BatchReport, HistoryError> {
@@ -163,19 +173,4 @@ impl Span<'_> {
 fn batch_of(records: &[Dated], legs: &[Vec<Leg>]) -> Option<Batch> {
     let of: Vec<BatchRecord> = records.iter().map(|(_, record)| record.clone()).collect();
     rules::batch(&of, |place| time(&legs[place]))
-}
-
-fn dated(row: &Row) -> duckdb::Result<Dated> {
-    Ok((row.get(6)?, record(row)?))
-}
-
-fn record(row: &Row) -> duckdb::Result<BatchRecord> {
-    Ok(BatchRecord {
-        at: read::time(row)?,
-        batch: shared(row, 1)?,
-        number: row.get(2)?,
-        place: row.get(3)?,
-        event: BatchEvent::from_word(&row.get::<_, String>(4)?).ok_or(duckdb::Error::InvalidQuery)?,
-        phase: maybe_shared(row, 5)?,
-    })
 }

@@ -5,9 +5,9 @@ use std::collections::HashSet;
 use duckdb::params;
 
 use super::{
-    read::action,
     sql,
     store::{Store, engine, utc},
+    stored::Stored,
 };
 use crate::{
     history::HistoryError,
@@ -57,7 +57,7 @@ impl Store {
 
     /// What is compared with the audit log at a start.
     pub(super) fn stored_entries(&self) -> Result<StoredEntries, HistoryError> {
-        let mut unchained = self.list(&sql::unchained(CHAIN_HASHES_MAX), &[], action)?;
+        let mut unchained = self.list(&sql::unchained(CHAIN_HASHES_MAX), &[], ActionRecord::read)?;
         unchained.reverse();
         Ok(StoredEntries { chain_hashes: self.chain_hashes()?, unchained })
     }

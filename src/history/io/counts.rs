@@ -13,9 +13,11 @@ use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{SAMPLES_MAX, action},
+    aggregates::Detail,
+    read::SAMPLES_MAX,
     sql,
     store::{Store, instant, utc},
+    stored::Stored,
 };
 use crate::{
     history::{
@@ -73,6 +75,14 @@ impl CountedTag {
         CountedTag { counts, span: i64::MIN..i64::MAX, gain: Exact::default(), steps: Vec::new() }
     }
 
+    /// What it showed last says nothing of what comes now.
+    fn forget(&mut self) {
+        match &mut self.counts {
+            Counts::Counter(counter) => counter.forget(),
+            Counts::Starts(last) => *last = None,
+        }
+    }
+
     /// The span begins: what was counted before is not in it.
     fn begin(&mut self) {
         (self.gain, self.steps) = (Exact::default(), Vec::new());
@@ -84,6 +94,10 @@ impl CountedTag {
             self.gain = self.gain + gain;
             self.steps.extend(steps.into_iter().map(unsaid));
         }
+    }
+
+    fn is_counter(&self) -> bool {
+        matches!(self.counts, Counts::Counter(_))
     }
 
     fn is_known(&self) -> bool {
@@ -151,6 +165,10 @@ impl CountedTag {
     }
 }
 
+fn is_in(spans: &[Range<i64>], row: Range<i64>) -> bool {
+    spans.iter().any(|span| span.start < row.end && row.start < span.end)
+}
+
 fn unsaid(step: CounterStep) -> (CounterStep, String) {
     (step, String::new())
 }
@@ -184,6 +202,9 @@ impl Store {
             let before = recorded::legs(&doubled, around.start, around.end);
             let before = before.into_iter().take_while(|leg| leg.epochs != first.epochs);
             let own = Leg { from: around.start, to: first.from, ..first.clone() };
+            if self.is_deleted(around.start)? {
+                tags.iter_mut().for_each(|(_, tag)| tag.forget());
+            }
             for leg in before.chain([own]) {
                 self.count_leg(&mut tags, &leg)?;
             }
@@ -209,6 +230,13 @@ impl Store {
         Ok(tags)
     }
 
+    /// The times that came twice and of which no samples are kept any more: their minutes and hours hold both, in no order, and
+    /// would look like a counter that jumps. It goes on behind them.
+    fn mixed(&self) -> Result<Vec<Range<i64>>, HistoryError> {
+        let deleted = self.deleted_until(Tier::Raw)?.map_or(i64::MIN, Timestamp::as_microsecond);
+        Ok(self.doubled()?.into_iter().map(|doubled| doubled.span).filter(|span| span.start < deleted).collect())
+    }
+
     /// Counts what one setting of the clock stored in a time that others stored in, too.
     fn count_leg(&self, tags: &mut [(TagId, CountedTag)], leg: &Leg) -> Result<(), HistoryError> {
         let ids: Vec<TagId> = tags.iter().map(|(id, _)| *id).collect();
@@ -224,7 +252,7 @@ impl Store {
     fn correct(&self, tags: &mut [(TagId, CountedTag)], leg: &Leg) -> Result<(), HistoryError> {
         let (Some(from), Some(to)) = (instant(leg.from), instant(leg.to)) else { return Ok(()) };
         let sql = sql::corrections(&leg.epochs.condition());
-        for correction in self.list(&sql, params![counter::CORRECT, utc(from), utc(to)], action)? {
+        for correction in self.list(&sql, params![counter::CORRECT, utc(from), utc(to)], ActionRecord::read)? {
             let amount = correction.new.as_deref().and_then(|new| new.split(' ').next()?.parse().ok());
             let tag = tags.iter_mut().find(|(id, _)| *self.def.tag(*id).name == *correction.target);
             if let (Some((_, tag)), Some(amount)) = (tag, amount) {
@@ -267,7 +295,7 @@ impl Store {
             return self.count_edge(tags, piece, finest);
         }
         let Some(step) = piece.tier.step() else {
-            self.each_part_of(&ids, (from, to), Tier::Raw, |place, part| {
+            self.each_part_of(&ids, (from, to), (Tier::Raw, Detail::Whole), |place, part| {
                 if let CurvePart::Held(held) = part {
                     tags[place].1.read(held.value, held.from, held.to);
                 }
@@ -275,8 +303,11 @@ impl Store {
             return Ok(());
         };
         let mut rows: Vec<Vec<Aggregate>> = vec![Vec::new(); tags.len()];
-        self.each_part_of(&ids, (from, to), piece.tier, |place, part| {
-            if let CurvePart::Aggregate(row) = part {
+        let mixed = self.mixed()?;
+        self.each_part_of(&ids, (from, to), (piece.tier, Detail::Whole), |place, part| {
+            if let CurvePart::Aggregate(row) = part
+                && !(tags[place].1.is_counter() && is_in(&mixed, row.at..row.at + step))
+            {
                 rows[place].push(row);
             }
         })?;
@@ -296,8 +327,10 @@ impl Store {
         let first = floor(piece.from + step - 1, step);
         let (Some(from), Some(to)) = (instant(first), instant(floor(piece.to + step - 1, step))) else { return Ok(()) };
         if from < to {
-            self.each_part_of(&ids, (from, to), tier, |place, part| {
+            let mixed = self.mixed()?;
+            self.each_part_of(&ids, (from, to), (tier, Detail::Whole), |place, part| {
                 if let CurvePart::Aggregate(row) = part
+                    && !(tags[place].1.is_counter() && is_in(&mixed, row.at..row.at + step))
                     && !tags[place].1.read_row(&row, step)
                 {
                     tags[place].1.read_kept(&row);
@@ -335,9 +368,8 @@ impl Store {
         step: i64,
     ) -> Result<(), HistoryError> {
         let (Some(from), Some(to)) = (instant(span.start), instant(span.end)) else { return Ok(()) };
-        let deleted = self.deleted_until(Tier::Raw)?.is_some_and(|until| from < until);
-        if !deleted {
-            self.each_part_of(&[id], (from, to), Tier::Raw, |_, part| {
+        if !self.is_deleted(span.start)? {
+            self.each_part_of(&[id], (from, to), (Tier::Raw, Detail::Whole), |_, part| {
                 if let CurvePart::Held(held) = part {
                     tag.read(held.value, held.from, held.to);
                 }
@@ -346,7 +378,7 @@ impl Store {
         }
         let mut kept = Vec::new();
         if step == HOUR {
-            self.each_part_of(&[id], (from, to), Tier::Minute, |_, part| {
+            self.each_part_of(&[id], (from, to), (Tier::Minute, Detail::Whole), |_, part| {
                 if let CurvePart::Aggregate(minute) = part {
                     kept.push(minute);
                 }

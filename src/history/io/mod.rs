@@ -50,6 +50,7 @@ pub mod files;
 pub mod last;
 pub mod interrupt;
 pub mod store;
+mod stored;
 pub mod open;
 mod blocks;
 mod mend;

@@ -12,10 +12,9 @@ use super::{
     files::{self, Failure, Opening},
     last::{self, Noted},
     mend::{end_cut, mend, missing, said_of},
-    probe,
-    read::action,
-    restore, room, sql,
+    probe, restore, room, sql,
     store::{Store, engine},
+    stored::Stored,
 };
 use crate::{
     history::{HistoryError, words::joined},
@@ -85,7 +84,7 @@ impl Store {
         };
         let entries =
             self.stored_entries().inspect_err(|error| tracing::warn!(%error, "not compared with the audit log")).ok();
-        let procedure = self.list(&sql::latest_procedure(), &[], action)?.pop();
+        let procedure = self.list(&sql::latest_procedure(), &[], ActionRecord::read)?.pop();
         Ok(Restored { events, recent, entries, procedure, ..self.restore_followed()? })
     }
 

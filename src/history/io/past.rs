@@ -6,9 +6,10 @@ use duckdb::params;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    read::{ROWS_MAX, alarm, line_minute},
+    read::ROWS_MAX,
     sql,
     store::{Store, after, engine, instant, utc},
+    stored::Stored,
 };
 use crate::{
     history::{
@@ -26,7 +27,7 @@ use crate::{
     report::step_series::{HOLD_MAX, expiry},
 };
 
-/// A total that has had no value for so many days of records begins at 0.
+/// A total that has had no value for this many days of records begins at 0.
 const TOTALS_DAYS: i64 = 32;
 
 impl Store {
@@ -157,13 +158,13 @@ impl Store {
     fn minutes_at(&self, at: Timestamp) -> Result<Vec<Option<LineMinute>>, HistoryError> {
         let end = instant(at.as_microsecond().saturating_add(MINUTE)).unwrap_or(at);
         let minute = |line: &LineDef| {
-            let found = self.span_list(sql::LINE_MINUTES, (at, end, 1), params![line.name], line_minute)?;
+            let found = self.span_list(&sql::line_minutes(), (at, end, 1), params![line.name], LineMinute::read)?;
             Ok(found.into_iter().next())
         };
         self.def.lines.iter().map(minute).collect()
     }
 
     fn events_until(&self, end: Timestamp) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::restore(), params![ROWS_MAX + 1, utc(end)], alarm)
+        self.whole_list(&sql::restore(), params![ROWS_MAX + 1, utc(end)], AlarmRecord::read)
     }
 }

@@ -34,7 +34,7 @@ const SOUND: &str = "sound";
 const TIME_MAX: Duration = Duration::from_secs(120);
 /// What a process says at most, bytes.
 const OUTPUT_MAX: usize = 64 << 10;
-/// So many processes must fail in a row.
+/// This many processes must fail in a row.
 const FAILURES: usize = 2;
 /// A process that ends by one of these has ended itself. Not a bus error: that comes from a disk that cannot be read.
 const OWN_SIGNALS: [Signal; 5] = [Signal::ABORT, Signal::SEGV, Signal::ILL, Signal::FPE, Signal::TRAP];

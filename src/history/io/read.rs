@@ -6,8 +6,10 @@ use duckdb::{Row, params};
 use jiff::Timestamp;
 
 use super::{
+    aggregates::Detail,
     sql,
-    store::{Store, engine, instant, utc},
+    store::{Store, engine, utc},
+    stored::Stored,
 };
 use crate::{
     history::{
@@ -16,11 +18,9 @@ use crate::{
     },
     plant::{
         counter,
-        def::{Priority, TagId},
-        exact::Exact,
-        keyword::Keyword,
+        def::TagId,
         line_minute::LineMinute,
-        record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash, FirstOut},
+        record::{ActionRecord, AlarmRecord},
         time::instant_of_grid,
     },
     report::step_series::{HeldValue, ValuesAt},
@@ -77,18 +77,18 @@ impl Store {
             Query::Unarchived { from, to } => self.unarchived(*from, *to).map(Answer::Unarchived),
             Query::Overview => self.overview(now).map(|overview| Answer::Overview(Box::new(overview))),
             Query::Registers(_) => Err(HistoryError::Engine("registers are read by the line".to_owned())),
-            Query::Journal { from, to, limit } => {
-                self.span_list(&sql::journal("", sql::NEWEST), (*from, *to, *limit), &[], alarm).map(Answer::Journal)
-            }
-            Query::Actions { from, to, limit } => {
-                self.span_list(&sql::actions(sql::NEWEST), (*from, *to, *limit), &[], action).map(Answer::Actions)
-            }
+            Query::Journal { from, to, limit } => self
+                .span_list(&sql::journal("", sql::NEWEST), (*from, *to, *limit), &[], AlarmRecord::read)
+                .map(Answer::Journal),
+            Query::Actions { from, to, limit } => self
+                .span_list(&sql::actions(sql::NEWEST), (*from, *to, *limit), &[], ActionRecord::read)
+                .map(Answer::Actions),
             Query::Audit { from, to, words, by, action: what, limit } => self
-                .span_list(&sql::audit(), (*from, *to, *limit), params![by, what, words], action)
+                .span_list(&sql::audit(), (*from, *to, *limit), params![by, what, words], ActionRecord::read)
                 .map(Answer::Actions),
             Query::LineMinutes { line, from, to, limit } => {
                 let name = self.def.lines.get(line.index()).map_or("", |line| &line.name);
-                self.span_list(sql::LINE_MINUTES, (*from, *to, *limit), params![name], line_minute)
+                self.span_list(&sql::line_minutes(), (*from, *to, *limit), params![name], LineMinute::read)
                     .map(Answer::LineMinutes)
             }
             Query::Report { period } => self.report(period, now).map(|report| Answer::Report(Box::new(report))),
@@ -101,7 +101,7 @@ impl Store {
     /// Of each alarm the last event of every kind, oldest first: from these the plant restores what is active and
     /// what is acknowledged.
     pub fn restore(&self) -> Result<Vec<AlarmRecord>, HistoryError> {
-        self.whole_list(&sql::restore(), params![ROWS_MAX + 1, utc(Timestamp::MAX)], alarm)
+        self.whole_list(&sql::restore(), params![ROWS_MAX + 1, utc(Timestamp::MAX)], AlarmRecord::read)
     }
 
     pub(super) fn curves(
@@ -116,7 +116,7 @@ impl Store {
         let mut curves: Vec<Curve> = tags.each.iter().map(|tag| Curve::new(*tag, span, buckets)).collect();
         let known = (span.from, span.to.min(span.until));
         if known.0 < known.1 {
-            self.each_part(&tags.each, known, tier, |place, part| curves[place].add(part))?;
+            self.each_part(&tags.each, known, (tier, Detail::Curve), |place, part| curves[place].add(part))?;
         }
         let mut series: Vec<Series> = curves.into_iter().map(Curve::end).collect();
         if buckets == 1 && known.0 < known.1 {
@@ -170,7 +170,7 @@ impl Store {
         self.ids.get(tag.index()).copied().flatten()
     }
 
-    /// The rows between two instants, at most so many; the parameters after these three are `more`.
+    /// The rows between two instants, up to a limit; the parameters after these three are `more`.
     pub(super) fn span_list<T>(
         &self,
         sql: &str,
@@ -242,92 +242,4 @@ pub(super) fn check_span(from: Timestamp, to: Timestamp) -> Result<(), HistoryEr
 
 pub(super) fn within(rows: u64, max: u64) -> Result<(), HistoryError> {
     if rows <= max { Ok(()) } else { Err(HistoryError::TooManyRows { rows, max, asked: None }) }
-}
-
-pub(super) fn alarm(row: &Row) -> duckdb::Result<AlarmRecord> {
-    Ok(AlarmRecord {
-        at: time(row)?,
-        subject: shared(row, 1)?,
-        message: shared(row, 2)?,
-        priority: match row.get::<_, u8>(3)? {
-            1 => Priority::Critical,
-            2 => Priority::High,
-            3 => Priority::Medium,
-            4 => Priority::Low,
-            n => return Err(duckdb::Error::IntegralValueOutOfRange(3, i128::from(n))),
-        },
-        event: AlarmEvent::from_word(&row.get::<_, String>(4)?).ok_or(duckdb::Error::InvalidQuery)?,
-        value: exact(row.get(5)?, row.get(12)?),
-        limit: row.get(6)?,
-        by: maybe_shared(row, 7)?,
-        reason: maybe_shared(row, 8)?,
-        until: maybe_time(row, 9)?,
-        first_out: match (maybe_time(row, 10)?, row.get(11)?) {
-            (Some(began), Some(rank)) => Some(FirstOut { began, rank }),
-            (_, None) | (None, _) => None,
-        },
-        identity: None,
-    })
-}
-
-fn exact(value: Option<f64>, rest: Option<f64>) -> Option<Exact> {
-    value.map(|value| Exact::of_parts(value, rest))
-}
-
-pub(super) fn action(row: &Row) -> duckdb::Result<ActionRecord> {
-    Ok(ActionRecord {
-        at: time(row)?,
-        by: shared(row, 1)?,
-        action: shared(row, 2)?,
-        target: shared(row, 3)?,
-        old: maybe_shared(row, 4)?,
-        new: maybe_shared(row, 5)?,
-        outcome: shared(row, 6)?,
-        from: maybe_shared(row, 7)?.unwrap_or_default(),
-        note: maybe_shared(row, 8)?,
-        chain_hash: chain_hash(row.get(9)?, row.get(10)?),
-    })
-}
-
-/// Number and hash of an entry; `None` for an action that the audit log does not have.
-pub(super) fn chain_hash(number: Option<u64>, hash: Option<Vec<u8>>) -> Option<ChainHash> {
-    Some(ChainHash { number: number?, hash: hash?.try_into().ok()? })
-}
-
-pub(super) fn line_minute(row: &Row) -> duckdb::Result<LineMinute> {
-    let count = |column| row.get::<_, u32>(column).map(u64::from);
-    Ok(LineMinute {
-        at: time(row)?,
-        line: shared(row, 1)?,
-        requests: count(2)?,
-        ok: count(3)?,
-        timeouts: count(4)?,
-        corrupt: count(5)?,
-        exceptions: count(6)?,
-        retries: count(7)?,
-        late: count(8)?,
-        missed: count(9)?,
-        sent_bytes: count(10)?,
-        received_bytes: count(11)?,
-        utilisation: row.get(12)?,
-        reply_p99_ms: row.get(13)?,
-        reply_max_ms: row.get(14)?,
-    })
-}
-
-pub(super) fn time(row: &Row) -> duckdb::Result<Timestamp> {
-    let micros: i64 = row.get(0)?;
-    instant(micros).ok_or(duckdb::Error::IntegralValueOutOfRange(0, i128::from(micros)))
-}
-
-pub(super) fn maybe_time(row: &Row, column: usize) -> duckdb::Result<Option<Timestamp>> {
-    Ok(row.get::<_, Option<i64>>(column)?.and_then(instant))
-}
-
-pub(super) fn shared(row: &Row, column: usize) -> duckdb::Result<Arc<str>> {
-    row.get::<_, String>(column).map(Arc::from)
-}
-
-pub(super) fn maybe_shared(row: &Row, column: usize) -> duckdb::Result<Option<Arc<str>>> {
-    row.get::<_, Option<String>>(column).map(|text| text.map(Arc::from))
 }

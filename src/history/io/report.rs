@@ -11,15 +11,17 @@ use duckdb::params;
 use jiff::Timestamp;
 
 use super::{
-    read::{ROWS_MAX, SAMPLES_MAX, action, chain_hash, check_span},
+    read::{ROWS_MAX, SAMPLES_MAX, check_span},
     sql,
     store::{Store, utc},
+    stored::{Stored, chain_hash},
 };
 use crate::{
     history::{HistoryError, series::Span},
     plant::{
         PlantDef,
         def::{DeviceDef, Section, TagId, TrendGroup},
+        record::ActionRecord,
         report::PeriodKind,
         tag::{Access, DataType, Poll, TagDef},
         time::elapsed,
@@ -61,8 +63,11 @@ impl Store {
         };
         let events = self.event_legs(from, until)?;
         let suppressed = figures::suppressed_in(&events);
-        let actions =
-            self.whole_list(&sql::actions(sql::OLDEST), params![utc(from), utc(until), ROWS_MAX + 1], action)?;
+        let actions = self.whole_list(
+            &sql::actions(sql::OLDEST),
+            params![utc(from), utc(until), ROWS_MAX + 1],
+            ActionRecord::read,
+        )?;
         let audit = self.list(sql::LAST_ENTRY, params![utc(until)], |row| Ok(chain_hash(row.get(0)?, row.get(1)?)))?;
         let audit = audit.into_iter().flatten().next();
         let more = recorded.iter().flat_map(|recorded| [recorded.sv, recorded.pv]);

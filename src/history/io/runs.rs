@@ -1,13 +1,14 @@
 //! Control runs as they are stored.
 
-use std::{ops::Range, time::Duration};
+use std::ops::Range;
 
-use duckdb::{Appender, Row, params};
+use duckdb::params;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    read::{self, check_span, maybe_time, shared},
+    read::check_span,
     store::{Store, instant, utc},
+    stored::Stored,
 };
 use crate::{
     history::{
@@ -15,29 +16,20 @@ use crate::{
         legs::{Position, back, between, clip, end_of_period, joined, time, widened},
         recorded::{Doubled, Leg, micros},
     },
-    plant::{
-        control_run::{ControlRun, Figure, RunCause, RunState, STORED},
-        keyword::Keyword,
-    },
+    plant::control_run::{ControlRun, RunState, STORED},
     report::{
         Gap, batch,
         control_runs::{RUNS_MAX, RunPart},
     },
 };
 
-const COLUMNS: &str =
-    "utc, controller, number, place, state, cause, detail, begin_seen, until_utc, sv_before, sv, pv, unit,
-    decimals, band, settings, settings_changed, at_sv, steady, rise, overshoot, final_offset, iae, kwh, kwh_good, good, epoch";
 /// The last record of each run.
 const LATEST: &str = "rowid IN (SELECT max(rowid) FROM control_run GROUP BY controller, number)";
 /// Runs of a period, what lies in it of those that do not lie in it as a whole, and the span of those that are left out.
 type RunsOfPeriod = (Vec<ControlRun>, Vec<RunPart>, Option<Gap>);
 
-/// A time that is not known.
-const UNKNOWN: f64 = -1.0;
-
 impl Store {
-    /// The runs of a span, of one controller or of all, newest first, at most so many.
+    /// The runs of a span, of one controller or of all, newest first, up to a limit.
     pub(super) fn control_runs(
         &self,
         controller: Option<&str>,
@@ -45,10 +37,11 @@ impl Store {
     ) -> Result<Vec<ControlRun>, HistoryError> {
         check_span(from, to)?;
         let sql = format!(
-            "SELECT {COLUMNS} FROM control_run WHERE {LATEST} AND utc < ? AND until_utc >= ? AND controller = coalesce(?, controller)
-             ORDER BY utc DESC, controller, number DESC LIMIT ?"
+            "SELECT {} FROM control_run WHERE {LATEST} AND utc < ? AND until_utc >= ? AND controller = coalesce(?, controller)
+             ORDER BY utc DESC, controller, number DESC LIMIT ?",
+            ControlRun::columns()
         );
-        self.list(&sql, params![utc(to), utc(from), controller, limit], run)
+        self.list(&sql, params![utc(to), utc(from), controller, limit], ControlRun::read)
     }
 
     /// The runs of a period for its report as they stood at its end, whenever it is made: newest first; of too many the span
@@ -56,11 +49,12 @@ impl Store {
     pub(super) fn control_runs_of(&self, from: Timestamp, until: Timestamp) -> Result<RunsOfPeriod, HistoryError> {
         check_span(from, until)?;
         let sql = format!(
-            "SELECT {COLUMNS} FROM control_run
+            "SELECT {}, epoch FROM control_run
              WHERE rowid IN (SELECT max(rowid) FROM control_run
                 WHERE until_utc <= ?1 OR epoch < ?7 AND until_utc < ?6 GROUP BY controller, number)
              AND utc < ?6 AND (until_utc >= ?2 OR state = ?3 AND until_utc >= ?4)
-             ORDER BY utc DESC, controller, number DESC LIMIT ?5"
+             ORDER BY utc DESC, controller, number DESC LIMIT ?5",
+            ControlRun::columns()
         );
         let doubled = self.doubled()?;
         let period = from.as_microsecond()..until.as_microsecond();
@@ -69,7 +63,7 @@ impl Store {
         let at_work = begin.saturating_sub(SignedDuration::try_from(STORED.1).unwrap_or_default()).unwrap_or(begin);
         let most = RUNS_MAX as u64 + 1;
         let values = params![utc(until), utc(begin), RunState::Running.word(), utc(at_work), most, utc(end), now.0];
-        let mut runs = self.list(&sql, values, dated)?;
+        let mut runs = self.list(&sql, values, ControlRun::read_dated)?;
         let left_out = runs.drain(RUNS_MAX.min(runs.len())..).next().map(|(_, first)| {
             let why = format!("only the latest {RUNS_MAX} control runs are listed");
             Gap { from: from.min(first.from), to: first.until, why }
@@ -135,95 +129,10 @@ impl Store {
     /// The latest run of each controller.
     pub(super) fn latest_runs(&self) -> Result<Vec<ControlRun>, HistoryError> {
         let sql = format!(
-            "SELECT {COLUMNS} FROM control_run WHERE {LATEST}
-             QUALIFY row_number() OVER (PARTITION BY controller ORDER BY number DESC) = 1"
+            "SELECT {} FROM control_run WHERE {LATEST}
+             QUALIFY row_number() OVER (PARTITION BY controller ORDER BY number DESC) = 1",
+            ControlRun::columns()
         );
-        self.list(&sql, &[], run)
+        self.list(&sql, &[], ControlRun::read)
     }
-}
-
-pub(super) fn append_run(to: &mut Appender, run: &ControlRun, epoch: u16) -> duckdb::Result<()> {
-    let (kwh, kwh_good) = run.energy.unzip();
-    let (begin, until) = (utc(run.from), utc(run.until));
-    to.append_row(params![
-        begin,
-        run.controller,
-        run.number,
-        run.place,
-        run.state.word(),
-        run.cause.word(),
-        run.detail,
-        run.seen,
-        until,
-        run.sv_before,
-        run.sv,
-        run.pv,
-        run.unit,
-        run.decimals,
-        run.band,
-        run.settings,
-        run.settings_changed,
-        seconds(run.at_sv),
-        seconds(run.steady),
-        seconds(run.rise),
-        run.overshoot,
-        run.offset,
-        run.iae,
-        kwh,
-        kwh_good,
-        run.good,
-        epoch
-    ])
-}
-
-pub(super) fn seconds(figure: Figure) -> Option<f64> {
-    match figure {
-        Figure::NotYet => None,
-        Figure::After(time) => Some(time.as_secs_f64()),
-        Figure::Unknown => Some(UNKNOWN),
-    }
-}
-
-fn figure(row: &Row, column: usize) -> duckdb::Result<Figure> {
-    Ok(match row.get::<_, Option<f64>>(column)? {
-        None => Figure::NotYet,
-        Some(seconds) => Duration::try_from_secs_f64(seconds).map_or(Figure::Unknown, Figure::After),
-    })
-}
-
-/// With the epoch of the clock that it was stored by.
-fn dated(row: &Row) -> duckdb::Result<(u16, ControlRun)> {
-    Ok((row.get(26)?, run(row)?))
-}
-
-fn run(row: &Row) -> duckdb::Result<ControlRun> {
-    let state: String = row.get(4)?;
-    let cause: String = row.get(5)?;
-    Ok(ControlRun {
-        from: read::time(row)?,
-        controller: shared(row, 1)?,
-        number: row.get(2)?,
-        place: row.get(3)?,
-        state: RunState::from_word(&state).ok_or(duckdb::Error::InvalidQuery)?,
-        cause: RunCause::from_word(&cause).ok_or(duckdb::Error::InvalidQuery)?,
-        detail: shared(row, 6)?,
-        seen: row.get(7)?,
-        until: maybe_time(row, 8)?.ok_or(duckdb::Error::InvalidQuery)?,
-        sv_before: row.get(9)?,
-        sv: row.get(10)?,
-        pv: row.get(11)?,
-        unit: shared(row, 12)?,
-        decimals: row.get(13)?,
-        band: row.get(14)?,
-        settings: shared(row, 15)?,
-        settings_changed: row.get(16)?,
-        at_sv: figure(row, 17)?,
-        steady: figure(row, 18)?,
-        rise: figure(row, 19)?,
-        overshoot: row.get(20)?,
-        offset: row.get(21)?,
-        iae: row.get(22)?,
-        energy: row.get::<_, Option<f64>>(23)?.zip(row.get(24)?),
-        good: row.get(25)?,
-    })
 }

@@ -5,13 +5,15 @@ mod standing;
 
 use std::ops::Range;
 
+use super::stored::Stored;
 use crate::{
     history::tiers::Tier,
     plant::{
         command::{CommandKind, Outcome},
         def::{ParquetVersion, ProcedureId},
+        line_minute::LineMinute,
         procedure,
-        record::NOT_PROCESS_ACTIONS,
+        record::{ActionRecord, AlarmRecord, NOT_PROCESS_ACTIONS},
     },
 };
 
@@ -24,23 +26,6 @@ pub const IMPORTED: u16 = u16::MAX;
 pub const ENTER_IMPORT: &str = "INSERT INTO import VALUES (?, ?, ?, ?, ?)";
 /// What was imported.
 pub const IMPORTS: &str = "SELECT utc, file, from_utc, to_utc, rows FROM import ORDER BY rowid";
-
-/// Columns of an alarm event, in the order that it is read.
-pub const EVENT_COLUMNS: [&str; 13] = [
-    "utc",
-    "subject",
-    "message",
-    "priority",
-    "event",
-    "value",
-    "limit_value",
-    "by_whom",
-    "reason",
-    "until_utc",
-    "first_out_utc",
-    "first_out_rank",
-    "value_rest",
-];
 
 /// Holds the number of migrations done.
 pub const CREATE_VERSION: &str = "CREATE TABLE IF NOT EXISTS schema_version (version UINTEGER NOT NULL)";
@@ -140,12 +125,12 @@ pub const OLDEST: &str = "ORDER BY coalesce(epoch, 0), utc, rowid LIMIT ?";
 
 /// Alarm events in a span, of the epochs of a condition.
 pub fn journal(epochs: &str, order: &str) -> String {
-    format!("SELECT {} FROM alarm_journal WHERE utc >= ? AND utc < ?{epochs} {order}", EVENT_COLUMNS.join(", "))
+    format!("SELECT {} FROM alarm_journal WHERE utc >= ? AND utc < ?{epochs} {order}", AlarmRecord::columns())
 }
 
 /// Of each alarm the last event of every kind (and step) before an instant, as written: all that its state depends on.
 pub fn restore() -> String {
-    let columns = EVENT_COLUMNS.join(", ");
+    let columns = AlarmRecord::columns();
     format!(
         "SELECT {columns} FROM alarm_journal
          WHERE rowid IN (SELECT max(rowid) FROM alarm_journal WHERE utc < $2
@@ -154,20 +139,21 @@ pub fn restore() -> String {
     )
 }
 
-/// Columns of an action, in the order that it is read.
-const ACTION: &str = "utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash";
-
 /// Actions on the plant in a span, without those on users and terminals.
 pub fn actions(order: &str) -> String {
     let others = NOT_PROCESS_ACTIONS.map(|word| format!("'{word}'")).join(", ");
-    format!("SELECT {ACTION} FROM operator_action WHERE utc >= ? AND utc < ? AND action NOT IN ({others}) {order}")
+    format!(
+        "SELECT {} FROM operator_action WHERE utc >= ? AND utc < ? AND action NOT IN ({others}) {order}",
+        ActionRecord::columns()
+    )
 }
 
 /// The corrections of counters in a span that were accepted, oldest first.
 pub fn corrections(epochs: &str) -> String {
     format!(
-        "SELECT utc, by_whom, action, target, old_value, new_value, outcome, from_where, note, number, hash
-        FROM operator_action WHERE action = ? AND outcome = 'verified' AND utc >= ? AND utc < ?{epochs} ORDER BY utc, rowid"
+        "SELECT {} FROM operator_action
+         WHERE action = ? AND outcome = 'verified' AND utc >= ? AND utc < ?{epochs} ORDER BY utc, rowid",
+        ActionRecord::columns()
     )
 }
 
@@ -175,23 +161,28 @@ pub fn corrections(epochs: &str) -> String {
 /// letters are the same. An empty part is in everything.
 pub fn audit() -> String {
     format!(
-        "SELECT {ACTION} FROM operator_action WHERE utc >= $1 AND utc < $2
+        "SELECT {} FROM operator_action WHERE utc >= $1 AND utc < $2
             AND contains(lower(by_whom), lower($4)) AND contains(lower(action), lower($5)) AND contains(lower(concat_ws(' ', by_whom, from_where, action, target, old_value, new_value, outcome, note)),
                 lower($6))
-         ORDER BY utc DESC, rowid DESC LIMIT $3"
+         ORDER BY utc DESC, rowid DESC LIMIT $3",
+        ActionRecord::columns()
     )
 }
 
 /// The latest actions without a chain hash, newest first.
 pub fn unchained(limit: usize) -> String {
-    format!("SELECT {ACTION} FROM operator_action WHERE number IS NULL ORDER BY rowid DESC LIMIT {limit}")
+    format!(
+        "SELECT {} FROM operator_action WHERE number IS NULL ORDER BY rowid DESC LIMIT {limit}",
+        ActionRecord::columns()
+    )
 }
 
 /// The last record of a procedure: its start, what is written before its end, or its end; a refused start is none.
 pub fn latest_procedure() -> String {
     format!(
-        "SELECT {ACTION} FROM operator_action WHERE (action = '{}' AND outcome IN ('{}', '{}')) OR action IN ('{}', '{}')
+        "SELECT {} FROM operator_action WHERE (action = '{}' AND outcome IN ('{}', '{}')) OR action IN ('{}', '{}')
          ORDER BY rowid DESC LIMIT 1",
+        ActionRecord::columns(),
         procedure::START,
         CommandKind::StartProcedure(ProcedureId(0)).label(),
         // So it was called before.
@@ -206,10 +197,13 @@ pub const LAST_ENTRY: &str = "SELECT number, hash FROM operator_action WHERE utc
     ORDER BY number DESC LIMIT 1";
 
 /// Minutes of a line in a span, oldest first; of more than the limit the latest.
-pub const LINE_MINUTES: &str = "SELECT * FROM (
-    SELECT utc, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, sent_bytes, received_bytes,
-        utilisation, reply_p99_ms, reply_max_ms
-    FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4 ORDER BY utc DESC LIMIT $3) ORDER BY utc";
+pub fn line_minutes() -> String {
+    format!(
+        "SELECT * FROM (SELECT {} FROM line_minute WHERE utc >= $1 AND utc < $2 AND line = $4
+         ORDER BY utc DESC LIMIT $3) ORDER BY utc",
+        LineMinute::columns()
+    )
+}
 
 /// How files of the archive are written. Of aggregates, which lie by tag, a trend needs few rows: smaller groups, and with
 /// snappy it takes 0.6 of the time of zstd, for minutes in 14 to 31 % more room, by their values (measured).
@@ -366,7 +360,9 @@ pub fn count_samples(span: &Range<i64>) -> String {
     count_rows_of("sample", span)
 }
 
-/// Rows of aggregates in a span.
-pub fn aggregates(files: &str, tags: &str, rests: bool) -> String {
-    format!("SELECT {} FROM {files} WHERE utc >= $1 AND utc < $2{tags}", columns(Tier::Minute, rests))
+/// Rows of aggregates in a span; what they are not wanted for is not read: nothing stands in its place.
+pub fn aggregates(files: &str, tags: &str, rests: bool, whole: bool) -> String {
+    let columns = columns(Tier::Minute, rests);
+    let nothing = if whole { "" } else { " REPLACE (0.0::DOUBLE AS first, 0.0::DOUBLE AS gain, 0::UINTEGER AS n)" };
+    format!("SELECT *{nothing} FROM (SELECT {columns} FROM {files} WHERE utc >= $1 AND utc < $2{tags})")
 }

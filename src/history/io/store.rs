@@ -9,7 +9,7 @@ use std::{
 };
 
 use duckdb::{
-    Appender, Connection, ToSql, params,
+    Appender, Connection, appender_params_from_iter, params,
     types::{TimeUnit, Value},
 };
 use jiff::Timestamp;
@@ -20,20 +20,16 @@ use super::{
     interrupt::{Interrupt, Open},
     last::{self, LastCommit},
     recorded::{Recording, recorded_at},
-    reports::append_report,
     room,
-    runs::append_run,
     samples::PIECE,
     sql,
+    stored::Stored,
 };
 use crate::{
     history::{HistoryError, recorded::recorded, tiers::in_milliseconds},
     plant::{
-        batch::BatchRecord,
         def::PlantDef,
-        exact::Exact,
-        line_minute::LineMinute,
-        record::{ActionRecord, AlarmRecord, Record},
+        record::Record,
         sample::{Cause, Quality, Sample},
     },
 };
@@ -290,19 +286,26 @@ impl Store {
         })
     }
 
-    /// Appends rows to a table; where there are none, nothing is done.
+    /// Appends rows to columns of a table; where there are none, nothing is done.
     fn append_rows<T>(
         &self,
-        table: &str,
+        (table, columns): (&str, &[&str]),
         rows: Vec<T>,
         mut append: impl FnMut(&mut Appender, T) -> duckdb::Result<()>,
     ) -> duckdb::Result<()> {
         if rows.is_empty() {
             return Ok(());
         }
-        let mut appender = self.db.appender(table)?;
+        let mut appender = self.db.appender_with_columns(table, columns)?;
         rows.into_iter().try_for_each(|row| append(&mut appender, row))?;
         appender.flush()
+    }
+
+    fn append_records<T: Stored>(&self, records: Vec<&T>, epoch: u16) -> duckdb::Result<()> {
+        let columns = [T::COLUMNS, &["epoch"]].concat();
+        self.append_rows((T::TABLE, &columns), records, |to, record| {
+            to.append_row(appender_params_from_iter(record.write().into_iter().chain([epoch.into()])))
+        })
     }
 
     /// Appends records of one epoch.
@@ -316,62 +319,27 @@ impl Store {
                 Record::Action(action) => actions.push(action),
                 Record::Line(minute) => lines.push(minute),
                 Record::Batch(batch) => batches.push(batch),
-                Record::Run(run) => runs.push(run),
+                Record::Run(run) => runs.push(&**run),
                 Record::Report(report) => reports.push(report),
                 Record::ClockSet => {}
             }
         }
-        self.append_rows("sample", samples, |to, (id, &Sample { at, value, rest, quality })| {
+        let columns = ["utc", "tag", "value", "quality", "epoch", "rest"];
+        self.append_rows(("sample", &columns), samples, |to, (id, &Sample { at, value, rest, quality })| {
             to.append_row((utc(in_milliseconds(at)), id, value, quality.code(), epoch, rest))
         })?;
-        self.append_rows("alarm_journal", alarms, |to, alarm| append_alarm(to, alarm, epoch))?;
+        self.append_records(alarms, epoch)?;
         self.remove_unsealed(&mut actions)?;
-        self.append_rows("operator_action", actions, |to, action| append_action(to, action, epoch))?;
-        self.append_rows("line_minute", lines, |to, minute| append_line(to, minute, epoch))?;
-        self.append_rows("batch", batches, |to, BatchRecord { at, batch, number, place, event, phase }| {
-            to.append_row(params![utc(*at), batch, number, place, event.word(), phase, epoch])
-        })?;
-        self.append_rows("control_run", runs, |to, run| append_run(to, run, epoch))?;
-        self.append_rows("report", reports, |to, report| append_report(to, report, epoch))
+        self.append_records(actions, epoch)?;
+        self.append_records(lines, epoch)?;
+        self.append_records(batches, epoch)?;
+        self.append_records(runs, epoch)?;
+        self.append_records(reports, epoch)
     }
-}
-
-fn append_alarm(to: &mut Appender, alarm: &AlarmRecord, epoch: u16) -> duckdb::Result<()> {
-    let AlarmRecord { at, subject, message, priority, event, value, limit, by, reason, until, first_out, .. } = alarm;
-    let (at, priority, event, until) = (utc(*at), priority.number(), event.word(), until.map(utc));
-    let (began, rank) = first_out.map(|first_out| (utc(first_out.began), first_out.rank)).unzip();
-    let (value, rest) = (value.map(Exact::near), value.and_then(Exact::rest));
-    to.append_row(params![
-        at, subject, message, priority, event, value, limit, by, reason, until, began, rank, epoch, rest
-    ])
-}
-
-fn append_action(to: &mut Appender, action: &ActionRecord, epoch: u16) -> duckdb::Result<()> {
-    let ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash } = action;
-    let (number, hash) = chain_hash.map(|chain_hash| (chain_hash.number, chain_hash.hash.to_vec())).unzip();
-    let at = utc(*at);
-    to.append_row(params![at, by, action, target, old, new, outcome, from, note, number, hash, epoch])
-}
-
-fn append_line(to: &mut Appender, minute: &LineMinute, epoch: u16) -> duckdb::Result<()> {
-    let LineMinute { at, line, requests, ok, timeouts, corrupt, exceptions, retries, late, missed, .. } = minute;
-    let LineMinute { sent_bytes, received_bytes, utilisation, reply_p99_ms, reply_max_ms, .. } = minute;
-    let counts = [requests, ok, timeouts, corrupt, exceptions, retries, late, missed, sent_bytes, received_bytes];
-    let counts = counts.map(|count| small(*count));
-    let at = utc(*at);
-    let mut row: Vec<&dyn ToSql> = vec![&at, line];
-    row.extend(counts.iter().map(|count| count as &dyn ToSql));
-    row.extend([utilisation as &dyn ToSql, reply_p99_ms, reply_max_ms, &epoch]);
-    to.append_row(&*row)
 }
 
 fn is_clock_set(record: &Record) -> bool {
     matches!(record, Record::ClockSet)
-}
-
-/// A count as the column holds it; more than four thousand million in a minute is no count.
-fn small(count: u64) -> u32 {
-    count.try_into().unwrap_or(u32::MAX)
 }
 
 /// An instant as SQL has it: microseconds UTC.

@@ -25,8 +25,8 @@ use duckdb::{Connection, params};
 use super::{
     archive::{any_rests, paths, quoted, table},
     interrupt::{Interrupt, Open},
-    runs::seconds,
     store::{engine, utc},
+    stored::seconds,
 };
 use crate::{
     history::{ArchiveFile, HistoryError, Overview, Unarchived, tiers::Tier},
@@ -289,7 +289,7 @@ impl Tables {
         Ok(format!("SELECT {} FROM ({select}\n) AS r({})", values.join(", "), names.join(", ")))
     }
 
-    /// The names of the columns and at most so many rows of a SELECT.
+    /// The names of the columns and at most this many rows of a SELECT.
     pub fn rows(&self, sql: &str, limit: usize) -> Result<(Vec<String>, Vec<Row>), HistoryError> {
         // A screen shows no more of a value.
         let select = self.select(sql)?;

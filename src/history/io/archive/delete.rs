@@ -43,6 +43,11 @@ impl Store {
         Ok(until.and_then(instant))
     }
 
+    /// Are samples of an instant not kept any more?
+    pub(in crate::history::io) fn is_deleted(&self, at: i64) -> Result<bool, HistoryError> {
+        Ok(self.deleted_until(Tier::Raw)?.is_some_and(|until| at < until.as_microsecond()))
+    }
+
     /// Where samples are not kept any more, and what is.
     pub(in crate::history::io) fn coarse(
         &self,

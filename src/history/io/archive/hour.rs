@@ -29,7 +29,7 @@ impl Store {
     /// deleted meanwhile, what was formed of them stays, and only what it lacks is added.
     pub(super) fn archive_hour(&self, hour: i64) -> Result<(), HistoryError> {
         let span = hour..hour + HOUR;
-        let deleted = self.deleted_until(Tier::Raw)?.is_some_and(|until| hour < until.as_microsecond());
+        let deleted = self.is_deleted(hour)?;
         let replace = if deleted { sql::added } else { sql::others };
         let rests = self.any_rests(Tier::Raw, &span)?;
         let samples = sql::samples_of(&span, rests);

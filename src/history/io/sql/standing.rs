@@ -1,7 +1,9 @@
 //! How alarms stood at an instant, by the events of the journal. `before` is the condition for what was stored until then.
 
-use super::EVENT_COLUMNS;
-use crate::plant::record::AlarmEvent;
+use crate::{
+    history::io::stored::Stored,
+    plant::record::{AlarmEvent, AlarmRecord},
+};
 
 /// The raising events of the alarms that were active at an instant, also of those that were suppressed.
 pub fn active_at(before: &str) -> String {
@@ -16,7 +18,7 @@ pub fn standing_at(before: &str) -> String {
 
 /// The alarms whose latest event before an instant is one of these. Events that raise or end an alarm count, and `others`.
 fn raised_at(before: &str, others: impl Fn(AlarmEvent) -> bool, is: impl Fn(AlarmEvent) -> bool) -> String {
-    let columns = EVENT_COLUMNS.join(", ");
+    let columns = AlarmRecord::columns();
     let (counts, is) = (words(|event| event.active().is_some() || others(event)), words(is));
     format!(
         "SELECT {columns} FROM (
@@ -28,7 +30,7 @@ fn raised_at(before: &str, others: impl Fn(AlarmEvent) -> bool, is: impl Fn(Alar
 
 /// The events that suppressed an alarm at an instant, each for itself.
 pub fn suppressing_at(before: &str) -> String {
-    let columns = EVENT_COLUMNS.join(", ");
+    let columns = AlarmRecord::columns();
     let pair = |event: AlarmEvent| Some(format!("('{}', '{}')", event.word(), event.ended_by()?.word()));
     let pairs: Vec<String> = AlarmEvent::ALL.into_iter().filter_map(pair).collect();
     let (pairs, removed) = (pairs.join(", "), AlarmEvent::Removed.word());

@@ -7,9 +7,11 @@ use super::{
     *,
 };
 use crate::{
+    history::tiers::Tier,
     plant::{
         batch::{BatchEvent, BatchRecord},
         control_run::{ControlRun, RunState},
+        history_def::HistoryDef,
     },
     report::ShiftReport,
 };
@@ -84,5 +86,29 @@ fn batches_and_runs_are_right_where_the_clock_was_set_back() {
                 assert!(energy == kwh && near(lasted, lasts), "{what}, {name} cut at {edge}: {parts:?}");
             }
         }
+    }
+}
+
+#[test]
+fn a_doubled_hour_is_counted_where_its_samples_are_deleted() {
+    let rule = HistoryDef { keep_samples_days: Some(7), ..HistoryDef::default() };
+    let def = Arc::new(PlantDef { history: rule, ..PlantDef::clone(&making()) });
+    for (begin, end) in [(-40, 15), (-90, 30), (20, 90)] {
+        let (_folder, db) = folder();
+        drop(station(&db, SET + begin, SET + end));
+        let store = Store::open(&db, &def, sec(0)).unwrap().store;
+        archive_all(&store, 60);
+        let before = report(&store, 27 * HOUR_S, 40 * HOUR_S);
+        archive_all(&store, 20 * 24);
+        assert_eq!(store.deleted_until(Tier::Raw).unwrap(), Some(sec(48 * HOUR_S)));
+        let after = report(&store, 27 * HOUR_S, 40 * HOUR_S);
+        // The whole is as it was; nothing is taken for what a counter did.
+        assert_eq!((&after.tags, &after.counters), (&before.tags, &before.counters), "{begin} to {end}");
+        let [(kwh, lasted), run] = within(&after);
+        let [(all_kwh, all_lasted), all_of_run] = within(&before);
+        assert_eq!((lasted, run), (all_lasted, all_of_run));
+        // What lies in that time cannot be told apart: the batch has what is known of it, never more, and says so.
+        let share = after.batches[0].energy.map_or(0.0, |(_, share)| share);
+        assert!(kwh <= all_kwh && share < 0.5, "{begin} to {end}: {kwh} of {all_kwh} kWh, known {share}");
     }
 }

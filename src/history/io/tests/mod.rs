@@ -231,7 +231,7 @@ fn a_commit_that_fails_leaves_nothing_behind() {
     store.append(&records[..2]).unwrap();
 }
 
-/// A minute of a line that ends `at`, with so many requests.
+/// A minute of a line that ends `at`, with this many requests.
 fn minute(line: &str, at: i64, requests: u64) -> LineMinute {
     LineMinute {
         at: sec(at),
