@@ -10,7 +10,7 @@ use crate::plant::role::AccessDef;
 const DELAY_MAX: Duration = Duration::from_secs(16);
 /// Keys that are remembered; those that were quiet longest are forgotten first.
 const KEYS_MAX: usize = 1024;
-/// One user of the operating system has so many times the attempts of one name for all names together.
+/// One user of the operating system has this many times the attempts of one name for all names together.
 const NAMES: u32 = 8;
 
 /// What wrong passwords are counted by.

@@ -9,13 +9,13 @@ use crate::access::RateLimit;
 pub const TERMINALS_MAX: usize = 64;
 /// Terminals of one user at once, except root and the user who runs the station.
 const TERMINALS_OF_USER_MAX: usize = TERMINALS_MAX / 2;
-/// So many are kept for these two, and for the users that the plant file trusts.
+/// This many are kept for these two, and for the users that the plant file trusts.
 const TERMINALS_KEPT: usize = 4;
 /// Connections of one user that have not completed the handshake; one more, and the oldest of them is dropped.
 pub const STRANGERS_MAX: usize = 8;
 /// The same of all users: the oldest one of the user with the most is dropped.
 const STRANGERS_OF_ALL_MAX: usize = 64;
-/// Terminals of one user that may attach: so many at once, and one more each time.
+/// Terminals of one user that may attach: this many at once, and one more each time.
 const ATTACHES: RateLimit = RateLimit::new(ATTACHES_BURST, Duration::from_millis(125));
 const ATTACHES_BURST: u32 = 128;
 /// Lines about one user in the log.

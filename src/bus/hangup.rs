@@ -9,7 +9,7 @@
 
 use super::plan::Block;
 
-/// So many connections in a row that end without any answer are no fault of a request.
+/// This many connections in a row that end without any answer are no fault of a request.
 const BARREN_MAX: u32 = 3;
 /// Connections that end after the same few answers show that the other side allows no more on one …
 const USED_UP_AFTER: u32 = 3;
@@ -34,16 +34,16 @@ pub struct Hangups {
     barren: u32,
     /// Were under way when a connection ended, and have not been answered since.
     suspects: Vec<Block>,
-    /// So many requests were under way together when one ended on them.
+    /// How many requests were under way together when one ended on them.
     together: usize,
-    /// In a row, after so many answers each.
+    /// In a row, with the number of answers before each.
     alike: (u64, u32),
     /// Connections since one was kept.
     used_up: u32,
 }
 
 impl Hangups {
-    /// A connection has ended with these requests under way, after so many answers on it.
+    /// A connection has ended with these requests under way, and this number of answers before.
     pub fn on_end(&mut self, under_way: &[Block], answers: u64) -> Hangup {
         self.barren = if 0 < answers { 0 } else { self.barren.saturating_add(1) };
         self.alike = match self.alike {
@@ -69,7 +69,7 @@ impl Hangups {
         Hangup { guilty, is_quiet: self.barren < BARREN_MAX }
     }
 
-    /// A block was answered. If with it all are cleared that were under way together, it was so many that were too much at once.
+    /// A block was answered. If with it all are cleared that were under way together, it was their number that was too much.
     pub fn answered(&mut self, block: &Block) -> Option<usize> {
         if self.suspects.is_empty() {
             return None;
@@ -112,7 +112,7 @@ impl Hangups {
         (USED_UP_AFTER <= count && (1..=FEW).contains(&answers)).then_some(answers)
     }
 
-    /// Is a connection used up after so many answers? The next one is opened before a request is lost on this one.
+    /// Is a connection used up after this number of answers? The next one is opened before a request is lost on this one.
     pub fn is_used_up(&mut self, answers: u64) -> bool {
         if self.answers_max().is_none_or(|most| answers < most) {
             return false;

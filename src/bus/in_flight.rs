@@ -6,7 +6,7 @@ use crate::plant::line_finding::DeviceFinding;
 
 /// Requests after which their fate is looked at …
 const WINDOW: u32 = 40;
-/// … and what share of them, one in so many, may be lost as frames are.
+/// … and what share of them, one in this many, may be lost as frames are.
 const LOST_SHARE: u32 = 10;
 
 /// What was learned of the units of a line.
@@ -63,7 +63,7 @@ impl InFlight {
         self.units.remove(&unit);
     }
 
-    /// So many under way were too much.
+    /// How many under way were too many.
     pub fn step_down(&mut self, unit: u8, together: u16) -> u16 {
         let queue = self.units.entry(unit).or_default();
         let most = (queue.most.unwrap_or(together).min(together) / 2).max(1);

@@ -109,7 +109,7 @@ impl LineStats {
         (self.devices, self.seen) = (devices, seen);
     }
 
-    /// A request for a poll has ended after so many tries; `index` is `None` if the plan has changed meanwhile.
+    /// A request for a poll has ended after `tries`; `index` is `None` if the plan has changed meanwhile.
     pub fn polled(
         &mut self,
         index: Option<usize>,

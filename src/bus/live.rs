@@ -14,7 +14,7 @@ use crate::plant::{
     tag::Table,
 };
 
-/// A table of which so many addresses were refused, and none was read, is asked for no more addresses.
+/// A table of which this many addresses were refused, and none was read, is asked for no more addresses.
 const BARREN: usize = 8;
 
 /// A live read at work.
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
     use crate::plant::id::LineId;
 
-    /// A unit that has these holding registers and gives so many at once; counts its requests.
+    /// A unit that has these holding registers and gives a limited number at once; counts its requests.
     fn serve(known: &mut UnreadableRanges, spans: &[(u16, u16)], has: impl Fn(u16) -> bool, most: u16) -> LiveReading {
         let span =
             |(address, count): &(u16, u16)| AddressSpan { table: Table::Holding, address: *address, count: *count };

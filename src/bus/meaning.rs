@@ -207,7 +207,7 @@ mod tests {
 
     const L1: LineId = LineId(0);
 
-    /// The tank of the thesis, whose controller has said so many decimals.
+    /// The tank of the thesis, whose controller has said this many decimals.
     fn tank(decimals: Option<f64>) -> Snapshot {
         let def = profile::load(Path::new("tank"), &Search::shipped()).expect("a shipped plant");
         let at = Timestamp::UNIX_EPOCH;

@@ -9,11 +9,11 @@ use std::{collections::BTreeMap, time::Duration};
 
 use crate::plant::line_finding::DeviceFinding;
 
-/// So many requests in a row that came soon after an answer must be lost, as no line loses them by chance …
+/// This many requests in a row that came soon after an answer must be lost, as no line loses them by chance …
 const LOST_MIN: u32 = 8;
-/// … or, where a gap is kept already, so many …
+/// … or, where a gap is kept already, this many …
 const LOST_AGAIN_MIN: u32 = 4;
-/// … and so many that came later be answered.
+/// … and this many that came later be answered.
 const HEARD_MIN: u32 = 3;
 /// The shortest gap that is tried, and the longest: what is lost after that is lost for other reasons, and so was what was lost before.
 const GAP_MIN: Duration = Duration::from_millis(10);

@@ -21,7 +21,7 @@ pub struct Args {
     /// For screen readers and logs: plain lines instead of screens, one for each change, until the end of input or Ctrl-C
     #[arg(long)]
     plain: bool,
-    /// With --plain: a value is written at most once in so many seconds; a change of its quality at once
+    /// With --plain: a value is written at most once in this many seconds; a change of its quality at once
     #[arg(long, value_name = "SECONDS", default_value_t = 10, requires = "plain", value_parser = clap::value_parser!(u16).range(1..=3600))]
     every: u16,
     #[command(flatten)]

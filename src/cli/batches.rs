@@ -16,7 +16,7 @@ use super::{
 pub struct Args {
     #[command(flatten)]
     list: ListArgs,
-    /// The latest so many; more than 100 at once have no figures
+    /// Only the latest N; more than 100 at once have no figures
     #[arg(long, value_name = "NUMBER", default_value_t = 20)]
     limit: usize,
 }

@@ -36,7 +36,7 @@ pub struct Args {
     /// The plant to simulate
     #[arg(default_value = "tank")]
     plant: String,
-    /// Run the plant, its line and its clock so many times faster
+    /// Run the plant, its line and its clock this many times faster
     #[arg(long, value_name = "N", default_value = "1", value_parser = speed)]
     speed: f64,
     /// Begin with a tour: eight small tasks

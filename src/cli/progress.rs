@@ -24,12 +24,12 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Of so many rows or bytes.
+    /// Of this many rows or bytes.
     pub fn new(total: u64) -> Progress {
         Progress { total, terminal: stderr().is_terminal(), next: Instant::now() + SILENT, shown: false }
     }
 
-    /// So many are done.
+    /// This many are done.
     pub fn show(&mut self, done: u64) {
         let now = Instant::now();
         if now < self.next {

@@ -33,7 +33,7 @@ pub struct Args {
     /// Only the runs of this controller
     #[arg(long, value_name = "DEVICE")]
     controller: Option<String>,
-    /// The latest so many
+    /// Only the latest N
     #[arg(long, value_name = "NUMBER", default_value_t = 100)]
     limit: usize,
 }

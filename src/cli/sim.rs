@@ -28,7 +28,7 @@ pub struct Args {
     /// Make a symbolic link to the pseudo-terminal, so that its name stays the same
     #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
     link: Option<PathBuf>,
-    /// Run the plant and its line so many times faster
+    /// Run the plant and its line this many times faster
     #[arg(long, value_name = "N", default_value = "1", value_parser = speed)]
     speed: f64,
     /// File of the log

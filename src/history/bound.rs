@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::QUERY_TIME_MAX;
 
-/// Of so many rows, behind a period of so many seconds where that can be said.
+/// Of this many rows, behind a period of this many seconds where that can be said.
 pub(super) fn too_many_rows(rows: u64, max: u64, asked: Option<u64>) -> String {
     let most = format!("at most {max} rows and, at a station, {} s", QUERY_TIME_MAX.as_secs());
     match asked {

@@ -65,7 +65,7 @@ pub enum Query {
         from: Timestamp,
         /// To.
         to: Timestamp,
-        /// At most so many.
+        /// The most to return.
         limit: usize,
     },
     /// Operator actions, newest first.
@@ -74,7 +74,7 @@ pub enum Query {
         from: Timestamp,
         /// To.
         to: Timestamp,
-        /// At most so many.
+        /// The most to return.
         limit: usize,
     },
     /// All actions with a search, for Supervisors; answered by [`Answer::Actions`].
@@ -89,7 +89,7 @@ pub enum Query {
         by: String,
         /// Part of the action; empty for all.
         action: String,
-        /// At most so many.
+        /// The most to return.
         limit: usize,
     },
     /// What a line counted, minute by minute, oldest first.
@@ -100,7 +100,7 @@ pub enum Query {
         from: Timestamp,
         /// To.
         to: Timestamp,
-        /// At most so many, the latest.
+        /// The most to return, the latest.
         limit: usize,
     },
     /// The report of a period.
@@ -132,7 +132,7 @@ pub enum Query {
         from: Timestamp,
         /// To.
         to: Timestamp,
-        /// At most so many.
+        /// The most to return.
         limit: usize,
     },
     /// The control runs in a span, newest first.
@@ -143,7 +143,7 @@ pub enum Query {
         from: Timestamp,
         /// To.
         to: Timestamp,
-        /// At most so many.
+        /// The most to return.
         limit: usize,
     },
     /// When the first value of some tags was stored in a span, or the latest.
@@ -159,7 +159,7 @@ pub enum Query {
     },
     /// The automatic reports on record, the newest period first.
     Reports {
-        /// At most so many.
+        /// The most to return.
         limit: usize,
     },
     /// The plant as it was at an instant.

@@ -34,7 +34,7 @@ impl Disk {
 /// Why a file is deleted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Why {
-    /// It is kept for so many days.
+    /// How many days it is kept.
     Age(u32),
     /// The history has more than its share of the disk.
     Share,

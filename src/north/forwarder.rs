@@ -31,7 +31,7 @@ const OVERLAP: Duration = Duration::from_secs(10);
 const SPAN: Duration = Duration::from_secs(60);
 const SPAN_MAX: Duration = Duration::from_secs(24 * 3_600);
 const SPAN_MIN: Duration = Duration::from_millis(1);
-/// A clock that is behind the cursor so many looks without a new epoch is that of another history.
+/// A clock that is behind the cursor this many looks without a new epoch is that of another history.
 const WAITS_MAX: u32 = 30;
 /// Fewer samples in a window make the next one longer.
 const FEW: usize = 5_000;

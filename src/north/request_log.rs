@@ -13,7 +13,7 @@ use crate::plant::{
     exact::Exact,
 };
 
-/// So many of the latest are kept after they have expired.
+/// This many of the latest are kept after they have expired.
 const KEPT: usize = 100;
 /// Entries at most. The rate of requests and the time within which they expire keep it below.
 const ENTRIES_MAX: usize = 1_000;

@@ -31,7 +31,7 @@ pub enum DataType {
     Bcd16,
     /// Eight decimal digits.
     Bcd32,
-    /// So many bytes of text, two a register. It has no number: see [`super::snapshot::Snapshot::text`].
+    /// This many bytes of text, two a register. It has no number: see [`super::snapshot::Snapshot::text`].
     Text(u8),
 }
 

@@ -12,13 +12,13 @@ pub const ASSUMED: Duration = Duration::from_millis(20);
 const MARGIN: u32 = 4;
 /// … and not less than this: timers and schedulers of computers are no finer.
 const MARGIN_MIN: Duration = Duration::from_millis(2);
-/// So many of the latest responses show whether a device keeps to what its profile states: one or two minutes of usual polls.
+/// This many of the latest responses show whether a device keeps to what its profile states: one or two minutes of usual polls.
 const LATEST: usize = 256;
 /// Fewer than these say nothing: an adapter may need some time at the start.
 const LATEST_MIN: usize = 32;
 /// Fewer slow responses than these are pauses of an adapter, a gateway or this computer …
 const SLOW_MIN: usize = 3;
-/// … and so are those that are not more than one of so many.
+/// … and so are those that are not more than one of this many.
 const SLOW_OF: usize = 100;
 
 /// Where a worst case has the time of the device from.

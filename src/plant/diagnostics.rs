@@ -39,7 +39,7 @@ const SERIALS_MAX: usize = 64;
 pub enum Diagnostic {
     /// Sends these bytes as they are, check included, and receives whatever comes back.
     Send(Vec<u8>),
-    /// Diagnostics 08/00, return query data, so many times.
+    /// Diagnostics 08/00, return query data, this many times.
     Loopback {
         /// Who is asked.
         unit: u8,

@@ -47,7 +47,7 @@ pub fn check(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, Strin
     }
 }
 
-/// Has a number so many decimals at most as its tag?
+/// Has a number this many decimals at most as its tag?
 pub fn check_decimals(written: usize, of_tag: u8) -> Result<(), String> {
     match of_tag {
         most if written <= usize::from(most) => Ok(()),

@@ -71,7 +71,7 @@ pub enum DeviceFinding {
 pub enum LineFinding {
     /// About a device.
     Device(DeviceId, DeviceFinding),
-    /// The other side ends each connection after so many answers.
+    /// The other side ends each connection after this many answers.
     AnswersPerConnection(u64),
     /// The other side does not answer for so long after it was connected.
     DeafAfterConnect(Duration),

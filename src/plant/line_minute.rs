@@ -143,7 +143,7 @@ mod tests {
         Timestamp::from_second(second).expect("a small number")
     }
 
-    /// So many good answers in `reply_ms`, so many timeouts.
+    /// This many good answers in `reply_ms`, this many timeouts.
     fn report(good: u64, reply_ms: u64, timeouts: u64) -> LineReport {
         let mut stats = RequestStats::default();
         for _ in 0..good {

@@ -157,7 +157,7 @@ pub struct PollReport {
     pub cost: Duration,
     /// What happens to it when the line has too much to do.
     pub class: PollClass,
-    /// Its period is stretched to so many now; 1 is not at all.
+    /// Its period is stretched to this many now; 1 is not at all.
     pub factor: f32,
     /// It is left out now, because the line has too much to do.
     pub shed: bool,

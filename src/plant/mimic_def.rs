@@ -42,7 +42,7 @@ impl Picture {
 }
 
 impl MimicPage {
-    /// The largest picture that fits into so many columns and rows; the smallest where none does.
+    /// The largest picture that fits into this many columns and rows; the smallest where none does.
     pub fn picture(&self, room: (u16, u16)) -> &Picture {
         let fits = |picture: &&Picture| picture.size.0 <= room.0 && picture.size.1 <= room.1;
         self.pictures.iter().rev().find(fits).or(self.pictures.first()).unwrap_or(Picture::empty())

@@ -71,18 +71,18 @@ pub enum Reason {
     },
     /// Too many of the latest requests failed.
     Failing {
-        /// So many.
+        /// How many.
         failed: u32,
-        /// Of so many.
+        /// Out of how many.
         of: u32,
     },
     /// It answers, and none of its latest answers held a value.
     NoValues,
     /// Corrupt or repeated requests.
     Corrupt {
-        /// So many.
+        /// How many.
         corrupt: u64,
-        /// Of so many.
+        /// Out of how many.
         of: u64,
     },
     /// Answers to requests that had been given up.
@@ -161,7 +161,7 @@ const REQUESTS_MIN: u64 = 20;
 const SLOW_PERCENT: u32 = 80;
 /// Share of the recent requests that may fail, in hundredths.
 const FAILING_PERCENT: u32 = 10;
-/// After so many failures in a row a device is of no use, whatever it answers.
+/// After this many failures in a row a device is of no use, whatever it answers.
 pub const NO_VALUES_AFTER: u32 = 12;
 /// Share of requests that may be corrupt or repeated, in hundredths.
 const CORRUPT_PERCENT: u64 = 1;

@@ -80,7 +80,7 @@ pub(crate) fn to_f32(number: f64) -> f32 {
 /// Most digits that an `f64` gives back of a decimal number.
 const DIGITS: usize = 15;
 
-/// The digits of a number that are known, with so many decimals at most; of one that is so large or small that most of them
+/// The digits of a number that are known, with this many decimals at most; of one that is so large or small that most of them
 /// say nothing, those that do and its exponent. What rounds to nothing has no sign.
 pub(crate) fn digits(number: impl Into<Exact>, decimals: Option<u8>) -> String {
     let exact = number.into();

@@ -21,7 +21,7 @@ use super::{
 };
 use crate::plant::time::elapsed;
 
-/// A value is uncertain after so many poll periods without an answer, and bad after [`PERIODS_BAD`].
+/// A value is uncertain after this many poll periods without an answer, and bad after [`PERIODS_BAD`].
 pub const PERIODS_UNCERTAIN: u32 = 3;
 /// See [`PERIODS_UNCERTAIN`].
 pub const PERIODS_BAD: u32 = 10;

@@ -27,7 +27,7 @@ impl RawNumber {
 }
 
 impl DataType {
-    /// Lowest and highest raw number, of a whole value or of a field of so many bits. A field of a signed type is signed,
+    /// Lowest and highest raw number, of a whole value or of a field of this many bits. A field of a signed type is signed,
     /// a single bit of it is not.
     pub fn raw_range(self, field: Option<u8>) -> Option<(i128, i128)> {
         match field {
@@ -37,7 +37,7 @@ impl DataType {
         }
     }
 
-    /// Has a field of so many bits a sign?
+    /// Has a field of this many bits a sign?
     pub fn is_signed_field(self, bits: u8) -> bool {
         self.encoding() == Encoding::Signed && 1 < bits
     }

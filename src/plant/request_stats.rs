@@ -108,7 +108,7 @@ impl RequestStats {
         }
     }
 
-    /// Have the latest requests failed, so many of them?
+    /// Have the latest requests failed, this many of them?
     pub fn fails_since(&self, count: u32) -> bool {
         u64::from(count) <= self.requests && count <= self.recent.trailing_ones()
     }

@@ -316,7 +316,7 @@ impl Table {
 /// Decimals of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Decimals {
-    /// Always so many; they do not scale.
+    /// Always this many; they do not scale.
     Fixed(u8),
     /// Another tag says how many decimals the raw number has: it scales by 10^-n and shows n.
     From(TagId),

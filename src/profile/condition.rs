@@ -35,7 +35,7 @@ toml_tables! {
         opt "over" over: Duration,
         opt "no_change" no_change: Duration,
         opt "no_update" no_update: Duration,
-        /// So many changes `within` a time.
+        /// This many changes `within` a time.
         opt "changes" changes: u32,
         opt "within" within: Duration,
         opt "line" line: String,

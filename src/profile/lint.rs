@@ -12,7 +12,7 @@ use super::{
 };
 use crate::plant::{def::Priority, tag::TagDef};
 
-/// From so many alarms up their split by priority says something.
+/// From this many alarms up their split by priority says something.
 const SPLIT_MIN: usize = 20;
 /// Most alarms of high and critical priority, percent. The target for those that are raised is 5; a file may have more of
 /// them, because what is urgent should come seldom.

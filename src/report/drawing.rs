@@ -85,7 +85,7 @@ pub struct Look {
     pub italic: bool,
     /// Underlined.
     pub underlined: bool,
-    /// Its letters fill so many columns, whatever the font of the viewer; `None`: as wide as they are.
+    /// Its letters fill this many columns, whatever the font of the viewer; `None`: as wide as they are.
     pub columns: Option<u16>,
 }
 

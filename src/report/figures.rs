@@ -65,7 +65,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Over so many seconds; nothing has come yet.
+    /// Over this many seconds; nothing has come yet.
     pub fn new(seconds: f64) -> Figures {
         Figures { seconds, first: None, stats: None }
     }

@@ -103,7 +103,7 @@ impl Rig {
         rig
     }
 
-    /// At rest, with so many litres in TK-1 already.
+    /// At rest, with this many litres in TK-1 already.
     pub fn filled(control_l: f64) -> Rig {
         let (pxr, plc) = (Slave::new(Pxr::new(AMBIENT_C)), Slave::new(Dl06::new()));
         Rig {
@@ -118,7 +118,7 @@ impl Rig {
         }
     }
 
-    /// The same with a controller that shows so many decimals.
+    /// The same with a controller that shows this many decimals.
     pub fn with_decimals(mut self, decimals: u8) -> Rig {
         self.pxr.device.start_with_decimals(decimals);
         self

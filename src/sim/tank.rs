@@ -260,7 +260,7 @@ fn share(dt_s: f64, lag_s: f64) -> f64 {
     1.0 - (-dt_s / lag_s).exp()
 }
 
-/// Level in TK-1 with so many litres.
+/// Level in TK-1 with this many litres.
 pub fn control_level_cm(litres: f64) -> f64 {
     level_cm(litres, CONTROL_DIAMETER_CM)
 }

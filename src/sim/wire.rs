@@ -25,7 +25,7 @@ pub enum FrameReceiver {
 }
 
 impl FrameReceiver {
-    /// For RTU, or for ASCII with so many data bits.
+    /// For RTU, or for ASCII with this many data bits.
     pub fn new(ascii: bool, data_bits: u8) -> FrameReceiver {
         if ascii {
             FrameReceiver::Ascii(ascii::Receiver::new(data_bits))

@@ -40,7 +40,7 @@ pub(crate) enum AuditMessage {
     Entry(ActionRecord),
     /// Send this result, its summary if it has one, once everything before it is on disk, or say that it is not.
     Reply(ReplySender, Result<Option<String>, String>),
-    /// So many entries did not fit into the queue.
+    /// This many entries did not fit into the queue.
     Lost(u64),
 }
 

@@ -17,7 +17,7 @@ use crate::{
 const REQUESTS: usize = 256;
 /// Attach requests that may wait.
 const ATTACH_QUEUE_MAX: usize = 16;
-/// So many of them are kept for root, the user of the station and those that the plant file trusts.
+/// This many of them are kept for root, the user of the station and those that the plant file trusts.
 const ATTACH_KEPT: usize = 4;
 
 /// A terminal asks to attach.

@@ -9,7 +9,7 @@ use crate::{
     plant::command::{Command, CommandId, CommandStatus, Outcome, Refusal},
 };
 
-/// An outcome that is no worry is shown for so many ticks: a minute of real time.
+/// An outcome that is no worry is shown for this many ticks: a minute of real time.
 const OUTCOME_TICKS: u32 = 120;
 
 /// A command of this terminal on its way.

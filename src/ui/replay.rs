@@ -29,7 +29,7 @@ pub use page::EventPage;
 pub(super) use refusal::{gives_command, refuse_commands, refused};
 use search::Search;
 
-/// Half a second of playing is so many times as long in the plant; 0 is paused.
+/// Half a second of playing is this many times as long in the plant; 0 is paused.
 const SPEEDS: [i32; 5] = [0, 1, 10, 60, 600];
 /// Snapshots that are fetched ahead while playing.
 const PREFETCH_MAX: usize = 3;

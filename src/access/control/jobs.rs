@@ -10,9 +10,9 @@ use crate::plant::command::Command;
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
 pub(super) const JOBS_MAX: usize = 64;
-/// So many of one user: the others still have room.
+/// This many of one user: the others still have room.
 pub(super) const JOBS_OF_USER_MAX: usize = 24;
-/// So many places are kept for root and the station's own user.
+/// This many places are kept for root and the station's own user.
 const JOBS_KEPT: usize = 8;
 /// The reply when there are more.
 pub(super) const BUSY: &str = "the station is busy with other logins, try again";

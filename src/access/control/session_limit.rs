@@ -9,7 +9,7 @@ use crate::plant::time::elapsed;
 
 /// A terminal without login and without a request for so long is closed when another needs its place.
 const IDLE: Duration = Duration::from_secs(600);
-/// One of so many sessions is kept for root, the user of the station and those that the plant file trusts.
+/// One of this many sessions is kept for root, the user of the station and those that the plant file trusts.
 const KEPT: usize = 8;
 
 impl AccessControl {

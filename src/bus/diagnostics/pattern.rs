@@ -8,7 +8,7 @@ use crate::plant::{
 /// Bytes of one pattern.
 const LENGTH: u8 = 32;
 
-/// Pattern `n`, in characters of so many data bits: what cables and drivers find hard, in turn. None is a frame.
+/// Pattern `n`, in characters of `bits` data bits: what cables and drivers find hard, in turn. None is a frame.
 pub(super) fn bytes(n: u32, bits: u8) -> Vec<u8> {
     let mask = if bits == 7 { 0x7F } else { 0xFF };
     let round = to_u8(n / 6 % 256);

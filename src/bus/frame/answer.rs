@@ -16,7 +16,7 @@ const LOG_MIN: u8 = 6;
 struct Expected {
     /// Length of the message.
     length: usize,
-    /// So many of its bytes, from the unit on, are those of the request.
+    /// How many of its bytes, from the unit on, are those of the request.
     repeated: usize,
 }
 

@@ -37,7 +37,7 @@ struct System {
 }
 
 impl Clock {
-    /// Virtual time, with a system clock that is set by so many microseconds.
+    /// Virtual time, with a system clock that is off by some microseconds.
     pub fn simulated(base: Timestamp, set_by: &'static AtomicI64) -> Clock {
         let clock = Clock { base, ..Clock::real() };
         Clock { system: clock.system.map(|system| System { simulated: Some(set_by), ..system }), ..clock }

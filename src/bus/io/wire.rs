@@ -238,7 +238,7 @@ impl Wire {
         self.record(false, frame.into(), FrameResult::Wrong(FrameFault::Late));
     }
 
-    /// So many stray bytes have come.
+    /// Stray bytes have come.
     fn took_stray(&mut self, count: usize) {
         self.counters.received_bytes += count as u64;
         self.counters.last_rx = Some(self.clock.utc());

@@ -44,7 +44,7 @@ impl<T: Send + 'static> Worker<T> {
     }
 }
 
-/// Starts work with so many threads for what blocks; an error where the system gives no thread.
+/// Starts work with a number of threads for what blocks; an error where the system gives no thread.
 pub fn spawn<F>(
     name: &str,
     blocking_threads: usize,

@@ -27,9 +27,9 @@ use crate::plant::time::elapsed;
 pub(super) const GLITCH_MAX: usize = 2;
 /// The most likely error that is taken for none: four in a million.
 const RISK_MAX: f64 = 4e-6;
-/// Losses are counted among about so many requests.
+/// Losses are counted among about this many requests.
 const COUNT_MAX: u32 = 2048;
-/// A unit that was silent for so many times the usual timeout owes nothing any more.
+/// A unit that was silent for this many times the usual timeout owes nothing any more.
 const REST: u32 = 5;
 /// A master that goes on so long after the usual end of a response has surely given up.
 const PATIENCE_MAX: Duration = Duration::from_millis(50);
@@ -65,7 +65,7 @@ pub(super) enum Verdict {
 pub(super) struct Evidence {
     order: Order,
     units: BTreeMap<u8, Unit>,
-    /// Of about as many requests so many frames were lost.
+    /// How many frames of about as many requests were lost.
     requests: u32,
     losses: u32,
     /// So often the master seemed to leave out a request: more than one frame was lost.

@@ -49,7 +49,7 @@ fn shown(heard: &[Heard]) -> String {
     heard.iter().filter_map(one).collect::<Vec<_>>().join(" ")
 }
 
-/// Hears messages, each so many milliseconds after the one before, and a silence behind the last.
+/// Hears messages, each this many milliseconds after the one before, and a silence behind the last.
 fn check_messages(framing: Framing, messages: &[(i64, &[u8])], expect: &str) -> Listener {
     let mut listener = listener(framing);
     let (mut heard, mut now) = (Vec::new(), 0);

@@ -10,7 +10,7 @@ use crate::plant::{PlantDef, id::LineId, tag::Poll, time::elapsed};
 const SILENT_MIN: Duration = Duration::from_secs(10);
 /// A master that pauses for longer is not followed.
 const PAUSE_MAX: Duration = Duration::from_secs(60);
-/// A line is silent after so many pauses, and after so many without one the pauses are forgotten.
+/// A line is silent after this many pauses, and after this many without one the pauses are forgotten.
 const PAUSES: u32 = 3;
 
 /// A line on which no frame is heard for so long has no traffic, as long as nothing else is learned: three of the shortest poll

@@ -15,9 +15,9 @@ use crate::plant::time::elapsed;
 const OWED_MAX: usize = 16;
 /// Counts are halved from here on.
 const COUNT_MAX: u32 = 2048;
-/// Of so many times the mean and the least are known.
+/// Of this many times the mean and the least are known.
 const TIMES_MIN: u32 = 16;
-/// Before they are known, a unit that has answered so many requests in a row owes nothing, if it hardly ever owes anything.
+/// Before they are known, a unit that has answered this many requests in a row owes nothing, if it hardly ever owes anything.
 const CALM: u32 = 256;
 /// A pause is long from here on, if it is longer than four times the response behind it takes.
 const PAUSE_MIN: Duration = Duration::from_millis(100);
@@ -27,7 +27,7 @@ const MEAN_OF: f64 = 32.0;
 const WINDOW: u32 = 1024;
 /// Times vary by a millisecond at the least.
 const VARIANCE_MIN: f64 = 1e-6;
-/// A time is usual within so many standard deviations.
+/// A time is usual within this many standard deviations.
 const USUAL: f64 = 4.0;
 
 /// What is known of a unit.
@@ -49,7 +49,7 @@ pub(super) struct Unit {
     gaps: f64,
     /// And how many of them came after a long pause.
     pauses: u32,
-    /// Of about as many requests so many had no response.
+    /// How many of about as many requests had no response.
     requests: u32,
     misses: u32,
     /// The request before the open one, if it was answered.

@@ -71,7 +71,7 @@ impl Wire {
         self.request + self.answer + self.byte * data_bytes(table, count)
     }
 
-    /// A good read of so many registers or bits.
+    /// A good read of a number of registers or bits.
     pub fn read(self, table: Table, count: u32) -> Duration {
         self.frames(table, count) + self.turnaround + self.silent_interval
     }

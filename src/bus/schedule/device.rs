@@ -24,15 +24,15 @@ pub const FAILURES_MAX: u32 = 3;
 /// its first frame, and has no values to lose.
 const FIRST_BLOCKS_MAX: u32 = 5;
 const FIRST_FAILURES_MIN: u32 = 2;
-/// After so many answers it is known how fast a device answers.
+/// After this many answers it is known how fast a device answers.
 const ANSWERS_MIN: u32 = 32;
-/// A device that has always answered faster is waited for so many times its slowest answer …
+/// A device that has always answered faster is waited for this many times its slowest answer …
 const SLOWER_MAX: u32 = 4;
 /// … but not less than this: systems and adapters pause now and then …
 const RESPONSE_TIMEOUT_MIN: Duration = Duration::from_millis(100);
 /// … and what is lost on a network is sent again after 200 to 300 ms.
 const NETWORK_RESPONSE_TIMEOUT_MIN: Duration = Duration::from_millis(500);
-/// Every so many-th try in a row waits for the whole timeout: the device may have become slow.
+/// Every n-th try in a row waits for the whole timeout: the device may have become slow.
 const WHOLE_TIMEOUT_EVERY: u32 = 4;
 
 /// A device without any result, not even a failure, is asked again after this time.
@@ -40,10 +40,10 @@ const TRIED_AGAIN: Duration = Duration::from_secs(1);
 /// Where the line has nothing else to do, a device that does not answer waits no longer than this: the cable may just have
 /// been plugged in …
 const IDLE_WAIT_MAX: Duration = Duration::from_secs(5);
-/// … and no longer than this for so many failures if it has answered before: it may come back by itself.
+/// … and no longer than this for this many failures if it has answered before: it may come back by itself.
 const IDLE_WAIT: Duration = Duration::from_secs(1);
 const IDLE_FAILURES: u32 = 20;
-/// A gateway that says at once that the device is away may be asked again soon: after so many times what that took.
+/// A gateway that says at once that the device is away may be asked again soon: after this many times what that took.
 const COST_SHARE: u32 = 20;
 /// Doubts in a row count once in this time: several requests may share one cause.
 const DOUBTS_EVERY: Duration = Duration::from_secs(1);
@@ -195,7 +195,7 @@ impl Health {
         }
     }
 
-    /// A request that was sent at `sent` has failed, after the line was taken for `spent`; it has so many `blocks`.
+    /// A request that was sent at `sent` has failed, after the line was taken for `spent`; it has this number of `blocks`.
     /// `affordable`: the line has time for another try. `true` if it is given up with this.
     pub fn failed(&mut self, failure: Failure, times: Failed, blocks: u32, affordable: bool) -> bool {
         let Failed { sent, spent, now } = times;

@@ -16,7 +16,7 @@ use jiff::Timestamp;
 
 /// The line is back to normal when the reads take at most this share of its time.
 const FITS: f64 = 0.95;
-/// Normal polls are stretched at most to so many times their period.
+/// Normal polls are stretched at most to this many times their period.
 pub const FACTOR_MAX: f64 = 32.0;
 /// A demand above this is overload.
 const FULL: f64 = 1.0;

@@ -17,7 +17,7 @@ use crate::{
 
 /// A block that is read once should be read within this time.
 pub(super) const ONCE_WITHIN: Duration = Duration::from_secs(5);
-/// Waits between its tries grow to so many doublings of that.
+/// Waits between its tries grow to this many doublings of that.
 const ONCE_DOUBLINGS: u32 = 4;
 /// A critical poll that was late so often in a row means overload, whatever the costs say.
 const LATE_MAX: u32 = 3;
@@ -52,7 +52,7 @@ pub struct PollInfo {
     pub class: PollClass,
     /// Its period, unstretched; `None` for a block that is read once.
     pub period: Option<Duration>,
-    /// Its period is stretched to so many now; 1 is not at all.
+    /// By how much its period is stretched now; 1 is not at all.
     pub factor: f32,
     /// It is left out now.
     pub shed: bool,

@@ -25,7 +25,7 @@ const WINDOW_MAX: u64 = 10;
 const HOUR_S: i64 = 3_600;
 /// Hours of the running figures, the running one included.
 const HOURS: i64 = 24;
-/// Chattering: so many activations within this time. ISA-18.2 names three in a minute as the usual test.
+/// Chattering: this many activations within this time. ISA-18.2 names three in a minute as the usual test.
 const CHATTER: usize = 3;
 const CHATTER_TIME: Duration = Duration::from_secs(60);
 /// Fleeting: active for a short time without repeating (ISA-18.2, terms). The standard gives no number; ten seconds
@@ -37,7 +37,7 @@ const STALE_S: i64 = 86_400;
 pub const LEAD: Duration = Duration::from_secs(86_400);
 /// How far back a monitor that starts again reads the journal: the hours of the running figures.
 pub const RUNNING: Duration = Duration::from_secs((HOURS * HOUR_S) as u64);
-/// The running figures are computed again after so many seconds.
+/// The running figures are computed again after this many seconds.
 const REFRESH_S: i64 = 10;
 
 /// Counts activations. Steps come in order of time.

@@ -136,7 +136,7 @@ pub enum NotConfirmed {
     PartlyWritten {
         /// Done.
         done: usize,
-        /// Of so many.
+        /// Out of how many.
         all: usize,
         /// The tag.
         failed: Option<String>,
@@ -146,7 +146,7 @@ pub enum NotConfirmed {
     PartlyAccepted {
         /// Done.
         done: usize,
-        /// Of so many.
+        /// Out of how many.
         count: usize,
         /// Why the first of the others did not.
         first: AlarmRefusal,

@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 
 use jiff::Timestamp;
 
-/// It does not count so many times what it usually counts in an hour at once, or in an hour.
+/// It does not count this many times what it usually counts in an hour at once, or in an hour.
 pub const UNUSUAL: f64 = 24.0;
-/// So many times what it usually counts in an hour is likely after a rollover or a reset.
+/// This many times what it usually counts in an hour is likely after a rollover or a reset.
 pub const LIKELY: f64 = 4.0;
-/// While no hour is over: it does not count so many times its greatest step at once, or in a minute.
+/// While no hour is over: it does not count this many times its greatest step at once, or in a minute.
 pub const UNHEARD: f64 = 1_000.0;
 /// Hours of history that matter: a week.
 pub const HOURS: i64 = 168;

@@ -8,7 +8,7 @@ use crate::plant::{
     tag::{Decimals, TagDef},
 };
 
-/// A fall is less than so many last digits where it is jitter: one, and what a conversion rounds.
+/// A fall is less than this many last digits where it is jitter: one, and what a conversion rounds.
 const JITTER: f64 = 1.5;
 
 /// What is known of a counter without reading it.

@@ -74,7 +74,7 @@ pub enum SweepEnd {
         /// How it is refused.
         code: ExceptionCode,
     },
-    /// So many blocks in a row were not answered, and none before.
+    /// This many blocks in a row were not answered, and none before.
     #[error("{}", t!("no answer to {count} blocks: what this unit has is not known", count = .0))]
     Silent(u32),
     /// The unit has fallen silent at this address.

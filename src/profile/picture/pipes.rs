@@ -158,7 +158,7 @@ fn opposite(way: u8) -> u8 {
     if way > DOWN { way >> 2 } else { way << 2 }
 }
 
-/// The cell so many further on; `None` left of or above the picture.
+/// The cell this many further on; `None` left of or above the picture.
 fn ahead((x, y): Point, way: u8, by: usize) -> Option<Point> {
     match way {
         RIGHT => Some((x + by, y)),

@@ -83,7 +83,7 @@ pub(super) fn bit_labels(
     )
 }
 
-/// The names of bits of a word of so many.
+/// The names of bits of a word of this many.
 pub(in crate::profile) fn named_bits(
     bits: Option<&At<Numbered>>,
     size: i128,

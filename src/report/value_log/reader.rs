@@ -13,7 +13,7 @@ use crate::{
 
 /// Problems that are kept in words; all are counted.
 const PROBLEMS_MAX: usize = 100;
-/// A value holds for so many usual times between two rows; beyond, rows are missing.
+/// A value holds for this many usual times between two rows; beyond, rows are missing.
 const HOLD: i32 = 3;
 
 /// A log of values.

@@ -7,7 +7,7 @@ use std::{fmt, str::FromStr, time::Duration};
 /// What is wrong with a line, a unit on it, its values, or the process behind it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum InjectedFault {
-    /// So many of 100 messages on the line have a wrong bit.
+    /// This many of 100 messages on the line have a wrong bit.
     Noise(u8),
     /// The unit receives nothing and does nothing.
     Silent,
@@ -31,7 +31,7 @@ pub enum InjectedFault {
     HeaterBurnout,
     /// A valve does not move any more.
     ValveStuck(Valve, Position),
-    /// TK-1 leaks, so many millilitres a minute.
+    /// TK-1 leaks, this many millilitres a minute.
     Leak(u32),
     /// Pump P-1 does not turn.
     PumpFailed,

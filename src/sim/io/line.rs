@@ -157,7 +157,7 @@ impl Line {
         }
     }
 
-    /// When so many characters have been on the wire since the request began. Bytes that really came later than the line's
+    /// When this many characters have been on the wire since the request began. Bytes that really came later than the line's
     /// pace count from when they came.
     fn over(&self, characters: usize) -> Instant {
         let on_wire = self.began + self.time_of(characters);
@@ -213,7 +213,7 @@ impl Line {
         }
     }
 
-    /// Real time of so many characters.
+    /// Real time of this many characters.
     fn time_of(&self, characters: usize) -> Duration {
         let bits = characters as f64 * f64::from(self.wire.serial.bits_per_char());
         self.clock.real_span(Duration::from_secs_f64(bits / f64::from(self.wire.serial.baud)))

@@ -156,7 +156,7 @@ mod tests {
         Motion { pace, ..motion(Source::Of(Operation::Sum, vec![A])) }
     }
 
-    /// The value after so many seconds in steps of 0.1 s, with A and B held.
+    /// The value after this many seconds in steps of 0.1 s, with A and B held.
     fn after(how: &Simulate, start: f64, seconds: u64, a: f64, b: f64) -> f64 {
         let mut generator = SignalGenerator::new("D.T", start);
         let dt = Duration::from_millis(100);

@@ -41,7 +41,7 @@ const BELOW_RANGE: u16 = 1 << 2;
 const ABOVE_RANGE: u16 = 1 << 3;
 /// Alarm word 31007: alarms 1 to 3, and the burnt-out heater, whose bit is not published: this position is a guess.
 const HEATER_BREAK: u16 = 1 << 3;
-/// The heater current is evaluated only above this output, after so many samples: it needs some seconds to warm up.
+/// The heater current is evaluated only above this output, after this many samples: it needs some seconds to warm up.
 const JUDGED_PERCENT: f64 = 20.0;
 const JUDGED_AFTER: u32 = 60;
 /// PV runs from −5 to 105 % of the range.

@@ -109,7 +109,7 @@ impl Judge {
         }
     }
 
-    /// So many alarm events have been lost by now.
+    /// This many alarm events have been lost by now.
     pub fn on_lost(&mut self, lost: u64) {
         self.lost = self.lost.max(lost);
     }

@@ -75,7 +75,7 @@ impl Reading {
         })
     }
 
-    /// The load of so many seconds since the last reading; `None` if the kernel has counted nothing.
+    /// The load of this many seconds since the last reading; `None` if the kernel has counted nothing.
     fn since(&self, last: &Reading, seconds: f64) -> Option<ProcessLoad> {
         let waits =
             self.waits.iter().map(|(thread, waits)| waits - last.waits.get(thread).copied().unwrap_or(0).min(*waits));

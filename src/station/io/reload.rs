@@ -34,7 +34,7 @@ use crate::{
     },
 };
 
-/// So many of what ends are named in the audit log; the journal of alarms has them all.
+/// This many of what ends are named in the audit log; the journal of alarms has them all.
 const NAMED_MAX: usize = 50;
 
 /// What was read from plant file and users file.

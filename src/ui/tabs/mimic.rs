@@ -36,7 +36,7 @@ use crate::{
     },
 };
 
-/// The small trends are asked again after so many seconds (real time).
+/// The small trends are asked again after this many seconds (real time).
 const EVERY_S: f64 = 10.0;
 const TIMEOUT_S: f64 = 30.0;
 

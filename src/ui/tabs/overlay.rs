@@ -14,7 +14,7 @@ use crate::{
     ui::widgets::chart::{self, Chart, Curve, mark, trace::Trace},
 };
 
-/// Curves over each other at most: a pen has one of so many marks.
+/// Curves over each other at most: a pen has one of this many marks.
 pub const CURVES_MAX: usize = 8;
 /// Batches that are shown where none is marked: the selected one and those before it.
 pub const UNMARKED: usize = 3;

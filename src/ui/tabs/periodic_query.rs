@@ -19,9 +19,9 @@ use crate::{
 
 /// Seconds of waiting that an operator notices.
 const NOTICED_S: f64 = 0.5;
-/// Between two queries passes at least so many times as long as the last answer took.
+/// Between two queries passes at least this many times as long as the last answer took.
 const REST: i32 = 4;
-/// An answer that was not there after so many timeouts is lost: the station answers each query, and says so
+/// An answer that was not there after this many timeouts is lost: the station answers each query, and says so
 /// where it cannot.
 const LOST: i32 = 4;
 

@@ -27,7 +27,7 @@ use crate::{
 
 /// Least width of the space for the labels of an axis, so that the picture does not jump with its data.
 const GUTTER: usize = 6;
-/// Pens carry their mark every so many cells.
+/// Pens carry their mark every this many cells.
 const MARK_CELLS: i64 = 24;
 
 /// What is drawn. Nothing appears before `from`, from `to` on or after `now`.

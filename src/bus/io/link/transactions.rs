@@ -21,7 +21,7 @@ use crate::{
     plant::{def::Framing, event::Fault, traffic::Exchange},
 };
 
-/// So many bytes that are no frame are shown.
+/// This many bytes that are no frame are shown.
 const SHOWN_MAX: usize = 24;
 /// Looked at again after this time at the latest.
 const LOOK_AGAIN: Duration = Duration::from_secs(3_600);

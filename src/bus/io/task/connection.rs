@@ -119,7 +119,7 @@ impl Task<'_> {
         (link.answers(), exit)
     }
 
-    /// So many requests may be under way to each device.
+    /// How many requests may be under way to each device.
     pub(super) fn allow_in_flight(&self, link: &mut Link) {
         for device in self.def.devices.iter().filter(|device| device.line == self.line) {
             link.state_request_gap(device.unit, device.gap);

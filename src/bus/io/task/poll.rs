@@ -24,7 +24,7 @@ use jiff::Timestamp;
 
 /// Requests in a row without any answer after which a TCP connection is opened again …
 const UNANSWERED_MAX: u32 = 5;
-/// … and twice as many each time that this was in vain, up to so many doublings: the device may be deaf after it was connected.
+/// … and twice as many each time that this was in vain, up to this many doublings: the device may be deaf after it was connected.
 const DOUBLINGS_MAX: u32 = 3;
 
 /// How a read has ended.

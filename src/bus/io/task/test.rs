@@ -24,7 +24,7 @@ use crate::{
     },
 };
 
-/// A busy line gives a diagnostic every so many-th turn.
+/// A busy line gives a diagnostic every n-th turn.
 pub(super) const POLLS_BETWEEN: u32 = 4;
 
 impl Task<'_> {

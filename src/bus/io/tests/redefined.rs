@@ -39,7 +39,7 @@ async fn redefine(line: &mut Line, before: &PlantDef, def: &PlantDef, at: LineId
     assert!(next.is_ok(), "the line waits for it");
 }
 
-/// The addresses whose values come within so many seconds, by unit.
+/// The addresses whose values come within this many seconds, by unit.
 async fn read_within(line: &mut Line, def: &PlantDef, seconds: u64) -> BTreeSet<(u8, u16)> {
     let (mut read, until) = (BTreeSet::new(), tokio::time::Instant::now() + Duration::from_secs(seconds));
     while let Ok(event) = tokio::time::timeout_at(until, line.next(def)).await {

@@ -21,7 +21,7 @@ fn outstanding(mode: Mode) -> Vec<u8> {
     frame::wrap(mode.framing(), 0, &[1, 3, 8, 0, 20, 0, 21, 0, 22, 0, 23])
 }
 
-/// Reads so many blocks; every value is checked against its address. Gives good and failed ones.
+/// Reads this many blocks; every value is checked against its address. Gives good and failed ones.
 async fn read(line: &mut Line, def: &PlantDef, polls: usize) -> (usize, usize) {
     let (mut good, mut failed) = (0, 0);
     while good + failed < polls {

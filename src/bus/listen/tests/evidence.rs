@@ -35,7 +35,7 @@ impl Line {
         }));
     }
 
-    /// Bytes come after so many milliseconds.
+    /// Bytes come after this many milliseconds.
     fn bytes(&mut self, after: i64, bytes: &[u8]) {
         self.now += after;
         let heard = self.listener.hear(at(self.now), bytes);
@@ -52,7 +52,7 @@ impl Line {
         self.take(heard);
     }
 
-    /// So many rounds of both blocks, as good as the line can be.
+    /// This many rounds of both blocks, as good as the line can be.
     fn rounds(&mut self, count: usize, answer_ms: i64) {
         for _ in 0..count {
             self.frame(5, A);

@@ -6,7 +6,7 @@ use crate::plant::{
     fixture::{PLC, TIC},
 };
 
-/// A plant with so many alarms on PV, each with a limit of its own.
+/// A plant with this many alarms on PV, each with a limit of its own.
 fn many(count: u16) -> Arc<PlantDef> {
     let mut def = fixture::plant();
     let alarm = |n: u16| {

@@ -60,7 +60,7 @@ fn a_device_slower_than_stated_is_an_alarm_with_figures() {
     let def = Arc::new(def);
     let ms = Duration::from_millis;
     let mut seen = SeenTime::new(Some(ms(30)));
-    // `responses` of so many ms come, then a second passes: what the alarm says, as an event and as a state.
+    // `responses` of this many ms come, then a second passes: what the alarm says, as an event and as a state.
     let mut after = |plant: &mut Plant, second: i64, responses: usize, of_ms: u64| {
         (0..responses).for_each(|_| seen.add(ms(of_ms)));
         let device_times = vec![(TIC, DeviceTime::new(&seen))];

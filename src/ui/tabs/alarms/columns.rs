@@ -11,7 +11,7 @@ use crate::{
 const MARKS: u16 = 7;
 /// Columns of tag and message together: at least, in a wide list at least, and at most.
 const TEXT: (u16, u16, u16) = (30, 40, 60);
-/// A list of so many columns is wide.
+/// A list of this many columns is wide.
 const WIDE: u16 = 90;
 /// Columns of a ribbon, at least and at most.
 const RIBBON: (u16, u16) = (10, 30);

@@ -17,7 +17,7 @@ use crate::{
     ui::tabs::Outgoing,
 };
 
-/// The page takes in what is new every so many half seconds: reading needs time, and slow lines have few bytes a second.
+/// The page takes in what is new every this many half seconds: reading needs time, and slow lines have few bytes a second.
 const EVERY: u32 = 4;
 
 /// The frames as they are shown.

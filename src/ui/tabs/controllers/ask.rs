@@ -11,7 +11,7 @@ use crate::plant::{
 };
 use crate::ui::tabs::prelude::*;
 
-/// The narrowest window has room for so many cells.
+/// The narrowest window has room for this many cells.
 const ROOM: u16 = 68;
 /// Lines of warnings that a window of 24 rows has room for.
 const WARNINGS_MAX: usize = 6;

@@ -16,7 +16,7 @@ use crate::{
     },
 };
 
-/// The faceplate beside the table needs so many rows.
+/// The faceplate beside the table needs this many rows.
 const PANEL_ROWS: u16 = 24;
 /// Columns of the faceplate beside the table.
 const PANEL: u16 = 36;

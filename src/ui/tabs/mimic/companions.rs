@@ -37,7 +37,7 @@ const PENS_MAX: usize = 3;
 const ROWS_MAX: usize = 8;
 /// Events that are listed at most, of the last day.
 const EVENTS_MAX: usize = 40;
-/// So many alarm events are looked through for them: most may be of suppressed alarms.
+/// This many alarm events are looked through for them: most may be of suppressed alarms.
 const SEARCHED_MAX: usize = 500;
 const EVENTS_SPAN: SignedDuration = SignedDuration::from_hours(24);
 const EVERY_S: f64 = 5.0;

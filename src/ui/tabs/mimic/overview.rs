@@ -9,7 +9,7 @@ use super::{
 use crate::ui::{layout::Size, tabs::prelude::*};
 use crate::{history::Series, ui::tabs::trends::span::View};
 
-/// The curves show so much, in so many columns.
+/// The curves show so much, in this many columns.
 const WINDOW_S: i64 = 3_600;
 const COLUMNS: usize = 120;
 const EVERY_S: f64 = 10.0;

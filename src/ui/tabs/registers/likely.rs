@@ -14,7 +14,7 @@ use crate::{
 const STEP_MAX: f64 = 0.05;
 /// A 16-bit value of a process does not jump so far between two reads; the lower half of a float does.
 const JUMP: u16 = 0x1000;
-/// A value that does not change is a float only if it was entered by a person: with so many digits at most.
+/// A value that does not change is a float only if it was entered by a person: with this many digits at most.
 const DIGITS_MAX: usize = 5;
 /// A counter has risen so often before it is called one.
 const RISES_MIN: usize = 3;

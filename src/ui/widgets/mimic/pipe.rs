@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-/// One arrow in so many cells.
+/// One arrow in this many cells.
 const ARROW_CELLS: usize = 5;
 
 /// One cell of a pipe: column, row, and the directions in and out of it.
