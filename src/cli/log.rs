@@ -4,6 +4,7 @@ use std::{
     io::{self, Write},
     os::unix::fs::FileTypeExt,
     path::{Path, PathBuf},
+    sync::mpsc::Receiver,
 };
 
 use tracing_appender::{
@@ -18,7 +19,10 @@ use tracing_subscriber::{
 };
 
 use super::{CliError, own_files, paths};
-use crate::plant::visible::visible;
+use crate::{
+    bus::io::worker::{HANG_MAX, within},
+    plant::visible::visible,
+};
 
 /// Days of logs that are kept.
 const DAYS: usize = 7;
@@ -27,12 +31,9 @@ const DAYS: usize = 7;
 /// the file `-` is standard error, for an init system that keeps it. A disk that does not take the log is no error: a
 /// station must poll all the same. Refuses the files of the station with this history.
 pub fn start(file: Option<&Path>, history: Option<&Path>) -> Result<WorkerGuard, CliError> {
-    if let (Some(file), Some(history)) = (file, history) {
-        own_files::refuse(file, history)?;
-    }
     let (writer, guard) = match file {
         Some(file) if file.as_os_str() == "-" => tracing_appender::non_blocking(Visible(io::stderr())),
-        _ => tracing_appender::non_blocking(Visible(LogFile::open(file)?)),
+        _ => tracing_appender::non_blocking(Visible(LogFile::open(file, history)?)),
     };
     init(writer);
     Ok(guard)
@@ -42,10 +43,24 @@ pub fn start(file: Option<&Path>, history: Option<&Path>) -> Result<WorkerGuard,
 struct LogFile {
     path: Option<PathBuf>,
     file: Option<RollingFileAppender>,
+    /// Where it comes from once its disk responds.
+    late: Option<Receiver<Result<LogFile, CliError>>>,
 }
 
 impl LogFile {
-    fn open(path: Option<&Path>) -> Result<LogFile, CliError> {
+    /// Opens it; a disk that hangs is not waited for.
+    fn open(path: Option<&Path>, history: Option<&Path>) -> Result<LogFile, CliError> {
+        let (own, history) = (path.map(Path::to_path_buf), history.map(Path::to_path_buf));
+        within(HANG_MAX, move || LogFile::open_now(own.as_deref(), history.as_deref())).unwrap_or_else(|late| {
+            let _ = writeln!(io::stderr(), "sightglass: the disk of the log does not respond; no log until it does");
+            Ok(LogFile { path: None, file: None, late: Some(late) })
+        })
+    }
+
+    fn open_now(path: Option<&Path>, history: Option<&Path>) -> Result<LogFile, CliError> {
+        if let (Some(file), Some(history)) = (path, history) {
+            own_files::refuse(file, history)?;
+        }
         let file = match appender(path) {
             Err(error @ CliError::Io { .. }) => {
                 // Without standard error there is no place to say it.
@@ -54,12 +69,17 @@ impl LogFile {
             }
             opened => Some(opened?),
         };
-        Ok(LogFile { path: path.map(Path::to_path_buf), file })
+        Ok(LogFile { path: path.map(Path::to_path_buf), file, late: None })
     }
 }
 
 impl Write for LogFile {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        if let Some(late) = &self.late {
+            // One that is refused stays without lines.
+            let Ok(Ok(opened)) = late.try_recv() else { return Ok(line.len()) };
+            *self = opened;
+        }
         if self.file.is_none() {
             self.file = appender(self.path.as_deref()).ok();
         }
@@ -123,4 +143,23 @@ fn init(writer: tracing_appender::non_blocking::NonBlocking) {
     let log = fmt().with_writer(writer).with_ansi(false).with_max_level(LevelFilter::TRACE).finish();
     // A second start in one process (tests) keeps the first log.
     let _ = log.with(level).try_init();
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::channel;
+
+    use super::*;
+
+    #[test]
+    fn a_log_is_written_once_its_disk_responds() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("x.log");
+        let (sender, late) = channel();
+        let mut log = LogFile { path: None, file: None, late: Some(late) };
+        assert_eq!(log.write(b"early\n").expect("dropped"), 6);
+        sender.send(LogFile::open_now(Some(&path), None)).expect("awaited");
+        log.write_all(b"late\n").and_then(|()| log.flush()).expect("written");
+        assert_eq!(std::fs::read_to_string(&path).expect("a log"), "late\n");
+    }
 }

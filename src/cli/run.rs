@@ -14,7 +14,7 @@ use crate::{
         io::{users, users_beside},
     },
     attach::io::{find, serve},
-    bus::io::{clock::Clock, transport::Connector},
+    bus::io::{clock::Clock, transport::Connector, worker::spawn_blocking},
     plant::{PlantDef, Snapshot, record::ChainHash},
     profile::PlantFile,
     station::{
@@ -189,7 +189,7 @@ async fn stopped(lifecycle: &mut mpsc::Receiver<LifecycleRequest>) {
 /// Loads a plant file beside the station: however long it takes, and even if it fails badly. `Err` says why in words.
 async fn loaded<T: Send + 'static>(load: impl FnOnce() -> Result<T, CliError> + Send + 'static) -> Result<T, String> {
     // Drawing many errors takes its time as well.
-    let loaded = tokio::task::spawn_blocking(|| load().map_err(|error| error.to_string())).await;
+    let loaded = spawn_blocking(|| load().map_err(|error| error.to_string())).await;
     loaded.unwrap_or_else(|_| Err("the plant file cannot be read, see the log".to_owned()))
 }
 
@@ -231,12 +231,6 @@ fn start(
     history: PathBuf,
     file: Option<PlantFile>,
 ) -> Result<station::Station, CliError> {
-    // A disk that takes nothing is no reason not to poll: the station says what it cannot write, and tries again.
-    if let Some(folder) = history.parent()
-        && let Err(error) = std::fs::create_dir_all(folder)
-    {
-        say(&format!("cannot make {}: {error}", folder.display()));
-    }
     let connectors = connectors(def);
     Ok(station::start_guarded(station::Options { def: def.clone(), clock, history, connectors, file })?)
 }

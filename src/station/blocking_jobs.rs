@@ -1,13 +1,16 @@
 //! Jobs that would block the session server: password hashes and the users file, run on threads of their own.
 
-use std::{collections::VecDeque, path::PathBuf, time::Duration};
+use std::{collections::VecDeque, panic::resume_unwind, path::PathBuf, time::Duration};
 
 use tokio::task::{JoinHandle, JoinSet};
 
-use crate::access::{
-    Users,
-    control::{JobId, JobOutcome, PasswordJob},
-    io::{random, users},
+use crate::{
+    access::{
+        Users,
+        control::{JobId, JobOutcome, PasswordJob},
+        io::{random, users},
+    },
+    bus::io::worker::spawn_blocking,
 };
 
 /// Passwords that are hashed at the same time, 19 MiB each; access control bounds those that wait.
@@ -50,7 +53,7 @@ impl BlockingJobs {
     /// Writes the users down. Access control never requests it while it is being done.
     pub fn save(&mut self, list: Users) {
         let path = self.path.clone();
-        self.saving = Some(tokio::task::spawn_blocking(move || match path {
+        self.saving = Some(spawn_blocking(move || match path {
             Some(path) => users::write(&path, &list),
             None => Err("this station has no users".to_owned()),
         }));
@@ -60,10 +63,12 @@ impl BlockingJobs {
         while self.working.len() < AT_ONCE
             && let Some((job, work)) = self.waiting.pop_front()
         {
-            let begun = self.working.spawn_blocking(move || {
+            let hashed = spawn_blocking(move || {
                 let outcome = random().map_or_else(JobOutcome::Failed, |salt| work.run(salt));
                 (job, outcome)
             });
+            let begun =
+                self.working.spawn(async { hashed.await.unwrap_or_else(|error| resume_unwind(error.into_panic())) });
             self.jobs.push((begun.id(), job));
         }
     }

@@ -6,6 +6,7 @@ use jiff::Timestamp;
 
 use crate::{
     access::{
+        Users,
         audit_log::{PLANT_FILE, USERS_FILE, sha256},
         io::audit_log::Opened,
     },
@@ -47,6 +48,11 @@ impl RecordedFiles {
         let changed = file.and_then(|file| self.plant_file(file, at));
         let users = users.and_then(|users| self.users_file(users, at));
         [start].into_iter().chain(changed).chain(users).collect()
+    }
+
+    /// Were there users when they were recorded last?
+    pub fn had_users(&self) -> bool {
+        self.users.as_ref().is_some_and(|users| **users != *Users::default().digest())
     }
 
     /// The entry of users that were found in their file; `None` if they are the last ones recorded.

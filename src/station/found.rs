@@ -105,7 +105,7 @@ fn about(found: LineFinding, device: DeviceId) -> Option<DeviceFinding> {
 }
 
 /// The file, and what stands in it.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct FoundFile {
     path: PathBuf,
     known: Found,
@@ -117,6 +117,11 @@ impl FoundFile {
     pub fn open(history: &Path) -> FoundFile {
         let path = beside(history);
         FoundFile { known: Found::read(&path), path, writing: None }
+    }
+
+    /// The same where the disk does not respond: everything is searched again.
+    pub fn unread(history: &Path) -> FoundFile {
+        FoundFile { path: beside(history), ..FoundFile::default() }
     }
 
     /// What holds of the devices of a plant.

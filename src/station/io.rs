@@ -1,5 +1,6 @@
 //! Starts the tasks of a station and stops them in order.
 
+mod begin;
 mod delivery;
 mod lines;
 mod outlet;
@@ -17,17 +18,11 @@ use tokio::{
 };
 
 use crate::{
-    access::{
-        AccessControl, Peer, Users,
-        io::{audit_log::Opened, own_user, recorder, users, users_beside},
-    },
+    access::{AccessControl, Peer, io::own_user},
     bus::io::{clock::Clock, transport::Connector, worker::Worker},
-    history::{
-        HistoryError,
-        io::{
-            JobRequest, QueryRequest,
-            thread::{self as history, HistoryInput},
-        },
+    history::io::{
+        JobRequest, QueryRequest,
+        thread::{self as history, HistoryInput},
     },
     plant::{
         Plant, PlantDef,
@@ -36,22 +31,22 @@ use crate::{
         event::Event,
         record::ChainHash,
         snapshot::HistoryStatus,
-        station::{FaultState, STATION, StationFault},
+        station::STATION,
     },
     profile::PlantFile,
 };
 
+pub(super) use self::begin::USERS_MISSING;
+pub use self::begin::{start, start_guarded, start_observed};
 pub use self::reload::{PreparedReload, Reloaded};
-use self::{lines::Line, outlet::Outlet, reports::ReportTask};
+use self::{begin::Guarded, lines::Line, outlet::Outlet, reports::ReportTask};
 use super::{
-    audit_queue::{AuditMessage, AuditQueue},
+    audit_queue::AuditMessage,
     found::FoundFile,
-    past::Past,
     plant_task::{self, Inputs, Persistence, PlantTask, RecordObserver},
     session::Session,
     session_acceptor::SessionAcceptor,
     session_server::{self, Outputs, SessionServer},
-    sets,
 };
 
 /// Events waiting for the plant; a full queue holds the links back, which is the one place where waiting is right.
@@ -62,8 +57,6 @@ const COMMANDS_MAX: usize = 64;
 const SAFE_STATE_MAX: Duration = Duration::from_secs(10);
 /// The disk is waited for so long at the end: with the safe state less than systemd waits (`TimeoutStopSec`).
 const STOP_MAX: Duration = Duration::from_secs(15);
-/// Said of the users file where the audit log knows of users.
-pub(super) const USERS_MISSING: &str = "the users file is missing although users existed: restore it from a backup";
 
 /// What a station is started with.
 #[derive(Debug)]
@@ -119,72 +112,6 @@ struct Senders {
     history_file: PathBuf,
     plant: mpsc::Sender<plant_task::Reload>,
     sessions: mpsc::Sender<session_server::Reload>,
-}
-
-/// Starts history, links and plant; lines are polled whether or not the store opens. No login: root and the
-/// user of the station may do everything. For demonstrations.
-pub fn start(options: Options) -> Result<Station, HistoryError> {
-    start_observed(options, None)
-}
-
-/// The same, with an observer of all records.
-pub fn start_observed(options: Options, observer: Option<RecordObserver>) -> Result<Station, HistoryError> {
-    begin(options, observer, None)
-}
-
-/// The same for a plant with a users file beside its history: login is required.
-pub fn start_guarded(options: Options) -> Result<Station, HistoryError> {
-    let path = users_beside(&options.history);
-    let (def, host) = (options.def.clone(), Some(own_user().into()));
-    let access = match users::read(&path) {
-        Ok(users) => AccessControl::with_users(def, users, host),
-        // Login is closed: a damaged file is not an empty one. Values and alarms go on.
-        Err(error) => {
-            tracing::error!(%error, "login is disabled");
-            AccessControl::closed(def, &error.to_string(), host)
-        }
-    };
-    begin(options, None, Some((access, path)))
-}
-
-fn begin(
-    options: Options,
-    observer: Option<RecordObserver>,
-    guarded: Option<(AccessControl, PathBuf)>,
-) -> Result<Station, HistoryError> {
-    let Options { def, clock, history: path, connectors, file } = options;
-    let (sets, found) = (sets::folder(&path, &def.name), FoundFile::open(&path));
-    let mut history = history::start(&path, def.clone(), clock)?;
-    let mut plant = Plant::new(def.clone(), clock.now(), clock.speed());
-    let (records, store, queries) = (history.records.clone(), history.status.clone(), history.queries.clone());
-    let jobs = (history.jobs.clone(), path.clone());
-    let recorder = recorder::start(&path, clock, records.clone());
-    let mut audit_queue = AuditQueue::new(&recorder);
-    // Without such a file, at the first start or after it was damaged, the journal has the state.
-    let from_journal = recorder.alarms.events.is_none();
-    let succession = recorder.alarms.events.iter().map(|events| plant.restore(events)).next().unwrap_or_default();
-    let file_since = audit_queue.files().plant_file_since(file.as_ref());
-    let users = guarded.as_ref().and_then(|(access, _)| access.users_digest());
-    if let Some(state) = guarded.as_ref().and_then(|(access, _)| users_fault(access, &recorder.opened)) {
-        plant.on_fault(StationFault::UsersFile, state);
-    }
-    audit_queue.put_start(&def.name, file.as_ref(), users, clock.utc());
-    let past = Some(Past::new(history.restored.take(), from_journal, recorder.opened.procedure.clone()));
-    let (records, audit) = (Some(records), Some(audit_queue));
-    let (sets, found) = (Some(sets), Some(found));
-    let persistence = Persistence { records, store, past, audit, sets, found, observer, succession, file_since };
-    let threads = Threads { queries, jobs, history: Some(history), audit_writer: recorder.join };
-    Ok(assemble(def, clock, connectors, plant, file, persistence, threads, guarded))
-}
-
-/// What is wrong with the file of users: it is damaged, or it is missing although the audit log knows of users.
-fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
-    if let Some(why) = access.is_closed() {
-        return Some(FaultState::Active(why.clone()));
-    }
-    let no_users = Users::default().digest();
-    let had_users = log.users_file.as_ref().is_some_and(|recorded| **recorded != *no_users);
-    (had_users && access.users_digest() == Some(no_users)).then(|| FaultState::Occurred(USERS_MISSING.into()))
 }
 
 /// A station that keeps nothing, for virtual time, where no other thread may take part. Queries to the history
@@ -250,7 +177,7 @@ fn assemble(
     file: Option<PlantFile>,
     persistence: Persistence,
     threads: Threads,
-    guarded: Option<(AccessControl, PathBuf)>,
+    guarded: Option<Guarded>,
 ) -> Station {
     let Threads { queries, jobs: (history_jobs, history_file), history, audit_writer } = threads;
     let (stop, stopped) = watch::channel(false);
@@ -283,12 +210,16 @@ fn assemble(
         lifecycle: lifecycle_sender,
     };
     let open = guarded.is_none();
-    let (access, users) = guarded.map_or_else(
-        || (AccessControl::new(def.clone(), Some(own_user().into())), None),
-        |(access, users)| (access, Some(users)),
-    );
+    let (access, users, late) = match guarded {
+        Some(Guarded { access, path, late }) => (access, Some(path), late),
+        None => (AccessControl::new(def.clone(), Some(own_user().into())), None, None),
+    };
     let server = SessionServer::new(access.in_run(run), clock, outputs, users);
     let (to_sessions, reloads) = mpsc::channel(1);
+    if let Some(late) = late {
+        let to = (to_sessions.clone(), to_plant.clone());
+        tasks.push(tokio::spawn(begin::take_late_users(late, to, stopped.clone())));
+    }
     tasks.push(tokio::spawn(server.run(attach_requests, requests, reloads, stopped)));
     let senders = Senders { events, audit, store, queries, history_file, plant: to_plant, sessions: to_sessions };
     let mut station = Station {

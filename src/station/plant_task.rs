@@ -55,6 +55,11 @@ const FILES_MAX: Duration = Duration::from_secs(2);
 /// Real time between two ticks at the least; one second of plant time otherwise.
 const TICK_MIN: Duration = Duration::from_millis(20);
 
+/// A history that says nothing for so long (real time) hangs in its disk: it says how it stands every second.
+const SILENT_MAX: Duration = Duration::from_secs(10);
+/// Said of it.
+const SILENT: &str = "its disk does not respond";
+
 /// Gets every record of the plant, in the task of the plant: it must not block.
 pub type RecordObserver = Box<dyn Fn(&[Record]) + Send>;
 
@@ -90,6 +95,8 @@ pub(super) struct PlantTask {
     persistence: Persistence,
     /// Records that the queue to the store had no room for.
     lost: u64,
+    /// When the history said last how it stands.
+    heard: Instant,
     publish: watch::Sender<Arc<Snapshot>>,
 }
 
@@ -103,7 +110,8 @@ impl PlantTask {
         persistence: Persistence,
         publish: watch::Sender<Arc<Snapshot>>,
     ) -> PlantTask {
-        PlantTask { plant, clock, links, file, saving: None, filing: None, persistence, lost: 0, publish }
+        let heard = Instant::now();
+        PlantTask { plant, clock, links, file, saving: None, filing: None, persistence, lost: 0, heard, publish }
     }
 
     /// Runs until the links have stopped.
@@ -158,7 +166,10 @@ impl PlantTask {
                 saved = saved(&mut self.saving) => self.on_saved(saved),
                 done = filed(&mut self.filing) => self.on_filed(done),
                 restored = Past::known(&mut self.persistence.past) => self.restore_history(restored),
-                Ok(()) = self.persistence.store.changed() => self.update_history_status(),
+                Ok(()) = self.persistence.store.changed() => {
+                    self.heard = Instant::now();
+                    self.update_history_status();
+                }
                 () = AuditQueue::changed(&mut self.persistence.audit) => {
                     self.send_due_replies();
                     self.update_history_status();
@@ -187,6 +198,8 @@ impl PlantTask {
         self.apply_effects(effects);
         self.check_clock();
         self.send_due_replies();
+        // A disk that hangs says nothing by itself.
+        self.update_history_status();
         self.keep_found();
     }
 
@@ -359,6 +372,11 @@ impl PlantTask {
     fn update_history_status(&mut self) {
         let mut status = self.persistence.store.borrow_and_update().clone();
         status.lost += self.lost;
+        // One whose thread has ended has said so.
+        if self.persistence.store.has_changed().is_ok() && SILENT_MAX <= self.heard.elapsed() {
+            status.failing = Some(SILENT.to_owned());
+            status.trouble = joined([&status.failing, &status.trouble]);
+        }
         let lost = (self.lost > 0).then(|| format!("{} records found the queue to the history full", self.lost));
         status.trouble = joined([&status.trouble, &lost]);
         if let Some(audit) = &mut self.persistence.audit {

@@ -1,5 +1,7 @@
 //! The one thread that writes actions and alarm state to disk before they are reported as recorded: the audit log first.
 
+mod start;
+
 use std::{
     collections::VecDeque,
     io,
@@ -13,6 +15,9 @@ use tokio::{
     time::{Instant, timeout},
 };
 
+#[cfg(test)]
+pub use self::start::start;
+pub use self::start::start_within;
 use super::{
     audit_log::{self, AuditLog, IN_USE, Opened},
     sealing,
@@ -22,10 +27,7 @@ use crate::{
         audit_log::{Comparison, START, compare, fit},
         sealing::is_due,
     },
-    bus::io::{
-        clock::Clock,
-        worker::{self, Worker},
-    },
+    bus::io::{clock::Clock, worker::Worker},
     history::{
         io::{
             alarm_file::{self, AlarmFile, RestoredAlarms},
@@ -101,20 +103,6 @@ pub struct Handle {
     pub join: Option<Worker<Option<ChainHash>>>,
 }
 
-/// Opens both files beside a history and starts the thread. A file that cannot be opened is trouble, and no reason not to
-/// start; nor is a system that gives no thread: the station goes on, and says that the audit log is not written.
-pub fn start(history_file: &Path, clock: Clock, history: mpsc::Sender<HistoryInput>) -> Handle {
-    let (groups, queue) = mpsc::channel(WRITE_GROUPS_MAX);
-    let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
-    let mut opened = recorder.open();
-    recorder.tail = std::mem::take(&mut opened.tail);
-    recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.chain_hash).unwrap_or(START);
-    let (status, recorded) = watch::channel(recorder.status());
-    let join = worker::spawn("recorder", 1, move || recorder.run(queue, status));
-    let join = join.inspect_err(|error| tracing::error!(%error, "no thread for the audit log")).ok();
-    Handle { groups, recorded, opened, alarms, join }
-}
-
 /// An action that waits for the log.
 struct Pending {
     action: ActionRecord,
@@ -178,6 +166,19 @@ impl Recorder {
             lost: 0,
         };
         (recorder, found)
+    }
+
+    /// A recorder with both files opened, and what was found. Blocks while the disk works.
+    fn opened(
+        history_file: &Path,
+        clock: Clock,
+        history: mpsc::Sender<HistoryInput>,
+    ) -> (Recorder, (Opened, RestoredAlarms)) {
+        let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
+        let mut opened = recorder.open();
+        recorder.tail = std::mem::take(&mut opened.tail);
+        recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.chain_hash).unwrap_or(START);
+        (recorder, (opened, alarms))
     }
 
     async fn run(mut self, mut queue: mpsc::Receiver<Message>, status: watch::Sender<Recorded>) -> Option<ChainHash> {

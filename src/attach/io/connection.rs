@@ -178,7 +178,11 @@ impl Inbound {
         let replies = self.replies.clone();
         tokio::spawn(async move {
             let answer = match sent {
-                Ok(()) => answer.await.unwrap_or_else(|_| Err("the station has stopped".to_owned())),
+                Ok(()) => tokio::select! {
+                    answer = answer => answer.unwrap_or_else(|_| Err("the station has stopped".to_owned())),
+                    // A job that the terminal has left is cancelled.
+                    () = replies.closed() => return,
+                },
                 Err(why) => Err(why),
             };
             // The terminal may have gone.

@@ -29,6 +29,7 @@ use crate::{
         callers::{Callers, makes_room},
         protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, ProtocolError, TRY_AGAIN, TerminalOrigin},
     },
+    bus::io::worker::spawn_blocking,
     profile::io::atomic::with_suffix,
     station::SessionAcceptor,
 };
@@ -369,7 +370,7 @@ async fn receive_handshake(stream: UnixStream, credentials: UCred) -> HandshakeE
         }
     };
     // The list of users may be on another machine.
-    let name = tokio::task::spawn_blocking(move || uzers::get_user_by_uid(user)).await.ok().flatten();
+    let name = spawn_blocking(move || uzers::get_user_by_uid(user)).await.ok().flatten();
     let name = name.map(|name| name.name().to_string_lossy().into_owned());
     let process = credentials.pid().and_then(|process| u32::try_from(process).ok());
     let from = place.words(name.as_deref(), process).into();

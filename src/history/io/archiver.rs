@@ -21,7 +21,7 @@ use super::{
     store::{Store, instant},
 };
 use crate::{
-    bus::io::worker::spawn_blocking,
+    bus::io::worker::{HANG_MAX, spawn_blocking},
     history::{HistoryError, retention::Why, tiers::HOUR},
 };
 
@@ -32,6 +32,8 @@ const RETRY_AFTER: Duration = Duration::from_secs(600);
 
 /// A job that was asked for and takes no step for so long is given up; a step is a file, or the database.
 const STEP_MAX: Duration = Duration::from_secs(600);
+/// Jobs may hang in so many disks while others are begun: each keeps a thread.
+const HUNG_MAX: usize = 2;
 
 /// What became of a look.
 pub enum ArchiveOutcome {
@@ -59,6 +61,8 @@ struct Running {
     /// The step that it was at, and commits since.
     step: u32,
     commits: u32,
+    /// Commits since its answer is not awaited any more.
+    left: u32,
 }
 
 /// What a job and whoever watches it share.
@@ -79,8 +83,8 @@ impl Watched {
 /// Works on the archive of one store after the other.
 pub struct Archiver {
     running: Option<Running>,
-    /// A job that was given up and hangs in the disk.
-    hung: Option<JoinHandle<Done>>,
+    /// Jobs that were given up and hang in the disk.
+    hung: Vec<JoinHandle<Done>>,
     /// What the station is asked for, to begin next: the archive is not worked on meanwhile.
     asked: Option<JobRequest>,
     /// An import that is being stored, a piece with each commit.
@@ -102,7 +106,7 @@ impl Archiver {
             running: None,
             asked: None,
             import: None,
-            hung: None,
+            hung: Vec::new(),
             wait: commits(LOOK_EVERY, commit_every),
             commit_every,
             left: LeftOut::default(),
@@ -141,18 +145,19 @@ impl Archiver {
     }
 
     fn run(&mut self, work: JoinHandle<Done>, interrupt: Interrupt, reply: Option<JobReply>, watched: Arc<Watched>) {
-        self.running = Some(Running { work, interrupt, reply, watched, step: 0, commits: 0 });
+        self.running = Some(Running { work, interrupt, reply, watched, step: 0, commits: 0, left: 0 });
     }
 
     /// Cancels a job that was asked for and whose answer is not awaited any more, and gives up one that hangs.
     fn watch(&mut self) {
-        let step_max = commits(STEP_MAX, self.commit_every);
+        let (step_max, cancel_max) = (commits(STEP_MAX, self.commit_every), commits(HANG_MAX, self.commit_every));
         let Some(running) = self.running.as_mut().filter(|running| running.reply.is_some()) else { return };
         let step = running.watched.steps.load(Ordering::Relaxed);
         running.commits = if step == running.step { running.commits + 1 } else { 0 };
         running.step = step;
-        let hangs = step_max <= running.commits;
-        if hangs || running.reply.as_ref().is_some_and(JobReply::is_closed) {
+        running.left += u32::from(running.reply.as_ref().is_some_and(JobReply::is_closed));
+        let hangs = step_max <= running.commits || cancel_max < running.left;
+        if hangs || 0 < running.left {
             running.watched.cancelled.store(true, Ordering::Relaxed);
             running.interrupt.interrupt();
         }
@@ -161,7 +166,7 @@ impl Archiver {
             tracing::error!(why, "a job of the history");
             // Who has left needs no answer.
             let _ = reply.map(|reply| reply.send(Err(HistoryError::Refused(why))));
-            self.hung = Some(work);
+            self.hung.push(work);
         }
     }
 
@@ -175,10 +180,10 @@ impl Archiver {
     }
 
     fn begin_asked(&mut self, store: Option<&Store>, JobRequest { job, reply }: JobRequest, now: Timestamp) {
-        self.hung = self.hung.take().filter(|hung| !hung.is_finished());
-        let free = match &self.hung {
-            Some(_) => Err(HistoryError::Refused("an earlier backup or import still hangs in the disk".to_owned())),
-            None => store.ok_or(HistoryError::NotOpen).and_then(Store::try_clone),
+        self.hung.retain(|hung| !hung.is_finished());
+        let free = match self.hung.len() < HUNG_MAX {
+            true => store.ok_or(HistoryError::NotOpen).and_then(Store::try_clone),
+            false => Err(HistoryError::Refused("earlier backups or imports still hang in the disk".to_owned())),
         };
         let store = match free {
             Ok(store) => store,
@@ -311,4 +316,54 @@ fn pause(job: &Job) -> Duration {
 
 fn commits(time: Duration, every: Duration) -> u32 {
     u32::try_from(time.as_nanos() / every.as_nanos().max(1)).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::sync::oneshot::Receiver;
+
+    use super::*;
+    use crate::plant::fixture;
+
+    fn asked(to: &Path) -> (JobRequest, Receiver<Result<String, HistoryError>>) {
+        let (reply, answer) = oneshot::channel();
+        (JobRequest { job: HistoryJob::Backup { to: to.to_owned(), companions: Vec::new() }, reply }, answer)
+    }
+
+    #[tokio::test]
+    async fn a_cancelled_job_that_hangs_lets_others_begin() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let now = Timestamp::UNIX_EPOCH;
+        let store = Store::open(&folder.path().join("h.duckdb"), &fixture::shared(), now).expect("a new store").store;
+        let mut archiver = Archiver::new(Duration::from_secs(1));
+        let mut release = Vec::new();
+        for hung in 1..=HUNG_MAX {
+            let ((gate, held), (reply, answer)) = (std::sync::mpsc::channel::<()>(), oneshot::channel());
+            release.push(gate);
+            let work = spawn_blocking(move || {
+                let _ = held.recv();
+                Ok(ArchiveOutcome::Answered(Err(HistoryError::NotOpen)))
+            });
+            archiver.run(work, store.interrupt_handle(), Some(reply), Arc::default());
+            archiver.begin(Some(&store), now);
+            assert!(archiver.running.is_some(), "its answer is awaited");
+            drop(answer);
+            (0..=HANG_MAX.as_secs()).for_each(|_| archiver.begin(Some(&store), now));
+            assert!(archiver.running.is_none() && archiver.hung.len() == hung);
+        }
+        let (request, mut answer) = asked(&folder.path().join("one"));
+        archiver.take_up(request);
+        archiver.begin(Some(&store), now);
+        let refused = answer.try_recv().expect("at once").expect_err("as many hang as may");
+        assert!(refused.to_string().contains("hang in the disk"), "{refused}");
+        drop(release.pop());
+        while archiver.hung.iter().all(|hung| !hung.is_finished()) {
+            tokio::task::yield_now().await;
+        }
+        let (request, mut answer) = asked(&folder.path().join("two"));
+        archiver.take_up(request);
+        archiver.begin(Some(&store), now);
+        assert!(matches!(archiver.ended().await, Ok(ArchiveOutcome::Answered(Ok(_)))));
+        assert!(answer.try_recv().is_ok_and(|written| written.is_ok()));
+    }
 }

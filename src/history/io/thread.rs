@@ -19,7 +19,7 @@ use super::{
 use crate::{
     bus::io::{
         clock::Clock,
-        worker::{Worker, spawn, spawn_blocking},
+        worker::{HANG_MAX, Worker, spawn, spawn_blocking, within},
     },
     history::HistoryError,
     plant::{def::PlantDef, record::Record, snapshot::HistoryStatus},
@@ -140,7 +140,9 @@ pub fn start_with(
     commit_every: Duration,
     answer: Answerer,
 ) -> Result<Handle, HistoryError> {
-    files::refuse_foreign(path)?;
+    let file = path.to_owned();
+    // A disk that hangs is met again when the store is opened.
+    within(HANG_MAX, move || files::refuse_foreign(&file)).unwrap_or(Ok(()))?;
     let mut writer = Writer::new(path.to_owned(), def, clock.utc());
     let (records, records_in) = mpsc::channel(RECORDS_MAX);
     let (queries, queries_in) = mpsc::channel(QUERIES_MAX);

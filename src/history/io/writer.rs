@@ -85,7 +85,8 @@ impl Writer {
     /// A writer without a store yet: records wait until one is open.
     pub fn new(path: PathBuf, def: Arc<PlantDef>, started: Timestamp) -> Writer {
         let mut writer = Writer { path, def, started, ..Writer::default() };
-        writer.describe();
+        // Not that of its disk, which may hang.
+        writer.describe_store();
         writer
     }
 
@@ -328,6 +329,12 @@ impl Writer {
     }
 
     fn describe(&mut self) {
+        self.describe_store();
+        self.status.disk = files::disk(&self.path).and_then(|disk| files::disk_nearly_full(disk, self.def.history));
+        self.status.file_bytes = files::size(&self.path);
+    }
+
+    fn describe_store(&mut self) {
         let lost = (self.status.lost > 0).then(|| format!("{} records lost", self.status.lost));
         // A start has said already what it missed.
         let missing =
@@ -340,8 +347,6 @@ impl Writer {
         self.status.damaged = damaged;
         self.status.unarchived.clone_from(&self.unarchived);
         self.status.clock.clone_from(&self.clock);
-        self.status.disk = files::disk(&self.path).and_then(|disk| files::disk_nearly_full(disk, self.def.history));
-        self.status.file_bytes = files::size(&self.path);
     }
 }
 

@@ -24,6 +24,7 @@ use tokio::{
 };
 
 use crate::{
+    bus::io::worker::spawn_blocking,
     north::{
         payload::{self, Message},
         request::{self, PACKET_MAX, Received},
@@ -80,7 +81,10 @@ pub struct Broker {
 impl Broker {
     /// Connects, and says that the station is there; requests go to the inbox, if there is one. The error is for people.
     pub async fn connect(def: &MqttDef, inbox: Option<&Inbox>) -> Result<Broker, String> {
-        let (client, events) = AsyncClient::builder(options(def)?).capacity(QUEUE_MAX).build();
+        let own = def.clone();
+        // Its password and certificates may lie on a disk that hangs.
+        let options = spawn_blocking(move || options(&own)).await.map_err(|error| error.to_string())??;
+        let (client, events) = AsyncClient::builder(options).capacity(QUEUE_MAX).build();
         let (accepted, is_accepted) = oneshot::channel();
         let mut broker = Broker { client, connection: tokio::spawn(drive(events, accepted, inbox.cloned())) };
         let accepted = broker.unless_ended(is_accepted);

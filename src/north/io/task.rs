@@ -7,7 +7,6 @@ use jiff::Timestamp;
 use rumqttc::AsyncClient;
 use tokio::{
     sync::{mpsc, oneshot, watch},
-    task::spawn_blocking,
     time::{sleep, timeout},
 };
 
@@ -17,7 +16,7 @@ use super::{
     cursor::{self, Cursor},
 };
 use crate::{
-    bus::io::clock::Clock,
+    bus::io::{clock::Clock, worker::spawn_blocking},
     history::{
         Answer, HistoryError, Query,
         io::{QueryRequest, reader::STATION},
@@ -86,7 +85,13 @@ pub(crate) struct RequestChannels {
 pub(crate) async fn run(task: NorthTask, mut stopped: watch::Receiver<bool>) {
     let path = cursor::beside(&task.history_file);
     let now = task.clock.utc();
-    let (cursor, damaged) = match cursor::read(&path) {
+    let file = path.clone();
+    let read = tokio::select! {
+        read = spawn_blocking(move || cursor::read(&file)) => read.unwrap_or_else(|error| Err(error.to_string())),
+        // The disk hangs.
+        _ = stopped.wait_for(|stopped| *stopped) => return,
+    };
+    let (cursor, damaged) = match read {
         Ok(cursor) => (cursor, None),
         Err(why) => (None, Some(why)),
     };

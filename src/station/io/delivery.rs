@@ -26,13 +26,13 @@ impl Drop for Group {
     }
 }
 
-/// Runs a command in a folder; `Err` says in one line why it failed.
-pub async fn run(words: &[String], folder: &Path) -> Result<(), String> {
+/// Runs a command, in a folder if there is one; `Err` says in one line why it failed.
+pub async fn run(words: &[String], folder: Option<&Path>) -> Result<(), String> {
     let Some((program, arguments)) = words.split_first() else { return Ok(()) };
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
     command.process_group(0).kill_on_drop(true);
-    if folder.is_dir() {
+    if let Some(folder) = folder {
         command.current_dir(folder);
     }
     let mut child = command.spawn().map_err(|error| format!("{program}: {error}"))?;

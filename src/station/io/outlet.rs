@@ -56,7 +56,7 @@ impl Station {
             self.north = Some(Outlet::start(self.north.take(), move |stopped| async move {
                 let Some(mqtt) = def.north.mqtt.clone() else { return };
                 let snapshots = acceptor.snapshots.clone();
-                let started = requests::start(&mqtt, clock, &acceptor, &history_file, stopped.clone());
+                let started = requests::start(&mqtt, clock, &acceptor, &history_file, stopped.clone()).await;
                 drop(acceptor);
                 let (requests, passing_on) = started.unzip();
                 let task = NorthTask { def, mqtt, clock, snapshots, queries, history, events, history_file, requests };

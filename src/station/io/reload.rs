@@ -14,7 +14,7 @@ use tokio::sync::{mpsc, oneshot};
 use super::{Line, Outlet, Station};
 use crate::{
     access::Users,
-    bus::io::transport::Connector,
+    bus::io::{transport::Connector, worker::spawn_blocking},
     history::io::{
         QueryRequest,
         reader::Queries,
@@ -145,7 +145,7 @@ impl Station {
     /// What is kept of what was found of devices.
     async fn found(&self) -> Vec<(DeviceId, DeviceFinding)> {
         let history = self.senders.history_file.clone();
-        let file = tokio::task::spawn_blocking(move || FoundFile::open(&history)).await;
+        let file = spawn_blocking(move || FoundFile::open(&history)).await;
         file.map(|file| file.of(&self.def)).unwrap_or_default()
     }
 

@@ -11,14 +11,14 @@ use std::{path::Path, sync::Arc, time::Duration};
 use jiff::Timestamp;
 use tokio::{
     sync::{mpsc, oneshot, watch},
-    task::spawn_blocking,
+    task::{AbortHandle, JoinError},
     time::{sleep, timeout},
 };
 
 use super::{delivery, report_files};
 use crate::{
     access::audit_log::sha256,
-    bus::io::clock::Clock,
+    bus::io::{clock::Clock, worker::spawn_blocking},
     history::{
         Answer, HistoryError, MadeReports, Query,
         io::{
@@ -26,6 +26,7 @@ use crate::{
             reader::STATION,
             thread::{HistoryInput, offer},
         },
+        words::joined,
     },
     plant::{
         PlantDef,
@@ -52,6 +53,10 @@ const LOOK_EVERY: Duration = Duration::from_secs(30);
 const ASK_EVERY: Duration = Duration::from_secs(5);
 /// The audit log is waited for so long.
 const AUDIT_TIME_MAX: Duration = Duration::from_secs(5);
+/// A step in the folder of reports takes so long at most; what takes longer hangs.
+const DISK_MAX: Duration = Duration::from_secs(10);
+/// Said of that folder.
+const SILENT: &str = "the folder of reports does not respond";
 /// A report that takes too long is tried so often.
 const TOO_LONG_MAX: usize = 3;
 
@@ -75,7 +80,7 @@ pub(crate) struct ReportTask {
 
 /// Runs until the station stops; a step that is not done yet is done by the next station.
 pub(crate) async fn run(task: ReportTask, mut stopped: watch::Receiver<bool>) {
-    let mut made = Maker { task, failures: Failures::default(), fault: None, unsent: None };
+    let mut made = Maker { task, failures: Failures::default(), fault: None, unsent: None, hung: None };
     tokio::select! {
         _ = stopped.wait_for(|stopped| *stopped) => {}
         () = made.follow() => {}
@@ -98,6 +103,8 @@ struct Maker {
     fault: Option<String>,
     /// A state of the alarm that the plant had no room for.
     unsent: Option<FaultState>,
+    /// What hangs in the folder of reports: nothing more is begun there before it has ended.
+    hung: Option<AbortHandle>,
 }
 
 impl Maker {
@@ -135,19 +142,25 @@ impl Maker {
         let (def, now) = (self.task.def.clone(), self.task.clock.utc());
         let since = made.extent.map(|(first, _)| first);
         let record: automatic::Record = made.reports.into_iter().map(|report| (report.key(), report)).collect();
-        self.alarm(self.failures.words(&def, &record));
+        let hangs = self.hangs().then(|| SILENT.to_owned());
+        self.alarm(joined([&hangs, &self.failures.words(&def, &record)]));
         match automatic::next_step(&def, &record, &self.failures, since, now) {
             Step::Make(due) => self.make(due).await,
             Step::Deliver(report, rule) => {
                 let words: Vec<String> =
                     rule.after.iter().map(|word| automatic::filled(word, report, &def.name)).collect();
-                let folder = Path::new(&*report.file).parent().unwrap_or(Path::new("."));
-                let result = delivery::run(&words, folder).await;
+                let folder = Path::new(&*report.file).parent().unwrap_or(Path::new(".")).to_owned();
+                let inside = folder.clone();
+                let Some(Ok(is_there)) = self.on_disk(move || inside.is_dir()).await else {
+                    return sleep(ASK_EVERY).await;
+                };
+                let result = delivery::run(&words, is_there.then_some(&*folder)).await;
                 self.delivered(report, result);
             }
             Step::Delete(report) => {
                 let (path, sha) = (report.file.clone(), report.sha256.clone());
-                let deleted = spawn_blocking(move || report_files::delete(Path::new(&*path), &sha)).await;
+                let deleted = self.on_disk(move || report_files::delete(Path::new(&*path), &sha)).await;
+                let Some(deleted) = deleted else { return sleep(ASK_EVERY).await };
                 let event = match deleted {
                     Ok(Ok(true)) => ReportEvent::Deleted,
                     Ok(Ok(false)) => ReportEvent::LeftAlone,
@@ -164,6 +177,24 @@ impl Maker {
             }
             Step::Wait(until) => self.wait(now, until).await,
         }
+    }
+
+    /// Works in the folder of reports. `None` where it does not respond.
+    async fn on_disk<T>(&mut self, work: impl FnOnce() -> T + Send + 'static) -> Option<Result<T, JoinError>>
+    where
+        T: Send + 'static,
+    {
+        if self.hangs() {
+            return None;
+        }
+        let mut work = spawn_blocking(work);
+        let done = timeout(DISK_MAX, &mut work).await.ok();
+        self.hung = done.is_none().then(|| work.abort_handle());
+        done
+    }
+
+    fn hangs(&self) -> bool {
+        self.hung.as_ref().is_some_and(|hung| !hung.is_finished())
     }
 
     fn delivered(&mut self, report: &ReportRecord, result: Result<(), String>) {
@@ -234,18 +265,21 @@ impl Maker {
         let format = report::format(due.format).map_err(NotMade::Ever)?;
         let folder = rule.folder.clone().unwrap_or_else(|| def.report.folder.clone());
         let (stem, ending) = due.file_name(&def, format);
-        let write = move || -> Result<_, NotMade> {
+        let render = move || {
             let report: &ShiftReport = &report;
-            let bytes = file(|| report::render(format, report, &def, &Style::of(&def))).map_err(NotMade::Ever)?;
+            file(|| report::render(format, report, &def, &Style::of(&def)))
+        };
+        let bug = || "internal error, see the log".to_owned();
+        let bytes = spawn_blocking(render).await.unwrap_or_else(|_| Err(bug())).map_err(NotMade::Ever)?;
+        let write = move || -> Result<_, NotMade> {
             let failed = |error: std::io::Error| NotMade::Yet(format!("{}: {error}", folder.display()));
             // A list of reports names files for whoever reads it, wherever that is.
             let folder = std::path::absolute(&folder).map_err(failed)?;
             let (path, is_new) = report_files::place(&folder, &stem, &ending, &bytes).map_err(failed)?;
             Ok((path.display().to_string(), sha256(&bytes), is_new))
         };
-        let (path, sha, is_new) = spawn_blocking(write)
-            .await
-            .unwrap_or_else(|_| Err(NotMade::Ever("internal error, see the log".to_owned())))?;
+        let written = self.on_disk(write).await.ok_or_else(|| NotMade::Yet(SILENT.to_owned()))?;
+        let (path, sha, is_new) = written.unwrap_or_else(|_| Err(NotMade::Ever(bug())))?;
         Ok((self.about(due, &path, &sha, ReportEvent::Made), is_new))
     }
 

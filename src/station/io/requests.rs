@@ -12,12 +12,12 @@ use std::{
 use rumqttc::AsyncClient;
 use tokio::{
     sync::{mpsc, watch},
-    task::{JoinHandle, spawn_blocking},
+    task::JoinHandle,
     time::{MissedTickBehavior, interval},
 };
 
 use crate::{
-    bus::io::clock::Clock,
+    bus::io::{clock::Clock, worker::spawn_blocking},
     north::{
         io::{
             answers::{self, AnswerStatus},
@@ -46,14 +46,21 @@ const TICK: Duration = Duration::from_secs(1);
 
 /// Takes requests from outside where the plant file names a user for them, in a task that ends with its last refusals on record.
 /// Nothing is subscribed to otherwise.
-pub(crate) fn start(
+pub(crate) async fn start(
     mqtt: &MqttDef,
     clock: Clock,
     acceptor: &SessionAcceptor,
     history: &std::path::Path,
-    stopped: watch::Receiver<bool>,
+    mut stopped: watch::Receiver<bool>,
 ) -> Option<(RequestChannels, JoinHandle<()>)> {
     let user = mqtt.commands_as.as_ref()?;
+    let file = request_file::beside(history);
+    let path = file.clone();
+    let list = tokio::select! {
+        list = spawn_blocking(move || request_file::read(&path)) => list.unwrap_or_else(|error| Err(error.to_string())),
+        // The disk hangs.
+        () = has_stopped(&mut stopped) => return None,
+    };
     let from = format!("MQTT {}:{} as {}, {}", mqtt.host, mqtt.port, mqtt.client_id, request::filter(mqtt));
     let session = acceptor.attach_as(user, &from);
     let (inbox, received) = mpsc::channel(INBOX_MAX);
@@ -65,8 +72,7 @@ pub(crate) fn start(
     let (publish_answers, answer_status) = watch::channel(AnswerStatus::default());
     tokio::spawn(answers::run(answer_queue, client, publish_answers));
     let now = Now { plant: clock.now(), utc: clock.utc() };
-    let file = request_file::beside(history);
-    let requests = Requests::new(mqtt.clone(), request_file::read(&file), now);
+    let requests = Requests::new(mqtt.clone(), list, now);
     let task = RequestTask { requests, clock, session, lost, answers, publish, file };
     let task = tokio::spawn(task.run(received, stopped));
     Some((RequestChannels { inbox, clients, status, answers: answer_status }, task))

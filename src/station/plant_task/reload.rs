@@ -69,7 +69,8 @@ impl PlantTask {
             self.on_command(status);
         }
         if let Some(digest) = users {
-            let missing = digest == Users::default().digest();
+            let had_users = self.persistence.audit.as_mut().is_some_and(|audit| audit.files().had_users());
+            let missing = had_users && digest == Users::default().digest();
             let state = if missing { FaultState::Occurred(USERS_MISSING.into()) } else { FaultState::Cleared };
             self.plant.on_fault(StationFault::UsersFile, state);
             let now = self.clock.utc();

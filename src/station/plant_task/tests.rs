@@ -24,6 +24,7 @@ const COMMAND: CommandId = CommandId { terminal: 1, number: 1 };
 struct Station {
     events: mpsc::Sender<Event>,
     commands: mpsc::Sender<CommandStatus>,
+    store: watch::Sender<HistoryStatus>,
     snapshots: watch::Receiver<Arc<Snapshot>>,
     task: JoinHandle<()>,
     recorder: Worker<Option<ChainHash>>,
@@ -46,7 +47,7 @@ impl Station {
         let (records, blocked) = mpsc::channel(1);
         records.try_send(Vec::new().into()).unwrap();
         let recorder = recorder::start(history, clock, records.clone());
-        let (_, store) = watch::channel(HistoryStatus::default());
+        let (how_it_stands, store) = watch::channel(HistoryStatus::default());
         let audit = Some(AuditQueue::new(&recorder));
         let persistence = Persistence {
             records: Some(records),
@@ -68,8 +69,17 @@ impl Station {
         let inputs = Inputs { events: event_queue, commands: command_queue, messages: message_queue, reloads };
         let task = tokio::spawn(task.run(inputs));
         let recorder = recorder.join.unwrap();
-        let station =
-            Station { events, commands, snapshots, task, recorder, _blocked: blocked, messages, _requests: requests };
+        let station = Station {
+            events,
+            commands,
+            store: how_it_stands,
+            snapshots,
+            task,
+            recorder,
+            _blocked: blocked,
+            messages,
+            _requests: requests,
+        };
         let tags: Vec<TagId> = def.tags_of(fixture::TIC).map(|tag| tag.id).collect();
         let silent =
             Event::Failed { at: clock.now(), device: fixture::TIC, tags, fault: Fault::BackedOff, exchange: None };
@@ -221,4 +231,19 @@ async fn a_clock_step_is_followed_recorded_and_alarmed() {
     assert!(line.contains(&format!("\"old\":\"{}", day(wrong))), "{line}");
     assert!(line.contains(&format!("\"new\":\"{}", day(right))), "{line}");
     assert!(log.lines().last().unwrap().contains(&format!("\"utc\":\"{}", day(right))), "the stop, on the right day");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_history_that_says_nothing_is_named_until_it_speaks() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut station = Station::start(&folder.path().join("fixture.duckdb")).await;
+    let begun = Instant::now();
+    let is_recording = |snapshot: &Arc<Snapshot>| snapshot.history.failing.is_none();
+    let snapshot = station.snapshots.wait_for(|snapshot| !is_recording(snapshot)).await.unwrap().clone();
+    assert_eq!(snapshot.history.failing.as_deref(), Some(SILENT));
+    assert!(snapshot.history.trouble.as_ref().is_some_and(|trouble| trouble.starts_with(SILENT)));
+    assert!(SILENT_MAX <= begun.elapsed() && begun.elapsed() < 2 * SILENT_MAX);
+    station.store.send_replace(HistoryStatus::default());
+    station.snapshots.wait_for(is_recording).await.unwrap();
+    station.stop().await;
 }

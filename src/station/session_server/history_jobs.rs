@@ -4,6 +4,7 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::SessionServer;
 use crate::{
+    bus::io::worker::spawn_blocking,
     history::{
         HistoryError,
         io::{HistoryJob, JobRequest, import},
@@ -22,8 +23,7 @@ impl SessionServer {
         let (history, plant) = (self.outputs.history.clone(), self.outputs.plant.clone());
         let jobs = self.outputs.history_jobs.clone();
         self.spawn_job(ticket, async move {
-            let companions =
-                tokio::task::spawn_blocking(move || companions::companions(&history, &plant)).await.unwrap_or_default();
+            let companions = spawn_blocking(move || companions::companions(&history, &plant)).await.unwrap_or_default();
             done_by_history(jobs, HistoryJob::Backup { to: folder.into(), companions }).await
         });
     }

@@ -368,3 +368,21 @@ fn files_in_use_by_another_process_are_left_alone() {
     assert_eq!((recorder.status().log, recorder.status().alarms), (None, None));
     assert_eq!(verify(&beside(&history_file), &[]).unwrap().entries, 2);
 }
+
+#[tokio::test]
+async fn a_station_that_did_not_wait_for_its_log_writes_it_all_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let history = folder.path().join("h.duckdb");
+    for (number, max) in [Duration::MAX, Duration::ZERO].into_iter().enumerate() {
+        let (records, _rows) = mpsc::channel(8);
+        let mut recorder = start_within(max, &history, clock(), records);
+        let written = group(&[["first", "second"][number]], &[AlarmEvent::Raised]);
+        recorder.groups.try_send(Message::WriteGroup(written)).unwrap();
+        recorder.recorded.wait_for(|recorded| recorded.groups == 1).await.unwrap();
+        drop(recorder.groups);
+        assert!(recorder.join.unwrap().ended().await.unwrap().is_some());
+    }
+    let log = fs::read_to_string(beside(&history)).unwrap();
+    assert!(log.find("first").unwrap() < log.find("second").unwrap());
+    assert_eq!(verify(&beside(&history), &[]).unwrap().entries, 2);
+}

@@ -60,6 +60,17 @@ async fn queries_of_a_terminal_that_has_left_are_cancelled() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_job_of_a_terminal_that_has_left_is_cancelled() {
+    let (mut far, mut requests, served) = serving();
+    say(&mut far, &ClientMessage::SessionRequest { ticket: 1, request: SessionRequest::Reload }).await;
+    let Some((_, Request::SessionRequest(_, mut reply))) = requests.recv().await else { panic!("no request") };
+    assert!(timeout(Duration::from_secs(60), reply.closed()).await.is_err(), "its answer is awaited");
+    drop(far);
+    assert!(matches!(served.await.unwrap(), ConnectionEnd::Wire(_)));
+    assert!(timeout(Duration::from_secs(60), reply.closed()).await.is_ok());
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_cancelled_query_makes_room_for_another() {
     let (mut far, mut requests, _served) = serving();
     let last = ANSWERS_MAX as u64 + 1;

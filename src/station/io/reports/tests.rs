@@ -266,7 +266,7 @@ async fn a_command_gives_its_last_words_when_it_fails() {
     let folder = tempfile::tempdir().unwrap();
     let run = async |words: &[&str]| {
         let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
-        delivery::run(&words, folder.path()).await
+        delivery::run(&words, Some(folder.path())).await
     };
     // Without a shell: an argument is one, whatever is in it.
     assert_eq!(run(&["touch", "a; touch b"]).await, Ok(()));
@@ -277,4 +277,25 @@ async fn a_command_gives_its_last_words_when_it_fails() {
     assert!(run(&["no-such-program"]).await.is_err_and(|why| why.starts_with("no-such-program: ")));
     // What it leaves running in the background is not waited for.
     assert_eq!(run(&["sh", "-c", "sleep 2 & exit 0"]).await, Ok(()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_folder_that_hangs_is_left_alone_until_it_responds() {
+    let stand = Stand::new(&[(PeriodKind::Day, "csv")], "2026-11-20T06:00:00Z");
+    let Running { clock, _status, .. } = stand.start(at("2026-11-21T06:00:00Z"), 0);
+    let ((queries, _queries), (records, _records), (audit, _audit), (events, _events)) =
+        (mpsc::channel(1), mpsc::channel(1), mpsc::channel(1), mpsc::channel(1));
+    let (def, status) = (stand.def.clone(), _status.subscribe());
+    let task = ReportTask { def, clock, queries, records, audit, events, status };
+    let mut maker = Maker { task, failures: Failures::default(), fault: None, unsent: None, hung: None };
+    let (release, held) = std::sync::mpsc::channel::<()>();
+    let hung = maker.on_disk(move || held.recv().is_err());
+    let (done, ()) = tokio::join!(hung, tokio::time::advance(2 * DISK_MAX));
+    assert!(done.is_none() && maker.hangs());
+    assert!(maker.on_disk(|| ()).await.is_none(), "nothing more is begun");
+    drop(release);
+    while maker.hangs() {
+        tokio::task::yield_now().await;
+    }
+    assert!(maker.on_disk(|| 7).await.is_some_and(|done| done.is_ok_and(|seven| seven == 7)));
 }
