@@ -14,7 +14,7 @@ use super::{
 use crate::plant::{
     def::{ActionDef, Faceplate, Limits, TagId},
     output::Output,
-    tag::{Access, Bound, Decimals, Point, Poll, TagDef},
+    tag::{Access, Bound, Point, Poll, TagDef},
 };
 
 /// The keys of a device profile that stand in the plant file itself; `None` where there is no map at all.
@@ -200,7 +200,7 @@ pub(super) fn check_overlaps(tags: &[Defined], problems: &mut Problems) {
         for (next, next_at) in neighbours {
             let (a, b) = (tag.point, next.point);
             let same = a.address == b.address && (a.kind, a.order) == (b.kind, b.order);
-            let fields = a.len() == 1 && b.len() == 1 && (a.field.is_some() || b.field.is_some());
+            let fields = a.len() == 1 && b.len() == 1 && (a.part().is_some() || b.part().is_some());
             if same || fields {
                 continue;
             }
@@ -253,7 +253,7 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
                 let problem = problems.add(need.at, message);
                 problem.label("1 would be read as one decimal, and a power of ten of 1 is ten times as much");
                 problem
-                    .help("give it scale = -1 if it holds a power of ten (SunSpec), or min = 0 if it counts decimals");
+                    .help("write scale_from instead if it holds a power of ten (SunSpec), or give it min = 0 if it counts decimals");
             }
             if target.is_text() {
                 check_number(need.at, target, problems);
@@ -285,7 +285,19 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
         }
         tag
     };
-    defined.into_iter().map(finish).collect()
+    let mut tags: Vec<TagDef> = defined.into_iter().map(finish).collect();
+    read_powers_with_values(&mut tags);
+    tags
+}
+
+/// A power of ten is read as often as the fastest of the values that it scales: only then are both of one cycle.
+fn read_powers_with_values(tags: &mut [TagDef]) {
+    let scaled: Vec<(TagId, Poll)> =
+        tags.iter().filter_map(|tag| Some((tag.decimals.power_source()?, tag.poll))).collect();
+    for (source, poll) in scaled {
+        let source = &mut tags[source.index()];
+        source.poll = source.poll.min(poll);
+    }
 }
 
 /// Can it be below 0? Decimals never are, a power of ten that makes decimals always is.
@@ -334,11 +346,17 @@ pub(super) fn stated(stated: &Stated, scope: &Scope, listens: bool, problems: &m
             problem.label("`stated` is for devices of a line that only listens");
         } else if !scales && !scope.tags.iter().any(is_unit) {
             let problem = problems.add(name.at, format!("no value is scaled by {}", tag.name));
-            problem.label("expected a tag that is named in `decimals_from` or `unit_from`");
+            problem.label("expected a tag that is named in `decimals_from`, `scale_from` or `unit_from`");
         } else if let Some(value) = number_of(choice, tag, problems) {
-            if scales && Decimals::announced(value).is_none() {
-                let problem = problems.add(choice.at, format!("{value} is no number of decimals"));
-                problem.label(format!("expected 0 to {}", Decimals::MAX));
+            let scaled = scope.tags.iter().map(|other| other.decimals);
+            let mut unusable =
+                scaled.filter(|decimals| decimals.source() == Some(tag.id) && decimals.announced(value).is_none());
+            if let Some(decimals) = unusable.next() {
+                let is_power = decimals.power_source().is_some();
+                let what = if is_power { "power of ten" } else { "number of decimals" };
+                let problem = problems.add(choice.at, format!("{value} is no {what}"));
+                let (least, most) = decimals.possible();
+                problem.label(format!("expected {least} to {most}"));
             }
             found.push((tag.id, value));
         }

@@ -81,9 +81,10 @@ pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, probl
     let (row, has_default_marks) = row_of(layers, context, problems);
     let (point, kind, is_text) = place(&row, context, problems);
     let links = links(&row, context, problems);
-    let decimals = match links.decimals {
-        Some(tag) => Decimals::From(tag),
-        None => Decimals::Fixed(decimals(&row, kind, problems)),
+    let decimals = match (links.decimals, links.power) {
+        (Some(tag), _) => Decimals::From(tag),
+        (None, Some(tag)) => Decimals::PowerFrom(tag),
+        (None, None) => Decimals::Fixed(decimals(&row, kind, problems)),
     };
     check_scaling(&row, kind, decimals, problems);
     let access = access(&row, point, problems);
@@ -145,7 +146,13 @@ pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, probl
 
 /// The row of its layers, and whether its marks of no value are those of the defaults.
 fn row_of(mut layers: Vec<Raw>, context: &DeviceContext, problems: &mut Problems) -> (TagTable, bool) {
-    for (first, second) in [("min", "min_from"), ("max", "max_from"), ("decimals", "decimals_from")] {
+    for (first, second) in [
+        ("min", "min_from"),
+        ("max", "max_from"),
+        ("decimals", "decimals_from"),
+        ("decimals", "scale_from"),
+        ("decimals_from", "scale_from"),
+    ] {
         either(&mut layers, first, second, problems);
     }
     // A plant file that moves a tag need not repeat the number of the manual.
@@ -182,6 +189,7 @@ const NOWHERE: Point =
 /// The other tags that a row names.
 struct Links {
     decimals: Option<TagId>,
+    power: Option<TagId>,
     unit: Option<TagId>,
     min: Option<TagId>,
     max: Option<TagId>,
@@ -204,6 +212,7 @@ fn links(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Li
     });
     Links {
         decimals: refer(&row.decimals_from, "decimals_from", problems),
+        power: refer(&row.scale_from, "scale_from", problems),
         unit: refer(&row.unit_from, "unit_from", problems),
         min: refer(&row.min_from, "min_from", problems),
         max: refer(&row.max_from, "max_from", problems),
@@ -294,9 +303,10 @@ fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Acce
     if matches!(point.table, Table::Discrete | Table::Input) && !bit {
         problems.add(at, format!("a {} can only be read", point.table.word())).label("expected access = \"r\"");
     }
-    if point.field.is_some() && row.write_fc.is_none() {
+    if point.part().is_some() && row.write_fc.is_none() {
+        let what = if point.field.is_some() { "a field of bits inside a word" } else { "a byte of a register" };
         problems
-            .add(at, "a field of bits inside a word cannot be written by a whole word")
+            .add(at, format!("{what} cannot be written by a whole word"))
             .label("expected access = \"r\", or write_fc = 22")
             .help("it would overwrite the other bits; function 22, mask write, does not, if the device has it");
     }
@@ -305,7 +315,7 @@ fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Acce
         problem.help("a tag that cannot be read back has access = \"w\"");
     }
     if let Some(fc) = row.write_fc {
-        let allowed: &[u8] = match (point.table.is_bits(), point.field.is_some(), point.len()) {
+        let allowed: &[u8] = match (point.table.is_bits(), point.part().is_some(), point.len()) {
             (true, ..) => &[5, 15],
             (false, true, _) => &[22],
             (false, false, 1) => &[6, 16, 23],

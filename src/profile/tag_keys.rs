@@ -8,20 +8,20 @@ use super::{
 };
 use crate::plant::{
     address::{in_table, table_named},
-    tag::{Access, ByteOrder, Point, StorePolicy},
+    tag::{Access, ByteOrder, DataType, Point, StorePolicy},
 };
 
 /// Keys that a text does not have.
 #[rustfmt::skip]
-const FOR_NUMBERS: [&str; 16] = [
-    "scale", "offset", "decimals", "decimals_from", "unit", "unit_from", "min", "max", "min_from", "max_from", "enum", "bits",
+const FOR_NUMBERS: [&str; 17] = [
+    "scale", "offset", "decimals", "decimals_from", "scale_from", "unit", "unit_from", "min", "max", "min_from", "max_from", "enum", "bits",
     "bad_if", "quality_from", "deadband", "normal",
 ];
 
 /// Keys that belong to a register.
 #[rustfmt::skip]
-const FOR_REGISTERS: [&str; 26] = [
-    "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "unit_from", "access", "verify",
+const FOR_REGISTERS: [&str; 27] = [
+    "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "scale_from", "unit_from", "access", "verify",
     "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_unlock", "poll",
     "poll_class", "simulate", "default", "set",
 ];
@@ -45,7 +45,7 @@ pub(super) fn strip_default(mut defaults: Raw, own: &[Raw], scheme: Scheme) -> R
         foreign.extend(FOR_REGISTERS);
     } else if table.is_some_and(|table| table.is_bits()) {
         foreign.extend(["type", "order", "field"].into_iter().chain(FOR_NUMBERS));
-    } else if kind.starts_with("string") {
+    } else if kind.parse().is_ok_and(DataType::is_text) {
         foreign.extend(FOR_NUMBERS);
         // Only the bytes of a text have an order.
         foreign.extend(written(of_default, "order").filter(|order| order == ByteOrder::Cdab.word()).map(|_| "order"));

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::{
     plant::{
+        data_type::UnknownType,
         def::{Reauthentication, Role},
         exact::Exact,
         keyword::keyword_enum,
@@ -97,6 +98,8 @@ toml_tables! {
         opt "offset" offset: f64,
         opt "decimals" decimals: u8,
         opt "decimals_from" decimals_from: String,
+        /// A tag that holds the power of ten by which it is multiplied.
+        opt "scale_from" scale_from: String,
         opt "unit" unit: String,
         opt "unit_from" unit_from: String,
         opt "min" min: Exact,
@@ -332,21 +335,19 @@ pub(crate) struct TypeName(pub DataType);
 impl Value for TypeName {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
         let word = <String as Value>::read(value, at, problems)?;
-        if let Some(rest) = word.strip_prefix("string") {
-            let count = rest.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
-            let count =
-                count.and_then(|count| count.trim().parse().ok()).filter(|n| (1..=DataType::TEXT_MAX).contains(n));
-            if count.is_none() {
+        match word.parse() {
+            Ok(kind) => return Some(TypeName(kind)),
+            Err(UnknownType::Length(most)) => {
+                let name = word.split('(').next().unwrap_or_default();
                 let problem = problems.add(at, format!("`{word}` does not say how long the text is"));
-                problem.label(format!("expected \"string(N)\" with N bytes, 1 to {}", DataType::TEXT_MAX));
+                problem.label(format!("expected \"{name}(N)\" with N from 1 to {most}"));
             }
-            return count.map(|count| TypeName(DataType::Text(count)));
+            Err(UnknownType::Name) => {
+                let names: Vec<String> = DataType::NUMBERS.into_iter().map(|kind| kind.to_string()).collect();
+                let problem = problems.add(at, format!("unknown type `{word}`")).label("not a type");
+                problem.suggest(&word, names.iter().map(String::as_str));
+            }
         }
-        let found = DataType::NUMBERS.into_iter().find(|kind| kind.name() == word);
-        if found.is_none() {
-            let names = DataType::NUMBERS.into_iter().map(DataType::name);
-            problems.add(at, format!("unknown type `{word}`")).label("not a type").suggest(&word, names);
-        }
-        found.map(TypeName)
+        None
     }
 }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::plant::{
     exact::Exact,
-    tag::{Table, TagDef},
+    tag::{Decimals, Table, TagDef},
 };
 
 fn meter(more: &str) -> String {
@@ -167,4 +167,23 @@ fn any_text_is_a_unit_and_a_known_one_has_one_spelling() {
     {
         assert_eq!(tag(&METER.replace("°C", written), "D1.T").unit, unit, "{written}");
     }
+}
+
+#[test]
+fn a_power_of_ten_is_read_with_its_values() {
+    let map = "[[tag]]\nname = \"W\"\ntable = \"holding\"\naddress = 40083\ntype = \"int16\"\npoll = \"fast\"\n\
+               scale_from = \"W_SF\"\nbad_if = \"sunspec\"\n\
+               [[tag]]\nname = \"W_SF\"\ntable = \"holding\"\naddress = 40084\ntype = \"int16\"\npoll = \"once\"\n\
+               bad_if = \"sunspec\"\n";
+    let map = meter(map).replacen("vendor", "address_base = 0\nvendor", 1);
+    let (value, power) = (tag(&map, "D1.W"), tag(&map, "D1.W_SF"));
+    assert_eq!(value.decimals, Decimals::PowerFrom(power.id));
+    assert_eq!(power.poll, value.poll, "in the same cycle");
+    assert!(value.is_bad(Exact::whole(-32_768)) && power.is_bad(Exact::whole(-32_768)));
+    let both = map.replace("bad_if = \"sunspec\"\n[[", "decimals_from = \"W_SF\"\n[[");
+    assert!(errors(&both).contains("`decimals_from` and `scale_from`"), "{}", errors(&both));
+    let shown = map.replace("bad_if = \"sunspec\"\n[[", "decimals = 1\n[[");
+    assert!(errors(&shown).contains("`decimals` and `scale_from`"), "{}", errors(&shown));
+    let unknown = map.replace("= \"sunspec\"", "= \"solar\"");
+    assert!(errors(&unknown).contains("`solar` stands for no raw numbers"), "{}", errors(&unknown));
 }

@@ -10,9 +10,9 @@ use crate::{
     plant::event::ExceptionCode,
     plant::{
         def::{DeviceDef, Limits, TagId},
-        number::{to_u8, to_u32},
+        number::to_u32,
         scale,
-        tag::{Access, Bound, Decimals, Table, TagDef},
+        tag::{Access, Bound, Table, TagDef},
     },
     sim::pdu::Registers,
 };
@@ -132,11 +132,8 @@ impl Model {
         (tag.point.address..).take(usize::from(tag.point.len())).map(|address| cells.get(&address).copied()).collect()
     }
 
-    fn decimals(&self, tag: &TagDef) -> u8 {
-        match tag.decimals {
-            Decimals::From(from) => self.value(from).map_or(0, to_u8),
-            Decimals::Fixed(_) => 0,
-        }
+    fn decimals(&self, tag: &TagDef) -> i8 {
+        tag.scaling_decimals(|from| self.value(from)).unwrap_or(0)
     }
 
     fn bound(&self, bound: Option<Bound>) -> Option<f64> {

@@ -313,7 +313,7 @@ fn write_request(tag: &TagDef, raw: Exact) -> Option<Request<'static>> {
             Some(15) => Request::WriteMultipleCoils(address, Cow::Owned(vec![raw != 0.0])),
             Some(_) | None => Request::WriteSingleCoil(address, raw != 0.0),
         }),
-        Table::Holding if tag.point.field.is_some() => {
+        Table::Holding if tag.point.part().is_some() => {
             let (and, or) = codec::field_masks(tag.point, raw)?;
             Some(Request::MaskWriteRegister(address, and, or))
         }

@@ -171,6 +171,7 @@ impl Rule {
         }
         let order = self.word_order.as_deref().map_or(Some(usual), words::order_of);
         let order = order.ok_or_else(|| t!("unknown word order").to_owned())?;
+        let order = if kind.is_half() { ByteOrder::Abcd } else { order };
         let (mut scale, mut offset) = (1.0, 0.0);
         for op in &self.ops {
             let wrong = || t!("{op} is not a step that a scale and an offset can do", op);
@@ -228,7 +229,8 @@ fn exported(cell: impl Fn(&str) -> String, of: AddressContext) -> Result<Named, 
         return Err(t!("{written}: no name", written));
     }
     let kind = if word == "int1" { Some(DataType::Bool) } else { words::kind_of(&word) };
-    let kind = kind.filter(|kind| table.is_bits() == (*kind == DataType::Bool));
+    // Its 8-bit types are those of devices whose registers have 8 bits.
+    let kind = kind.filter(|kind| table.is_bits() == (*kind == DataType::Bool) && !kind.is_half());
     let kind = kind.ok_or_else(|| t!("{written}: `{word}` is not a known type", written, word))?;
     let number = |name: &str, usual: f64| {
         let text = cell(name);
