@@ -9,6 +9,8 @@
 //!  DCBA    3333    6643      little-endian
 //! ```
 
+mod clock;
+
 use crate::plant::{
     exact::Exact,
     half,
@@ -65,6 +67,9 @@ pub const UNPRINTABLE: char = '·';
 /// its end are filling, each byte or character that cannot be printed is shown as [`UNPRINTABLE`], and text of which
 /// nothing can be printed as the hex of its bytes. `None` for a point that holds no text.
 pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
+    if let DataType::Clock(clock) = point.kind {
+        return clock::text(clock, &in_order(point.order, words));
+    }
     let count = point.kind.length().filter(|_| point.kind.is_text())?;
     let bytes = to_bytes(point.order, words);
     // A character that does not fit one byte is none that can be printed.
@@ -140,6 +145,19 @@ pub fn field_masks(point: Point, value: impl Into<Exact>) -> Option<(u16, u16)> 
     let value = value.into().as_whole().filter(|value| (least..=most).contains(value))?;
     let on_wire = |bits: u64| from_bytes(point.order, &to_u16(bits).to_be_bytes())[0];
     Some((!on_wire(field << low), on_wire((Exact::whole(value).bits() & field) << low)))
+}
+
+/// The registers of a field of bits, or of one byte, once its number is set in what they hold now; `None` if it does not fit.
+pub fn modified(point: Point, held: &[u16], value: impl Into<Exact>) -> Option<Vec<u16>> {
+    let (low, width) = point.part()?;
+    let (least, most) = point.raw_range()?;
+    let value = value.into().as_whole().filter(|value| (least..=most).contains(value))?;
+    let bytes = to_bytes(point.order, held);
+    let bits = bytes.iter().fold(0u64, |bits, byte| (bits << 8) | u64::from(*byte));
+    let own = mask(width) << low;
+    let set = bits & !own | (Exact::whole(value).bits() << low) & own;
+    (bytes.len() == 2 * usize::from(point.kind.registers()))
+        .then(|| from_bytes(point.order, &set.to_be_bytes()[8 - bytes.len()..]))
 }
 
 fn mask(width: u8) -> u64 {

@@ -59,6 +59,36 @@ pub enum DataType {
     TextToNul(u8),
     /// So many characters of text, one in each register: in its low byte, in the order BADC in the high one.
     Chars(u8),
+    /// Date and time, shown as text.
+    Clock(Clock),
+}
+
+/// How a device keeps date and time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Clock {
+    /// Seconds since 1970 in 32 bits, UTC.
+    Epoch,
+    /// Year, month, day, hour, minute, second, a register each.
+    Words,
+    /// The same in bytes, year since 2000, in three registers.
+    Bytes,
+    /// The same with two decimal digits a byte.
+    Bcd,
+}
+
+impl Clock {
+    /// All of them.
+    pub const ALL: [Clock; 4] = [Clock::Epoch, Clock::Words, Clock::Bytes, Clock::Bcd];
+
+    /// Name in profiles and registers.
+    fn row(self) -> (&'static str, u16) {
+        match self {
+            Clock::Epoch => ("epoch32", 2),
+            Clock::Words => ("clock_words", 6),
+            Clock::Bytes => ("clock_bytes", 3),
+            Clock::Bcd => ("clock_bcd", 3),
+        }
+    }
 }
 
 /// How the bits of a raw value make a number.
@@ -145,6 +175,10 @@ impl DataType {
             DataType::SignedMod10k(registers) => ("smod10k", registers.into(), Encoding::Mod10k),
             DataType::TextToNul(bytes) => ("cstring", u16::from(bytes).div_ceil(2), Encoding::Text),
             DataType::Chars(registers) => ("chars", registers.into(), Encoding::Text),
+            DataType::Clock(clock) => {
+                let (name, registers) = clock.row();
+                (name, registers, Encoding::Text)
+            }
         }
     }
 
@@ -161,9 +195,8 @@ impl DataType {
     /// Bits of the value: those of its registers, or fewer.
     pub fn bits(self) -> u8 {
         match self {
-            DataType::I8 | DataType::U8 => 8,
             DataType::I24 | DataType::U24 => 24,
-            _ => to_u8(16 * self.registers()),
+            kind => to_u8(if kind.is_half() { 8 } else { 16 * kind.registers() }),
         }
     }
 
@@ -225,6 +258,9 @@ impl FromStr for DataType {
     fn from_str(word: &str) -> Result<DataType, UnknownType> {
         if let Some(kind) = DataType::NUMBERS.into_iter().find(|kind| kind.to_string() == word) {
             return Ok(kind);
+        }
+        if let Some(clock) = Clock::ALL.into_iter().find(|clock| clock.row().0 == word) {
+            return Ok(DataType::Clock(clock));
         }
         let (name, rest) = word.split_at(word.find('(').unwrap_or(word.len()));
         let texts: [fn(u8) -> DataType; 3] = [DataType::Text, DataType::TextToNul, DataType::Chars];

@@ -313,7 +313,10 @@ impl ProcessImage {
     /// The raw number last read, if the sample still stands on it.
     pub fn good_raw(&self, tag: TagId) -> Option<Exact> {
         self.sample(tag).good_value()?;
-        self.raw[tag.index()].map(|reading| reading.raw)
+        let (def, reading) = (self.def.tag(tag), self.raw[tag.index()]?);
+        // One of another power of ten is none that can be compared.
+        let is_of_now = def.decimals.power_source().is_none() || reading.decimals == self.scaling_decimals(def);
+        is_of_now.then_some(reading.raw)
     }
 
     fn mark_uncertain(&mut self, tag: TagId, cause: Cause) {

@@ -74,6 +74,11 @@ pub struct TagDef {
     pub quality_from: Option<(TagId, u64)>,
     /// Function code to write with; `None` picks 5/6 for one word, 16 for more.
     pub write_fc: Option<u8>,
+    /// Where it is written, if not where it is read.
+    pub write_at: Option<(Table, u16)>,
+    /// Written by reading its registers, setting its own bits and writing them back: another master, or the device itself, that
+    /// changes the others in between is overwritten.
+    pub read_modify_write: bool,
     /// Tag and value to write before this one (Delta DTB 0810H).
     pub write_unlock: Option<(TagId, f64)>,
     /// Group on the controller tab.
@@ -141,6 +146,8 @@ impl TagDef {
             bad_if: Vec::new(),
             quality_from: None,
             write_fc: None,
+            write_at: None,
+            read_modify_write: false,
             write_unlock: None,
             group: String::new(),
             poll: Poll::Every(Duration::from_secs(1)),
@@ -208,9 +215,14 @@ impl TagDef {
     pub fn is_text(&self) -> bool {
         self.point.kind.is_text()
     }
+    /// Where and as what it is written.
+    pub fn write_point(&self) -> Point {
+        self.write_at.map_or(self.point, |(table, address)| Point { table, address, ..self.point })
+    }
     /// The function code that it is written with: the profile's, else 5 or 6 for one bit or word, 16 for more.
     pub fn write_function(&self) -> Option<u8> {
-        let usual = match (self.point.table.is_bits(), self.point.len()) {
+        let point = self.write_point();
+        let usual = match (point.table.is_bits(), point.len()) {
             (true, _) => 5,
             (false, 1) => 6,
             (false, _) => 16,

@@ -4,8 +4,8 @@ use std::{rc::Rc, time::Duration};
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Names, Scope, Unique, check_number, held_number_of, number_of},
-    reader::{At, Node, OptionalKey, Raw, text},
+    names::{Names, Scope, check_number, held_number_of, number_of},
+    reader::{At, OptionalKey, Raw, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, Stated},
     simulate::simulate,
     tag::{Defined, range_of},
@@ -19,7 +19,7 @@ use crate::plant::{
 
 /// The keys of a device profile that stand in the plant file itself; `None` where there is no map at all.
 pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Option<Rc<ProfileFile>> {
-    if table.tags.is_empty() {
+    if table.tags.is_empty() && table.repeats.is_empty() {
         let at = table.name.as_ref().map_or(table.at, |name| name.at);
         problems
             .add(at, "a device needs `profile`, or tags of its own")
@@ -47,6 +47,8 @@ pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Op
         exception_status: None,
         output: None,
         tags: Vec::new(),
+        repeats: Vec::new(),
+        alarms: Vec::new(),
         actions: table.actions.clone(),
         faceplate: table.faceplate.clone(),
         program: table.program.clone(),
@@ -79,41 +81,6 @@ const OF_PROFILE: [&str; 11] = [
     "program",
     "signature",
 ];
-
-/// One tag before it is defined: a plant file's keys lie on the profile's, which lie on the profile's defaults.
-pub(super) struct Row {
-    pub short: String,
-    pub layers: Vec<Raw>,
-}
-
-/// The rows of a device. A `[[device.tag]]` with the name of a profile's tag changes it, any other is a new tag.
-pub(super) fn rows(device: &DeviceTable, profile: &ProfileFile, problems: &mut Problems) -> Vec<Row> {
-    let default = profile.default.as_ref().map(|default| default.value.clone());
-    let mut rows = Vec::new();
-    for tags in [&profile.tags, &device.tags] {
-        let mut seen = Unique::default();
-        for tag in tags {
-            let (short, at) = short_name(&tag.value);
-            if !short.is_empty() && !seen.insert(&short, at, format!("duplicate tag `{short}`"), problems) {
-                continue;
-            }
-            let raw = tag.value.clone();
-            match rows.iter_mut().find(|row: &&mut Row| row.short == short && !short.is_empty()) {
-                Some(row) => row.layers.insert(0, raw),
-                None => rows.push(Row { short, layers: std::iter::once(raw).chain(default.clone()).collect() }),
-            }
-        }
-    }
-    rows
-}
-
-/// The name of a row and where it stands; empty if it has none, which is reported when the row is read.
-fn short_name(raw: &Raw) -> (String, Span) {
-    match raw.table.get("name") {
-        Some((_, At { value: Node::Text(name), at })) => (name.clone(), *at),
-        _ => (String::new(), raw.at),
-    }
-}
 
 /// What a device needs of time and of its line.
 #[derive(Debug, Clone, Copy, Default)]
@@ -172,6 +139,15 @@ pub(super) fn limits(device: &DeviceTable, profile: &ProfileFile, problems: &mut
         units_max: table.units_max.map(|count| count.value),
     };
     (limits, timing)
+}
+
+/// A poll period that a line can keep and an operator can wait for.
+pub(super) fn period(written: Option<At<Duration>>, default_s: u64, problems: &mut Problems) -> Duration {
+    let Some(period) = written else { return Duration::from_secs(default_s) };
+    if period.value < Duration::from_millis(50) || period.value > Duration::from_secs(86_400) {
+        problems.add(period.at, "this is not a poll period").label("expected 50ms to 1 day");
+    }
+    period.value
 }
 
 /// The function codes that the profile lists, against those that its tags need.

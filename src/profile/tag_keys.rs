@@ -3,11 +3,12 @@
 use super::{
     address::memory_table,
     diagnostic::{Problems, Span},
-    reader::{Node, Raw},
+    reader::{At, Node, Raw},
     schema::{Scheme, TagTable},
 };
 use crate::plant::{
     address::{in_table, table_named},
+    data_type::Clock,
     tag::{Access, ByteOrder, DataType, Point, StorePolicy},
 };
 
@@ -20,9 +21,9 @@ const FOR_NUMBERS: [&str; 17] = [
 
 /// Keys that belong to a register.
 #[rustfmt::skip]
-const FOR_REGISTERS: [&str; 27] = [
+const FOR_REGISTERS: [&str; 29] = [
     "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "scale_from", "unit_from", "access", "verify",
-    "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_unlock", "poll",
+    "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_address", "write", "write_unlock", "poll",
     "poll_class", "simulate", "default", "set",
 ];
 
@@ -76,7 +77,8 @@ pub(super) fn check_text(row: &TagTable, point: Point, problems: &mut Problems) 
     for (key, at) in FOR_NUMBERS.into_iter().filter_map(|key| Some((key, row.span_of(key)?))) {
         problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
     }
-    if let Some(order) = row.order.filter(|order| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba)) {
+    let is_reversed = |order: &At<ByteOrder>| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba);
+    if let Some(order) = row.order.filter(|order| is_reversed(order) && point.kind != DataType::Clock(Clock::Epoch)) {
         let problem = problems.add(order.at, "the words of a text cannot be reversed");
         problem.label("expected \"ABCD\", high byte first, or \"BADC\", low byte first");
     }

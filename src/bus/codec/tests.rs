@@ -273,7 +273,7 @@ fn rare_types_are_read_as_their_manuals_say() {
 }
 
 #[test]
-fn text_ends_at_nul_and_has_one_character_a_register_where_it_is_so() {
+fn text_may_end_at_nul_or_have_one_character_a_register() {
     let check = |kind, order, words: &[u16], expect: &str| {
         let point = point(kind, order);
         assert_eq!(decode_text(point, words).as_deref(), Some(expect), "{kind}");
@@ -286,4 +286,16 @@ fn text_ends_at_nul_and_has_one_character_a_register_where_it_is_so() {
     check(DataType::Chars(3), ByteOrder::Badc, &[0x4100, 0x4200, 0x4300], "ABC");
     let odd = decode_text(point(DataType::Chars(2), abcd), &[0x0141, 0x0042]);
     assert_eq!(odd.as_deref(), Some("·B"), "no character of one byte");
+}
+
+#[test]
+fn a_part_is_modified_in_any_register_of_a_word() {
+    let high = Point { field: Some((20, 4)), ..point(DataType::U32, ByteOrder::Cdab) };
+    let words = modified(high, &[0x1234, 0xABCD], 5.0).expect("it fits");
+    assert_eq!(words, [0x1234, 0xAB5D]);
+    assert_eq!(decode(high, &words), Some(5.0.into()));
+    assert_eq!(modified(high, &[0x1234, 0xABCD], 16.0), None, "four bits hold 0 to 15");
+    assert_eq!(modified(high, &[0x1234], 5.0), None, "too few registers");
+    assert_eq!(modified(point(DataType::I8, ByteOrder::Badc), &[0x1234], -1.0), Some(vec![0xFF34]));
+    assert_eq!(modified(point(DataType::U16, ByteOrder::Abcd), &[0x1234], 1.0), None, "it is the whole register");
 }

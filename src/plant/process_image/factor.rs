@@ -13,7 +13,7 @@ use super::{ProcessImage, Reading};
 use crate::plant::{
     def::TagId,
     exact::Exact,
-    sample::Cause,
+    sample::{Cause, Sample},
     tag::{Decimals, TagDef},
 };
 
@@ -35,7 +35,7 @@ impl ProcessImage {
             self.heard[tag.index()].hear(at);
         }
         let is_in_answer = |tag: TagId| values.iter().any(|(other, _)| *other == tag);
-        self.settle_own(values.iter().map(|(tag, _)| *tag), &is_in_answer);
+        self.settle_own(at, values.iter().map(|(tag, _)| *tag), &is_in_answer);
         for (tag, _) in values {
             for dependent in self.dependents[tag.index()].clone() {
                 self.settle_dependent(dependent, &before, &is_in_answer, at);
@@ -61,7 +61,12 @@ impl ProcessImage {
 
     /// Makes samples of what an answer holds. What is scaled by a power of ten comes last, and waits for a later answer if this
     /// one has no power for it.
-    fn settle_own(&mut self, tags: impl Iterator<Item = TagId> + Clone, is_in_answer: &impl Fn(TagId) -> bool) {
+    fn settle_own(
+        &mut self,
+        at: Timestamp,
+        tags: impl Iterator<Item = TagId> + Clone,
+        is_in_answer: &impl Fn(TagId) -> bool,
+    ) {
         let is_scaled = |image: &ProcessImage, tag: TagId| image.def.tag(tag).decimals.power_source();
         for tag in tags.clone() {
             if is_scaled(self, tag).is_none() {
@@ -78,6 +83,8 @@ impl ProcessImage {
             if is_in_answer(source) || self.sample(source).is_stated() {
                 self.raw[tag.index()] = self.waiting[tag.index()].take();
                 self.recompute_sample(tag);
+            } else if decimals.is_none() && self.raw[tag.index()].is_none() {
+                self.set(tag, Sample::bad(Cause::Unscaled, at));
             }
         }
     }
@@ -120,7 +127,7 @@ mod tests {
     use super::*;
     use crate::plant::{
         fixture::{self, DP, FAULT, PV, SV},
-        sample::{Quality, Sample},
+        sample::Quality,
         tag::Decimals,
     };
 
@@ -174,6 +181,13 @@ mod tests {
     }
 
     #[test]
+    fn a_power_that_never_comes_is_named() {
+        let mut image = image();
+        image.read(&[(PV, 41.0)], at(1));
+        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::Unscaled));
+    }
+
+    #[test]
     fn what_waits_is_gone_with_its_device() {
         let mut image = image();
         image.read(&[(DP, 0.0)], at(1));
@@ -202,7 +216,7 @@ mod tests {
             let mut image = image();
             let mut power = -5;
             for (second, step) in (1..).zip(steps) {
-                let (raw, announced) = (1e6 / 10_f64.powi(power), f64::from(power));
+                let (raw, announced) = (10_f64.powi(6 - power), f64::from(power));
                 match step {
                     0 => power = (power + 1).min(6),
                     1 => image.read(&[(PV, raw)], at(second)),

@@ -276,10 +276,17 @@ fn sample(reading: &LiveReading, named: &Named, before: Sample) -> Sample {
 
 /// A value for the log: a plain float with all its digits, others with the decimals of their scale.
 fn logged(named: &Named, value: Exact) -> String {
-    match named.kind {
-        DataType::F32 if named.scale == 1.0 => to_f32(value.near()).to_string(),
-        DataType::F64 if named.scale == 1.0 => value.to_string(),
-        _ => digits(value, Some(named.decimals)),
+    match named.kind.encoding() {
+        Encoding::Float if named.scale == 1.0 && named.kind == DataType::F64 => value.to_string(),
+        Encoding::Float if named.scale == 1.0 => to_f32(value.near()).to_string(),
+        Encoding::Float
+        | Encoding::Bit
+        | Encoding::Unsigned
+        | Encoding::Signed
+        | Encoding::Bcd
+        | Encoding::SignMagnitude
+        | Encoding::Mod10k
+        | Encoding::Text => digits(value, Some(named.decimals)),
     }
 }
 
