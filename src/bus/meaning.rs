@@ -169,6 +169,7 @@ fn valued(snapshot: &Snapshot, tag: &TagDef, span: &Span) -> String {
     let shown = format!("{} {}", snapshot.format(tag.id, value), snapshot.unit(tag.id));
     let mut text = format!("{name} = {}", shown.trim_end());
     if let Some(source) = source {
+        let decimals = if tag.decimals.power_source().is_some() { -decimals } else { decimals };
         text += &t!(", {source} is {decimals}", source, decimals);
     } else if tag.enum_labels.is_empty() && tag.unit.is_empty() && !tag.label.is_empty() {
         text += &format!(", {}", tag.label);

@@ -14,6 +14,7 @@ pub mod cost;
 pub mod bisection;
 pub mod gaps;
 mod cheapest;
+mod factor;
 #[cfg(test)]
 #[path = "../../tests/bench/alternatives.rs"]
 mod alternatives;
@@ -103,7 +104,8 @@ fn blocks_of(def: &PlantDef, device: &DeviceDef, unreadable: &UnreadableRanges, 
     tags.sort_by_key(|tag| (tag.poll, tag.point.table, tag.point.address, tag.point.len(), tag.id));
     let wire = Wire::new(def.line(device.line), device);
     let groups = tags.chunk_by(|a, b| (a.poll, a.point.table) == (b.poll, b.point.table));
-    let runs = groups.flat_map(|group| cheapest::cut(group, device, wire, unreadable));
+    let cut = |group| factor::join(cheapest::cut(group, device, wire, unreadable), device, unreadable);
+    let runs = groups.flat_map(cut);
     runs.map(|run| together(device, &run)).chain(refused.iter().map(|tag| asked_again(device, tag))).collect()
 }
 

@@ -8,7 +8,7 @@ use crate::plant::{
     def::{DeviceDef, Probe},
     exact::Exact,
     live::AddressSpan,
-    number::to_u16,
+    number::{to_i8, to_u16},
     scale,
     tag::{Decimals, Point, TagDef},
 };
@@ -86,11 +86,11 @@ pub fn best<'a>(known: &'a [Arc<PlantDef>], words: Words) -> Option<(&'a Arc<Pla
 }
 
 /// Decimals and unit of a tag as the device says; `None` where it was not read or says nothing of use.
-pub fn scaling(def: &PlantDef, tag: &TagDef, words: Words) -> Option<(u8, String)> {
+pub fn scaling(def: &PlantDef, tag: &TagDef, words: Words) -> Option<(i8, String)> {
     let value = |of| raw_of(def.tag(of).point, words).map(|raw| scale::to_value(def.tag(of), raw, 0));
     let decimals = match tag.decimals {
-        Decimals::Fixed(decimals) => decimals,
-        Decimals::From(_) => tag.scaling_decimals(value)?,
+        Decimals::Fixed(decimals) => to_i8(decimals),
+        Decimals::From(_) | Decimals::PowerFrom(_) => tag.scaling_decimals(value)?,
     };
     Some((decimals, tag.unit_by(value)?.to_owned()))
 }

@@ -115,6 +115,7 @@ fn place(line: &LineDef, unit: u8) -> String {
     let mode = match (&line.transport, line.transport.framing()) {
         (Transport::Serial { .. }, Framing::Ascii) => " --mode ascii",
         (Transport::Tcp { .. }, Framing::Rtu) => " --mode rtu-over-tcp",
+        (Transport::Tcp { .. }, Framing::Ascii) => " --mode ascii-over-tcp",
         (Transport::Serial { .. } | Transport::Tcp { .. }, _) => "",
     };
     let serial = line.transport.serial().map_or(String::new(), |serial| {

@@ -46,6 +46,8 @@ enum ModeArg {
     Tcp,
     /// RTU frames over TCP, as a serial server passes them on
     RtuOverTcp,
+    /// ASCII frames over TCP
+    AsciiOverTcp,
 }
 
 impl From<ModeArg> for Mode {
@@ -55,6 +57,7 @@ impl From<ModeArg> for Mode {
             ModeArg::Ascii => Mode::Ascii,
             ModeArg::Tcp => Mode::Tcp,
             ModeArg::RtuOverTcp => Mode::RtuOverTcp,
+            ModeArg::AsciiOverTcp => Mode::AsciiOverTcp,
         }
     }
 }
@@ -97,12 +100,10 @@ fn check(service: Service, args: &Args) -> Result<(), CliError> {
     let refuse = |why: &str| Err(CliError::Usage(why.to_owned()));
     match service.mode {
         Mode::Rtu if service.serial.data_bits == 7 => refuse("Modbus RTU needs 8 data bits"),
-        Mode::Rtu | Mode::Ascii if args.tcp.is_some() => refuse("`--tcp` is for the modes tcp and rtu-over-tcp"),
-        Mode::Tcp | Mode::RtuOverTcp if args.link.is_some() => refuse("`--link` is for the modes rtu and ascii"),
-        Mode::Tcp | Mode::RtuOverTcp if args.data_bits.is_some() => {
-            refuse("`--data-bits` is for the modes rtu and ascii")
-        }
-        Mode::Rtu | Mode::Ascii | Mode::Tcp | Mode::RtuOverTcp => Ok(()),
+        Mode::Rtu | Mode::Ascii if args.tcp.is_some() => refuse("`--tcp` is for the modes over TCP"),
+        mode if mode.is_tcp() && args.link.is_some() => refuse("`--link` is for the modes rtu and ascii"),
+        mode if mode.is_tcp() && args.data_bits.is_some() => refuse("`--data-bits` is for the modes rtu and ascii"),
+        Mode::Rtu | Mode::Ascii | Mode::Tcp | Mode::RtuOverTcp | Mode::AsciiOverTcp => Ok(()),
     }
 }
 

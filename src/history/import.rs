@@ -293,8 +293,8 @@ fn value(tag: &TagDef, found: &str, line: u64, mark: &mut DecimalMark) -> Result
     let fits = |value: &Exact| match (tag.enum_labels.is_empty(), tag.point.table.is_bits()) {
         (false, _) => tag.label_of(*value).is_some(),
         (true, true) => is_bit(*value),
-        // With decimals that the device announces its range is smaller still.
-        (true, false) => scale::to_raw(tag, *value, 0).is_some(),
+        // With the decimals that the device announces its range is no greater.
+        (true, false) => scale::to_raw(tag, *value, tag.decimals.possible().0).is_some(),
     };
     let labels: Vec<&str> = tag.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
     let expected = match (mark.read(found, line), labels.is_empty()) {

@@ -1,10 +1,10 @@
 //! The types of raw values. A new type is a row here; the codec works by [`Encoding`] and size.
 
-use std::fmt;
+use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
-use super::keyword::keyword_enum;
+use super::{keyword::keyword_enum, number::to_u8};
 
 /// Type of a raw value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -33,6 +33,62 @@ pub enum DataType {
     Bcd32,
     /// This many bytes of text, two a register. It has no number: see [`super::snapshot::Snapshot::text`].
     Text(u8),
+    /// 8 bits, two's complement: the low byte of a register, in the order BADC the high one. The other byte is not its own.
+    I8,
+    /// 8 bits, the same.
+    U8,
+    /// 24 bits, two's complement, in two registers whose upper byte only repeats the sign, or is 0.
+    I24,
+    /// 24 bits in two registers whose upper byte is 0.
+    U24,
+    /// 48 bits, two's complement.
+    I48,
+    /// 48 bits.
+    U48,
+    /// IEEE 754 half.
+    F16,
+    /// A sign bit and 15 bits.
+    Sm16,
+    /// A sign bit and 31 bits.
+    Sm32,
+    /// So many registers of four decimal digits each, 0 to 9999 in binary.
+    Mod10k(u8),
+    /// The same with a sign that all registers have, -9999 to 9999.
+    SignedMod10k(u8),
+    /// So many bytes of text that ends at the first NUL; what follows is none of it.
+    TextToNul(u8),
+    /// So many characters of text, one in each register: in its low byte, in the order BADC in the high one.
+    Chars(u8),
+    /// Date and time, shown as text.
+    Clock(Clock),
+}
+
+/// How a device keeps date and time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Clock {
+    /// Seconds since 1970 in 32 bits, UTC.
+    Epoch,
+    /// Year, month, day, hour, minute, second, a register each.
+    Words,
+    /// The same in bytes, year since 2000, in three registers.
+    Bytes,
+    /// The same with two decimal digits a byte.
+    Bcd,
+}
+
+impl Clock {
+    /// All of them.
+    pub const ALL: [Clock; 4] = [Clock::Epoch, Clock::Words, Clock::Bytes, Clock::Bcd];
+
+    /// Name in profiles and registers.
+    fn row(self) -> (&'static str, u16) {
+        match self {
+            Clock::Epoch => ("epoch32", 2),
+            Clock::Words => ("clock_words", 6),
+            Clock::Bytes => ("clock_bytes", 3),
+            Clock::Bcd => ("clock_bcd", 3),
+        }
+    }
 }
 
 /// How the bits of a raw value make a number.
@@ -48,13 +104,17 @@ pub enum Encoding {
     Bcd,
     /// IEEE 754, single or double by size.
     Float,
+    /// A sign bit and a size.
+    SignMagnitude,
+    /// Registers of four decimal digits in binary.
+    Mod10k,
     /// No number.
     Text,
 }
 
 impl DataType {
     /// Every type that holds a number.
-    pub const NUMBERS: [DataType; 11] = [
+    pub const NUMBERS: [DataType; 26] = [
         DataType::I16,
         DataType::U16,
         DataType::I32,
@@ -66,9 +126,26 @@ impl DataType {
         DataType::Bcd16,
         DataType::Bcd32,
         DataType::Bool,
+        DataType::I8,
+        DataType::U8,
+        DataType::I24,
+        DataType::U24,
+        DataType::I48,
+        DataType::U48,
+        DataType::F16,
+        DataType::Sm16,
+        DataType::Sm32,
+        DataType::Mod10k(2),
+        DataType::Mod10k(3),
+        DataType::Mod10k(4),
+        DataType::SignedMod10k(2),
+        DataType::SignedMod10k(3),
+        DataType::SignedMod10k(4),
     ];
     /// Longest text, bytes: what one read of 125 registers holds.
     pub const TEXT_MAX: u8 = 250;
+    /// Most registers of one character each: what one read holds.
+    pub const CHARS_MAX: u8 = 125;
 
     /// Name in profiles, registers, encoding.
     fn row(self) -> (&'static str, u16, Encoding) {
@@ -85,10 +162,27 @@ impl DataType {
             DataType::Bcd16 => ("bcd16", 1, Encoding::Bcd),
             DataType::Bcd32 => ("bcd32", 2, Encoding::Bcd),
             DataType::Text(bytes) => ("string", u16::from(bytes).div_ceil(2), Encoding::Text),
+            DataType::I8 => ("int8", 1, Encoding::Signed),
+            DataType::U8 => ("uint8", 1, Encoding::Unsigned),
+            DataType::I24 => ("int24", 2, Encoding::Signed),
+            DataType::U24 => ("uint24", 2, Encoding::Unsigned),
+            DataType::I48 => ("int48", 3, Encoding::Signed),
+            DataType::U48 => ("uint48", 3, Encoding::Unsigned),
+            DataType::F16 => ("float16", 1, Encoding::Float),
+            DataType::Sm16 => ("sm16", 1, Encoding::SignMagnitude),
+            DataType::Sm32 => ("sm32", 2, Encoding::SignMagnitude),
+            DataType::Mod10k(registers) => ("mod10k", registers.into(), Encoding::Mod10k),
+            DataType::SignedMod10k(registers) => ("smod10k", registers.into(), Encoding::Mod10k),
+            DataType::TextToNul(bytes) => ("cstring", u16::from(bytes).div_ceil(2), Encoding::Text),
+            DataType::Chars(registers) => ("chars", registers.into(), Encoding::Text),
+            DataType::Clock(clock) => {
+                let (name, registers) = clock.row();
+                (name, registers, Encoding::Text)
+            }
         }
     }
 
-    /// The name in profiles, without the length of a text.
+    /// The name in profiles, without its length.
     pub fn name(self) -> &'static str {
         self.row().0
     }
@@ -96,6 +190,36 @@ impl DataType {
     /// Registers it takes.
     pub fn registers(self) -> u16 {
         self.row().1
+    }
+
+    /// Bits of the value: those of its registers, or fewer.
+    pub fn bits(self) -> u8 {
+        match self {
+            DataType::I24 | DataType::U24 => 24,
+            kind => to_u8(if kind.is_half() { 8 } else { 16 * kind.registers() }),
+        }
+    }
+
+    /// Is it one byte of a register, so that the other is something else?
+    pub fn is_half(self) -> bool {
+        matches!(self, DataType::I8 | DataType::U8)
+    }
+
+    /// Does it hold words instead of a number?
+    pub fn is_text(self) -> bool {
+        self.encoding() == Encoding::Text
+    }
+
+    /// The number that stands behind its name: bytes or characters of a text, registers.
+    pub fn length(self) -> Option<u8> {
+        match self {
+            DataType::Text(length)
+            | DataType::TextToNul(length)
+            | DataType::Chars(length)
+            | DataType::Mod10k(length)
+            | DataType::SignedMod10k(length) => Some(length),
+            _ => None,
+        }
     }
 
     /// How its bits make a number.
@@ -111,23 +235,57 @@ impl DataType {
     /// Lowest and highest whole number that it holds; `None` for floats and texts.
     pub fn whole_range(self) -> Option<(i128, i128)> {
         let (_, registers, encoding) = self.row();
-        let bits = 16 * u32::from(registers);
+        let bits = u32::from(self.bits());
         match encoding {
             Encoding::Bit => Some((0, 1)),
             Encoding::Unsigned => Some((0, (1 << bits) - 1)),
             Encoding::Signed => Some((-(1 << (bits - 1)), (1 << (bits - 1)) - 1)),
             Encoding::Bcd => Some((0, 10i128.pow(bits / 4) - 1)),
+            Encoding::SignMagnitude => Some((1 - (1 << (bits - 1)), (1 << (bits - 1)) - 1)),
+            Encoding::Mod10k => {
+                let most = 10_000_i128.pow(registers.into()) - 1;
+                Some((if let DataType::SignedMod10k(_) = self { -most } else { 0 }, most))
+            }
             Encoding::Float | Encoding::Text => None,
         }
     }
 }
 
+/// A type as a profile writes it: `int16`, `string(8)`.
+impl FromStr for DataType {
+    type Err = UnknownType;
+
+    fn from_str(word: &str) -> Result<DataType, UnknownType> {
+        if let Some(kind) = DataType::NUMBERS.into_iter().find(|kind| kind.to_string() == word) {
+            return Ok(kind);
+        }
+        if let Some(clock) = Clock::ALL.into_iter().find(|clock| clock.row().0 == word) {
+            return Ok(DataType::Clock(clock));
+        }
+        let (name, rest) = word.split_at(word.find('(').unwrap_or(word.len()));
+        let texts: [fn(u8) -> DataType; 3] = [DataType::Text, DataType::TextToNul, DataType::Chars];
+        let of_length = texts.into_iter().find(|of| of(1).name() == name).ok_or(UnknownType::Name)?;
+        let most = if of_length(1) == DataType::Chars(1) { DataType::CHARS_MAX } else { DataType::TEXT_MAX };
+        let length = rest.strip_prefix('(').and_then(|rest| rest.strip_suffix(')')?.trim().parse().ok());
+        length.filter(|length| (1..=most).contains(length)).map(of_length).ok_or(UnknownType::Length(most))
+    }
+}
+
+/// Why a word is no type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UnknownType {
+    /// There is no such type.
+    Name,
+    /// A text without its length, at most this.
+    Length(u8),
+}
+
 /// As a profile writes it: `int16`, `string(8)`.
 impl fmt::Display for DataType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            DataType::Text(bytes) => write!(f, "string({bytes})"),
-            _ => f.write_str(self.name()),
+        match self.length() {
+            Some(length) => write!(f, "{}({length})", self.name()),
+            None => f.write_str(self.name()),
         }
     }
 }

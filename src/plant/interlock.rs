@@ -13,7 +13,7 @@ use super::{
     role::Role,
     sample::{Cause, Sample},
     scale,
-    tag::{Decimals, TagDef},
+    tag::TagDef,
 };
 use crate::plant::time::elapsed;
 
@@ -145,7 +145,7 @@ pub fn stops<'a>(logic: &'a ControlLogic, actions: &'a [ActionDef], tag: TagId) 
 /// The interlocks of this value of a command. Here and below `value` is what is asked for, and what is then sent is compared
 /// ([`scale::is_sent_as`]); `decimals` are those of [`TagDef::scaling_decimals`], `None` where they are not known: then the strictest
 /// of all that are possible counts.
-pub fn of_write(def: &PlantDef, tag: TagId, value: Exact, decimals: Option<u8>) -> impl Iterator<Item = &InterlockDef> {
+pub fn of_write(def: &PlantDef, tag: TagId, value: Exact, decimals: Option<i8>) -> impl Iterator<Item = &InterlockDef> {
     let written = def.tag(tag);
     let is_meant = move |rule: f64| {
         possible_decimals(written, decimals).any(|decimals| scale::is_sent_as(written, value, rule.into(), decimals))
@@ -158,7 +158,7 @@ pub fn refusal(
     def: &PlantDef,
     tag: TagId,
     value: Exact,
-    decimals: Option<u8>,
+    decimals: Option<i8>,
     sample: impl Fn(TagId) -> Sample,
 ) -> Option<&InterlockDef> {
     let blocks = |lock: &&InterlockDef| lock.refuse && lock.status(sample(lock.of)) == InterlockStatus::Blocked;
@@ -166,27 +166,27 @@ pub fn refusal(
 }
 
 /// Does this value of a command certainly switch something off?
-pub fn is_stop(def: &PlantDef, tag: TagId, value: Exact, decimals: Option<u8>) -> bool {
+pub fn is_stop(def: &PlantDef, tag: TagId, value: Exact, decimals: Option<i8>) -> bool {
     let mut ways = sent_by(def.tag(tag), value, decimals).peekable();
     ways.peek().is_some() && ways.all(|decimals| is_stop_by(def, tag, value, decimals))
 }
 
-fn is_stop_by(def: &PlantDef, tag: TagId, value: Exact, decimals: u8) -> bool {
+fn is_stop_by(def: &PlantDef, tag: TagId, value: Exact, decimals: i8) -> bool {
     let mut stops = stops(&def.logic, &def.device(def.tag(tag).device).actions, tag);
     stops.any(|off| scale::is_sent_as(def.tag(tag), value, off.into(), decimals))
 }
 
 /// By how many decimals the raw number of a tag may be scaled: those that are `known`, else all that its device can announce.
-fn possible_decimals(tag: &TagDef, known: Option<u8>) -> RangeInclusive<u8> {
-    match (tag.decimals, known) {
-        (Decimals::Fixed(_), _) => 0..=0,
-        (Decimals::From(_), Some(known)) => known..=known,
-        (Decimals::From(_), None) => 0..=Decimals::MAX,
+fn possible_decimals(tag: &TagDef, known: Option<i8>) -> RangeInclusive<i8> {
+    let (least, most) = tag.decimals.possible();
+    match known.filter(|_| tag.decimals.source().is_some()) {
+        Some(known) => known..=known,
+        None => least..=most,
     }
 }
 
 /// The decimals by which a value can be sent at all.
-fn sent_by(tag: &TagDef, value: Exact, known: Option<u8>) -> impl Iterator<Item = u8> {
+fn sent_by(tag: &TagDef, value: Exact, known: Option<i8>) -> impl Iterator<Item = i8> {
     possible_decimals(tag, known).filter(move |decimals| scale::to_raw(tag, value, *decimals).is_some())
 }
 
@@ -194,7 +194,7 @@ fn sent_by(tag: &TagDef, value: Exact, known: Option<u8>) -> impl Iterator<Item 
 /// everybody who may operate. Decimals that a device announces may change before the write, so that all are considered.
 pub fn role_to_write(def: &PlantDef, tag: TagId, value: Exact) -> Role {
     let written = def.tag(tag);
-    let role_by = |decimals: u8| {
+    let role_by = |decimals: i8| {
         if is_stop_by(def, tag, value, decimals) {
             return Role::Technician;
         }

@@ -208,6 +208,10 @@ keyword_enum! {
         Even => "E",
         /// Odd.
         Odd => "O",
+        /// Always 1.
+        Mark => "M",
+        /// Always 0.
+        Space => "S",
     }
 }
 

@@ -7,7 +7,9 @@ use crate::t;
 
 /// Shortest time that an answer may take: no device is faster, and less would be all timeouts.
 pub const TIMEOUT_MIN: Duration = Duration::from_millis(10);
-/// Longest time that anything on a line may wait: for so long nothing else goes over it.
+/// Longest time that an answer may take: gateways over radio need so long.
+pub const TIMEOUT_MAX: Duration = Duration::from_secs(60);
+/// Longest time that anything else on a line may wait: for so long nothing goes over it.
 pub const WAIT_MAX: Duration = Duration::from_secs(10);
 
 /// What is wrong with a setting.
@@ -40,7 +42,7 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
     check_transport(&line.transport, &mut check);
     let known = match &line.transport {
         Transport::Serial { framing, .. } => *framing != Framing::Mbap,
-        Transport::Tcp { framing, .. } => *framing != Framing::Ascii,
+        Transport::Tcp { .. } => true,
     };
     check(
         !known,
@@ -50,19 +52,15 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
     );
     let short = t!("too short: no device responds within this time");
     check(line.timeout < TIMEOUT_MIN, "timeout_ms", short.into(), t!("expected at least 10 ms"));
+    let long = t!("too long: the line is blocked for this time");
+    check(TIMEOUT_MAX < line.timeout, "timeout_ms", long.into(), t!("expected at most 60000 ms"));
     for (key, span) in [
-        ("timeout_ms", line.timeout),
         ("request_gap_ms", line.gap),
         ("frame_timeout_ms", line.frame_timeout),
         ("turnaround_ms", line.turnaround),
         ("connect_delay_ms", line.connect_delay),
     ] {
-        check(
-            WAIT_MAX < span,
-            key,
-            t!("too long: the line is blocked for this time").into(),
-            t!("expected at most 10000 ms"),
-        );
+        check(WAIT_MAX < span, key, long.into(), t!("expected at most 10000 ms"));
     }
     let short = t!("too short: responses may arrive in fragments");
     check(
@@ -85,9 +83,9 @@ fn check_transport(transport: &Transport, check: &mut impl FnMut(bool, &'static 
             };
             let fits = data_bits == 8 || (data_bits == 7 && *framing == Framing::Ascii);
             check(port.trim().is_empty(), "port", t!("a serial line needs a port").into(), t!("expected /dev/…"));
-            let unusual = t!("{baud} is not a usual baud rate", baud);
-            let usual = t!("expected 300, 600, 1200 … 9600, 19200, 38400, 57600, 115200 …");
-            check(!BAUDS.contains(&baud), "baud", unusual, usual);
+            let impossible = t!("{baud} baud is out of range", baud);
+            let usual = t!("expected 50 to 4000000, usually 9600, 19200, 38400 or 115200");
+            check(!BAUD_RANGE.contains(&baud), "baud", impossible, usual);
             check(!fits, "data_bits", t!("{who} data bits", who), expected);
             let wrong = !matches!(stop_bits, 1 | 2);
             check(wrong, "stop_bits", t!("{stop_bits} stop bits do not exist", stop_bits), t!("expected 1 or 2"));
@@ -116,10 +114,12 @@ fn check_transport(transport: &Transport, check: &mut impl FnMut(bool, &'static 
 impl Serial {
     /// Can a port have these parameters? Which of them a framing needs is another query.
     pub fn is_usual(self) -> bool {
-        BAUDS.contains(&self.baud) && matches!(self.data_bits, 7 | 8) && matches!(self.stop_bits, 1 | 2)
+        BAUD_RANGE.contains(&self.baud) && matches!(self.data_bits, 7 | 8) && matches!(self.stop_bits, 1 | 2)
     }
 }
 
-/// Baud rates that ports and devices know.
+/// Baud rates that a driver may be asked for; it refuses what it cannot do.
+pub const BAUD_RANGE: std::ops::RangeInclusive<u32> = 50..=4_000_000;
+/// Baud rates that most ports and devices know.
 pub const BAUDS: &[u32] =
     &[300, 600, 1_200, 2_400, 4_800, 9_600, 14_400, 19_200, 28_800, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];

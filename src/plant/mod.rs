@@ -25,6 +25,8 @@ pub(crate) mod line_check;
 pub(crate) mod program;
 pub mod traffic;
 pub(crate) mod data_type;
+pub(crate) mod decimals;
+pub(crate) mod half;
 pub(crate) mod mimic_def;
 pub(crate) mod report_def;
 pub mod def;

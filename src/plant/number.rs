@@ -61,6 +61,7 @@ macro_rules! conversions {
 }
 
 conversions! {
+    to_i8 i8;
     to_u8 u8;
     to_u16 u16;
     to_u32 u32;

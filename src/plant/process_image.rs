@@ -1,5 +1,6 @@
 //! The values of all tags: raw responses become samples, faults and age make them uncertain, changes are stored.
 
+mod factor;
 mod fault_effect;
 mod redefine;
 
@@ -35,6 +36,8 @@ pub struct ProcessImage {
     def: Arc<PlantDef>,
     /// What was last read, by tag; `None` when there is no value to stand on.
     raw: Vec<Option<Reading>>,
+    /// What was read after it and waits for the power of ten of its own cycle, by tag.
+    waiting: Vec<Option<Reading>>,
     pub samples: Vec<Sample>,
     /// The text of tags that hold text, by tag; `None` while there is none to stand on. Shared with snapshots.
     pub texts: Arc<Vec<Option<Arc<str>>>>,
@@ -58,6 +61,8 @@ struct Reading {
     raw: Exact,
     at: Timestamp,
     uncertain: Option<Cause>,
+    /// The decimals of its cycle, for a tag that is scaled by a power of ten.
+    decimals: Option<i8>,
 }
 
 impl ProcessImage {
@@ -72,6 +77,7 @@ impl ProcessImage {
         }
         let mut image = ProcessImage {
             raw: vec![None; count],
+            waiting: vec![None; count],
             samples: vec![Sample::bad(Cause::NotRead, at); count],
             texts: Arc::new(vec![None; count]),
             decimals_seen: vec![0; count],
@@ -113,21 +119,6 @@ impl ProcessImage {
         self.read_as(&values, Some(Cause::Unproven), at);
         self.read_texts(&texts, at);
         texts.iter().for_each(|(tag, _)| self.mark_uncertain(*tag, Cause::Unproven));
-    }
-
-    fn read_as(&mut self, values: &[(TagId, impl Into<Exact> + Copy)], uncertain: Option<Cause>, at: Timestamp) {
-        for (tag, raw) in values {
-            self.raw[tag.index()] = Some(Reading { raw: (*raw).into(), at, uncertain });
-            self.heard[tag.index()].hear(at);
-        }
-        for (tag, _) in values {
-            self.recompute_sample(*tag);
-        }
-        for (tag, _) in values {
-            for dependent in self.dependents[tag.index()].clone() {
-                self.recompute_sample(dependent);
-            }
-        }
     }
 
     /// Takes the texts of one answer.
@@ -306,7 +297,7 @@ impl ProcessImage {
     }
 
     /// Decimals that the device announces for a tag: they scale its raw number. 0 for tags with fixed decimals.
-    pub fn scaling_decimals(&self, tag: &TagDef) -> Option<u8> {
+    pub fn scaling_decimals(&self, tag: &TagDef) -> Option<i8> {
         tag.scaling_decimals(|from| self.sample(from).scaling_value())
     }
 
@@ -314,17 +305,22 @@ impl ProcessImage {
     pub fn shown_decimals(&self, tag: &TagDef) -> u8 {
         match tag.decimals {
             Decimals::Fixed(decimals) => decimals,
-            Decimals::From(_) => self.scaling_decimals(tag).unwrap_or(self.decimals_seen[tag.id.index()]),
+            Decimals::From(_) => self.scaling_decimals(tag).map_or(self.decimals_seen[tag.id.index()], Decimals::shown),
+            Decimals::PowerFrom(_) => self.decimals_seen[tag.id.index()],
         }
     }
 
     /// The raw number last read, if the sample still stands on it.
     pub fn good_raw(&self, tag: TagId) -> Option<Exact> {
         self.sample(tag).good_value()?;
-        self.raw[tag.index()].map(|reading| reading.raw)
+        let (def, reading) = (self.def.tag(tag), self.raw[tag.index()]?);
+        // One of another power of ten is none that can be compared.
+        let is_of_now = def.decimals.power_source().is_none() || reading.decimals == self.scaling_decimals(def);
+        is_of_now.then_some(reading.raw)
     }
 
     fn mark_uncertain(&mut self, tag: TagId, cause: Cause) {
+        self.waiting[tag.index()] = None;
         if let Some(reading) = &mut self.raw[tag.index()] {
             reading.uncertain = Some(cause);
         }
@@ -338,7 +334,7 @@ impl ProcessImage {
     }
 
     fn drop_value(&mut self, tag: TagId, cause: Cause, at: Timestamp) {
-        self.raw[tag.index()] = None;
+        (self.raw[tag.index()], self.waiting[tag.index()]) = (None, None);
         if self.texts[tag.index()].is_some() {
             Arc::make_mut(&mut self.texts)[tag.index()] = None;
         }
@@ -357,15 +353,16 @@ impl ProcessImage {
     /// Makes the sample of a tag from its reading and all that it depends on. It stays uncertain until the tag itself
     /// is read again.
     fn recompute_sample(&mut self, tag: TagId) {
-        let Some(Reading { raw, at, uncertain }) = self.raw[tag.index()] else { return };
+        let Some(reading @ Reading { raw, at, uncertain, .. }) = self.raw[tag.index()] else { return };
         let def = self.def.clone();
         let tag = def.tag(tag);
-        if let Some(decimals) = self.scaling_decimals(tag) {
-            self.decimals_seen[tag.id.index()] = decimals;
+        let scaling = self.decimals_of(tag, reading);
+        if let Some(decimals) = scaling {
+            self.decimals_seen[tag.id.index()] = Decimals::shown(decimals);
         }
         let fault_word = tag.quality_from.map(|(from, mask)| (self.sample(from), self.good_raw(from), mask));
         let no_value = tag.is_bad(raw);
-        let sample = match (no_value, self.scaling_decimals(tag)) {
+        let sample = match (no_value, scaling) {
             (true, _) => Sample::bad(Cause::SensorFault, at),
             (false, None) => Sample::bad(Cause::Unscaled, at),
             (false, Some(decimals)) => Sample::good(scale::to_value(tag, raw, decimals), at),

@@ -2,6 +2,8 @@
 
 use super::{
     exact::Exact,
+    half,
+    number::to_u16,
     tag::{DataType, Encoding, Point},
 };
 
@@ -52,10 +54,10 @@ impl Point {
     /// What a number means here: `-32768`, `32768` and the pattern `0x8000` are one for an int16. Of a float and a BCD
     /// number only a pattern is one of bits: 9999 is the number.
     pub fn raw_number(self, written: i128, is_pattern: bool) -> RawNumber {
-        if let DataType::Text(_) = self.kind {
+        if self.kind.is_text() {
             return RawNumber::Impossible;
         }
-        let bits = self.field.map_or(16 * u32::from(self.kind.registers()), |(_, bits)| u32::from(bits));
+        let bits = u32::from(self.field.map_or(self.kind.bits(), |(_, bits)| bits));
         let bits = if self.table.is_bits() || self.kind == DataType::Bool { 1 } else { bits };
         let is_inside = |range: Option<(i128, i128)>| range.is_some_and(|(low, high)| (low..=high).contains(&written));
         let is_pattern_of = (0..1 << bits).contains(&written);
@@ -73,15 +75,35 @@ impl Point {
                 Some(number) => RawNumber::Is(Exact::whole(number)),
                 None => RawNumber::NotANumber,
             },
-            Encoding::Bcd if is_inside(self.raw_range()) => RawNumber::Is(Exact::whole(written)),
-            Encoding::Bcd | Encoding::Text => RawNumber::Impossible,
+            Encoding::SignMagnitude if is_pattern => {
+                let sign = 1 << (bits - 1);
+                match is_pattern_of {
+                    // A sign without a size reads as −0, which is a mark of its own.
+                    true if written == sign => RawNumber::Is(Exact::plain(-0.0)),
+                    true if written < sign => RawNumber::Is(Exact::whole(written)),
+                    true => RawNumber::Is(Exact::whole(sign - written)),
+                    false => RawNumber::Impossible,
+                }
+            }
+            Encoding::Mod10k if is_pattern && !is_pattern_of => RawNumber::Impossible,
+            Encoding::Mod10k if is_pattern => {
+                let words: Vec<u16> = (0..bits / 16).rev().map(|n| to_u16((written >> (16 * n)) & 0xFFFF)).collect();
+                let number = from_mod10k(self.kind, &words);
+                number.map_or(RawNumber::NotANumber, |number| RawNumber::Is(Exact::whole(number)))
+            }
+            Encoding::Bcd | Encoding::Mod10k | Encoding::SignMagnitude if is_inside(self.raw_range()) => {
+                RawNumber::Is(Exact::whole(written))
+            }
+            Encoding::Bcd | Encoding::Mod10k | Encoding::SignMagnitude | Encoding::Text => RawNumber::Impossible,
             Encoding::Float if is_pattern && !is_pattern_of => RawNumber::Impossible,
             Encoding::Float => {
                 let number = match (is_pattern, u64::try_from(written), bits) {
                     (true, Ok(pattern), 32) => {
                         u32::try_from(pattern).map_or(f64::NAN, |bits| f32::from_bits(bits).into())
                     }
+                    (true, Ok(pattern), 16) => half::value(to_u16(pattern)),
                     (true, Ok(pattern), _) => f64::from_bits(pattern),
+                    (_, _, 16) => half::rounded(Exact::whole(written).near()),
                     (_, _, 32) => f64::from(super::number::to_f32(Exact::whole(written).near())),
                     _ => Exact::whole(written).near(),
                 };
@@ -100,6 +122,16 @@ impl Point {
 pub(super) fn is_same(mark: Exact, raw: Exact) -> bool {
     let is_minus_zero = |number: Exact| number.near() == 0.0 && number.near().is_sign_negative();
     mark == raw && (!is_minus_zero(mark) || is_minus_zero(raw))
+}
+
+/// The number in words of four decimal digits each, the first the highest; `None` where one has more, or another sign.
+pub(crate) fn from_mod10k(kind: DataType, words: &[u16]) -> Option<i128> {
+    let is_signed = matches!(kind, DataType::SignedMod10k(_));
+    let part = |word: &u16| if is_signed { i128::from(word.cast_signed()) } else { i128::from(*word) };
+    let parts: Vec<i128> = words.iter().map(part).collect();
+    let fits = parts.iter().all(|part| part.abs() < 10_000);
+    let has_both = parts.iter().any(|part| *part < 0) && parts.iter().any(|part| 0 < *part);
+    (fits && !has_both).then(|| parts.iter().fold(0, |number, part| number * 10_000 + part))
 }
 
 fn from_bcd(pattern: i128, digits: u32) -> Option<i128> {

@@ -2,7 +2,8 @@
 
 use super::{
     exact::{Exact, PLAIN},
-    number::to_f32,
+    half,
+    number::{to_f32, to_u32},
     tag::{Encoding, TagDef},
 };
 
@@ -10,38 +11,45 @@ use super::{
 pub type Bounds = (Option<Exact>, Option<Exact>);
 
 /// The value of a raw number: `raw · scale · 10^-decimals + offset`. `decimals` are those that the device
-/// announces for this tag ([`super::tag::Decimals::From`]), 0 for all others.
-pub fn to_value(tag: &TagDef, raw: impl Into<Exact>, decimals: u8) -> Exact {
+/// announces for this tag ([`TagDef::scaling_decimals`]), below 0 for a multiple of ten, 0 for all others.
+pub fn to_value(tag: &TagDef, raw: impl Into<Exact>, decimals: i8) -> Exact {
     scaled(raw.into(), tag.scale, tag.offset, decimals)
 }
 
 /// The same of any scale and offset.
-pub fn scaled(raw: Exact, scale: f64, offset: f64, decimals: u8) -> Exact {
+pub fn scaled(raw: Exact, scale: f64, offset: f64, decimals: i8) -> Exact {
     let exact = raw.rest().and_then(|_| Scaling::new(scale, offset, decimals)?.value(raw.as_whole()?));
     exact.unwrap_or_else(|| (multiply(multiply(raw.near(), scale), 10f64.powi(-i32::from(decimals))) + offset).into())
 }
 
 /// The raw number to write for a value, rounded to what the type can hold; `None` if it does not fit the type.
-pub fn to_raw(tag: &TagDef, value: impl Into<Exact>, decimals: u8) -> Option<Exact> {
+pub fn to_raw(tag: &TagDef, value: impl Into<Exact>, decimals: i8) -> Option<Exact> {
     let value = value.into();
     let raw = match tag.point.kind.encoding() {
         Encoding::Float => {
             let held = as_stored(tag, unscaled(value, tag.scale, tag.offset, decimals));
-            let max = if tag.point.kind.registers() == 2 { f64::from(f32::MAX) } else { f64::MAX };
+            let max = match tag.point.kind.registers() {
+                1 => half::MAX,
+                2 => f64::from(f32::MAX),
+                _ => f64::MAX,
+            };
             // A zero has no sign: its bits would be those of another number to a device that compares words.
             return (held.abs() <= max).then(|| (held + 0.0).into());
         }
         Encoding::Text => return None,
-        Encoding::Bit | Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => {
-            whole_raw(value, tag.scale, tag.offset, decimals)?
-        }
+        Encoding::Bit
+        | Encoding::Unsigned
+        | Encoding::Signed
+        | Encoding::Bcd
+        | Encoding::SignMagnitude
+        | Encoding::Mod10k => whole_raw(value, tag.scale, tag.offset, decimals)?,
     };
     let (low, high) = tag.point.raw_range()?;
     (low..=high).contains(&raw).then(|| Exact::whole(raw))
 }
 
 /// The whole raw number that is nearest to a value; `None` if not all of its digits are known.
-pub fn whole_raw(value: Exact, scale: f64, offset: f64, decimals: u8) -> Option<i128> {
+pub fn whole_raw(value: Exact, scale: f64, offset: f64, decimals: i8) -> Option<i128> {
     match unscaled(value, scale, offset, decimals) {
         near if near.abs() < PLAIN => Exact::from(near.round()).as_whole(),
         // By way of an `f64` it would silently become another number.
@@ -49,12 +57,12 @@ pub fn whole_raw(value: Exact, scale: f64, offset: f64, decimals: u8) -> Option<
     }
 }
 
-fn unscaled(value: Exact, scale: f64, offset: f64, decimals: u8) -> f64 {
+fn unscaled(value: Exact, scale: f64, offset: f64, decimals: i8) -> f64 {
     (value.near() - offset) / (scale * 10f64.powi(-i32::from(decimals)))
 }
 
 /// The value as the device will hold it once it is written: rounded to what the type can hold; `None` if it does not fit.
-pub fn rounded_to_device(tag: &TagDef, value: impl Into<Exact>, decimals: u8) -> Option<Exact> {
+pub fn rounded_to_device(tag: &TagDef, value: impl Into<Exact>, decimals: i8) -> Option<Exact> {
     to_raw(tag, value, decimals).map(|raw| to_value(tag, raw, decimals))
 }
 
@@ -65,7 +73,7 @@ pub fn is_held(value: Exact, held: Exact) -> bool {
 
 /// The raw number to write for a value within bounds; `None` if the type cannot hold it, or if the value, or what the device
 /// will hold, is beyond a bound: rounding must not lead there, nor hide that more was asked for.
-pub fn raw_within(tag: &TagDef, value: Exact, decimals: u8, (min, max): Bounds) -> Option<Exact> {
+pub fn raw_within(tag: &TagDef, value: Exact, decimals: i8, (min, max): Bounds) -> Option<Exact> {
     let raw = to_raw(tag, value, decimals)?;
     let inside = |value| is_inside(min, max, value);
     (inside(value) && inside(to_value(tag, raw, decimals))).then_some(raw)
@@ -73,7 +81,7 @@ pub fn raw_within(tag: &TagDef, value: Exact, decimals: u8, (min, max): Bounds) 
 
 /// Does a device get the same raw number for two values? What is sent decides, not what was typed: 3.4 is 3 in a register
 /// without decimals, and a single-precision one has no 0.1.
-pub fn is_sent_as(tag: &TagDef, value: Exact, other: Exact, decimals: u8) -> bool {
+pub fn is_sent_as(tag: &TagDef, value: Exact, other: Exact, decimals: i8) -> bool {
     let raw = |value| to_raw(tag, value, decimals);
     raw(value).zip(raw(other)).is_some_and(|(one, other)| same_raw(tag, one, other))
 }
@@ -88,13 +96,19 @@ pub fn same_raw(tag: &TagDef, one: Exact, other: Exact) -> bool {
         Encoding::Float => as_stored(tag, one.near()) == as_stored(tag, other.near()),
         Encoding::Bit => (one != 0.0) == (other != 0.0),
         Encoding::Text => false,
-        Encoding::Unsigned | Encoding::Signed | Encoding::Bcd => one == other,
+        Encoding::Unsigned | Encoding::Signed | Encoding::Bcd | Encoding::SignMagnitude | Encoding::Mod10k => {
+            one == other
+        }
     }
 }
 
 /// A float in the precision of its type.
 fn as_stored(tag: &TagDef, exact: f64) -> f64 {
-    if tag.point.kind.registers() == 2 { f64::from(to_f32(exact)) } else { exact }
+    match tag.point.kind.registers() {
+        1 => half::rounded(exact),
+        2 => f64::from(to_f32(exact)),
+        _ => exact,
+    }
 }
 
 /// The same number but for what scaling forth and back rounds: within two units in the last place.
@@ -117,10 +131,12 @@ struct Scaling {
 }
 
 impl Scaling {
-    fn new(scale: f64, offset: f64, decimals: u8) -> Option<Scaling> {
+    fn new(scale: f64, offset: f64, decimals: i8) -> Option<Scaling> {
         let (scale, of_scale) = Exact::from(scale).as_decimal()?;
         let (offset, of_offset) = Exact::from(offset).as_decimal()?;
-        let of_scale = of_scale + u32::from(decimals);
+        let of_scale = i32::try_from(of_scale).ok()? + i32::from(decimals);
+        let scale = scale.checked_mul(10i128.checked_pow(to_u32(-of_scale))?)?;
+        let of_scale = to_u32(of_scale);
         let decimals = of_scale.max(of_offset);
         let shifted = |mantissa: i128, from: u32| mantissa.checked_mul(10i128.checked_pow(decimals - from)?);
         Some(Scaling { scale: shifted(scale, of_scale)?, offset: shifted(offset, of_offset)?, decimals })

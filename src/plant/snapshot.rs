@@ -23,7 +23,7 @@ use super::{
     line_report::LineReport,
     ne107,
     north_def::NorthStatus,
-    number::{digits, to_u32},
+    number::{digits, to_i8, to_u32},
     parameter_set::StoredSet,
     procedure::ProcedureRun,
     process_load::ProcessLoad,
@@ -168,10 +168,13 @@ impl Snapshot {
     pub fn step(&self, tag: TagId) -> f64 {
         self.def.tag(tag).scale.abs() * 10f64.powi(-i32::from(self.scaling_decimals(tag)))
     }
-    pub(crate) fn scaling_decimals(&self, tag: TagId) -> u8 {
-        match self.def.tag(tag).decimals {
+    pub(crate) fn scaling_decimals(&self, tag: TagId) -> i8 {
+        let def = self.def.tag(tag);
+        let shown = to_i8(self.decimals[tag.index()]);
+        match def.decimals {
             Decimals::Fixed(_) => 0,
-            Decimals::From(_) => self.decimals[tag.index()],
+            Decimals::From(_) => shown,
+            Decimals::PowerFrom(_) => def.scaling_decimals(|tag| self.sample(tag).scaling_value()).unwrap_or(shown),
         }
     }
     /// The displayed value of the tag that a command writes; `None` where it writes none, or none is displayed.

@@ -9,6 +9,7 @@ pub use super::{
     calculation::Calculation,
     confidence::Confidence,
     data_type::{ByteOrder, DataType, Encoding},
+    decimals::Decimals,
     poll_class::PollClass,
     store_policy::{STORE_EVERY_MAX, StorePolicy},
 };
@@ -16,7 +17,6 @@ use super::{
     exact::Exact,
     id::{DeviceId, TagId},
     keyword::keyword_enum,
-    number::to_u8,
     raw_number::is_same,
     role::{Reauthentication, Role},
     sample::Sample,
@@ -40,7 +40,7 @@ pub struct TagDef {
     pub meaning: String,
     /// Where and how it is stored in the device.
     pub point: Point,
-    /// `value = raw · scale · 10^-decimals_from + offset`.
+    /// `value = raw · scale · 10^-decimals_from + offset`, or `10^scale_from`.
     pub scale: f64,
     /// Added after scaling.
     pub offset: f64,
@@ -74,6 +74,11 @@ pub struct TagDef {
     pub quality_from: Option<(TagId, u64)>,
     /// Function code to write with; `None` picks 5/6 for one word, 16 for more.
     pub write_fc: Option<u8>,
+    /// Where it is written, if not where it is read.
+    pub write_at: Option<(Table, u16)>,
+    /// Written by reading its registers, setting its own bits and writing them back: another master, or the device itself, that
+    /// changes the others in between is overwritten.
+    pub read_modify_write: bool,
     /// Tag and value to write before this one (Delta DTB 0810H).
     pub write_unlock: Option<(TagId, f64)>,
     /// Group on the controller tab.
@@ -141,6 +146,8 @@ impl TagDef {
             bad_if: Vec::new(),
             quality_from: None,
             write_fc: None,
+            write_at: None,
+            read_modify_write: false,
             write_unlock: None,
             group: String::new(),
             poll: Poll::Every(Duration::from_secs(1)),
@@ -189,11 +196,11 @@ impl TagDef {
     pub fn value_needs(&self) -> impl Iterator<Item = TagId> + use<> {
         self.decimals.source().into_iter().chain(self.quality_from.map(|(tag, _)| tag))
     }
-    /// Decimals that scale its raw number, as its device announces them; 0 where the profile fixes them, `None` while they
-    /// are not known. A register that holds anything else would scale every value to nothing.
-    pub fn scaling_decimals<N: Into<Exact>>(&self, value: impl Fn(TagId) -> Option<N>) -> Option<u8> {
+    /// Decimals that scale its raw number, as its device announces them, below 0 for a multiple of ten; 0 where the profile
+    /// fixes them, `None` while they are not known.
+    pub fn scaling_decimals<N: Into<Exact>>(&self, value: impl Fn(TagId) -> Option<N>) -> Option<i8> {
         let Some(source) = self.decimals.source() else { return Some(0) };
-        value(source).and_then(|value| Decimals::announced(value.into().near()))
+        value(source).and_then(|value| self.decimals.announced(value.into().near()))
     }
     /// Least and greatest value that may be written now; `Err` names a tag that one of them needs and that is not known.
     pub fn limits(&self, value: impl Fn(TagId) -> Option<Exact>) -> Result<(Option<Exact>, Option<Exact>), TagId> {
@@ -206,11 +213,16 @@ impl TagDef {
     }
     /// Does it hold words instead of a number?
     pub fn is_text(&self) -> bool {
-        matches!(self.point.kind, DataType::Text(_))
+        self.point.kind.is_text()
+    }
+    /// Where and as what it is written.
+    pub fn write_point(&self) -> Point {
+        self.write_at.map_or(self.point, |(table, address)| Point { table, address, ..self.point })
     }
     /// The function code that it is written with: the profile's, else 5 or 6 for one bit or word, 16 for more.
     pub fn write_function(&self) -> Option<u8> {
-        let usual = match (self.point.table.is_bits(), self.point.len()) {
+        let point = self.write_point();
+        let usual = match (point.table.is_bits(), point.len()) {
             (true, _) => 5,
             (false, 1) => 6,
             (false, _) => 16,
@@ -262,6 +274,10 @@ impl Point {
     pub fn len(self) -> u16 {
         if self.table.is_bits() { 1 } else { self.kind.registers() }
     }
+    /// The bits of its register that are its own, lowest and number; `None` where all are.
+    pub fn part(self) -> Option<(u8, u8)> {
+        self.field.or_else(|| self.kind.is_half().then(|| (0, self.kind.bits())))
+    }
     /// Never empty; here because clippy and readers expect it beside `len`.
     pub fn is_empty(self) -> bool {
         false
@@ -310,33 +326,6 @@ impl Table {
     pub fn modicon(self, address: u16) -> String {
         let number = u32::from(address) + 1;
         if number <= 9_999 { format!("{}{number:04}", self.digit()) } else { format!("{}{number:05}", self.digit()) }
-    }
-}
-
-/// Decimals of a value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Decimals {
-    /// Always this many; they do not scale.
-    Fixed(u8),
-    /// Another tag says how many decimals the raw number has: it scales by 10^-n and shows n.
-    From(TagId),
-}
-
-impl Decimals {
-    /// Most decimals that a value can have.
-    pub const MAX: u8 = 6;
-
-    /// What a register announces, if it holds a number of decimals: any other would scale every value to nothing.
-    pub(crate) fn announced(value: f64) -> Option<u8> {
-        (value.fract() == 0.0 && (0.0..=f64::from(Decimals::MAX)).contains(&value)).then(|| to_u8(value))
-    }
-
-    /// The tag that holds them.
-    pub fn source(self) -> Option<TagId> {
-        match self {
-            Decimals::From(tag) => Some(tag),
-            Decimals::Fixed(_) => None,
-        }
     }
 }
 

@@ -26,13 +26,23 @@ const SHELVE_MAX: Duration = Duration::from_secs(7 * 86_400);
 /// A time on the shelf that is too short to be of use.
 const SHELVE_MIN: Duration = Duration::from_secs(60);
 
-/// The alarms of a plant file, those that every device and line has unless the file has its own of that kind, and those of
-/// the station.
-pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Problems) -> Vec<AlarmDef> {
-    let mut alarms = Vec::new();
-    for table in tables.iter().map(|table| &table.value) {
+/// The alarms of a plant file, those of its profiles and those that every device and line has unless the file has its own of
+/// that kind, and those of the station.
+pub(super) fn alarms(
+    own: &[At<AlarmTable>],
+    of_profiles: &[At<AlarmTable>],
+    defs: &Defs,
+    problems: &mut Problems,
+) -> Vec<AlarmDef> {
+    let tables = &[own, of_profiles].concat();
+    let mut alarms: Vec<AlarmDef> = Vec::new();
+    for (place, table) in tables.iter().map(|table| &table.value).enumerate() {
         let found = if table.valid { condition::subject(table, defs, problems) } else { None };
         let Some((subject, condition)) = found else { continue };
+        let is_same = |alarm: &AlarmDef| alarm.subject == subject && is_same_kind(alarm.condition, condition);
+        if own.len() <= place && alarms.iter().any(is_same) {
+            continue;
+        }
         let alarm = alarm(table, AlarmId(to_u16(alarms.len())), subject, condition, defs, problems);
         alarms.push(alarm);
     }
@@ -60,6 +70,14 @@ pub(super) fn alarms(tables: &[At<AlarmTable>], defs: &Defs, problems: &mut Prob
         alarms.push(fault.alarm(AlarmId(to_u16(alarms.len()))));
     }
     alarms
+}
+
+/// Do both watch for the same, be it at another limit?
+fn is_same_kind(one: Condition, other: Condition) -> bool {
+    match (one, other) {
+        (Condition::Limit { level: one, .. }, Condition::Limit { level: other, .. }) => one == other,
+        _ => one == other,
+    }
 }
 
 /// Two alarms of one name would be one in the journal, and each would take up the other's state after a restart.

@@ -4,8 +4,8 @@ use std::{rc::Rc, time::Duration};
 
 use super::{
     diagnostic::{Problems, Span},
-    names::{Names, Scope, Unique, check_number, held_number_of, number_of},
-    reader::{At, Node, OptionalKey, Raw, text},
+    names::{Names, Scope, check_number, held_number_of, number_of},
+    reader::{At, OptionalKey, Raw, text},
     schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, Stated},
     simulate::simulate,
     tag::{Defined, range_of},
@@ -14,12 +14,12 @@ use super::{
 use crate::plant::{
     def::{ActionDef, Faceplate, Limits, TagId},
     output::Output,
-    tag::{Access, Bound, Decimals, Point, Poll, TagDef},
+    tag::{Access, Bound, Point, Poll, TagDef},
 };
 
 /// The keys of a device profile that stand in the plant file itself; `None` where there is no map at all.
 pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Option<Rc<ProfileFile>> {
-    if table.tags.is_empty() {
+    if table.tags.is_empty() && table.repeats.is_empty() {
         let at = table.name.as_ref().map_or(table.at, |name| name.at);
         problems
             .add(at, "a device needs `profile`, or tags of its own")
@@ -47,6 +47,8 @@ pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Op
         exception_status: None,
         output: None,
         tags: Vec::new(),
+        repeats: Vec::new(),
+        alarms: Vec::new(),
         actions: table.actions.clone(),
         faceplate: table.faceplate.clone(),
         program: table.program.clone(),
@@ -79,41 +81,6 @@ const OF_PROFILE: [&str; 11] = [
     "program",
     "signature",
 ];
-
-/// One tag before it is defined: a plant file's keys lie on the profile's, which lie on the profile's defaults.
-pub(super) struct Row {
-    pub short: String,
-    pub layers: Vec<Raw>,
-}
-
-/// The rows of a device. A `[[device.tag]]` with the name of a profile's tag changes it, any other is a new tag.
-pub(super) fn rows(device: &DeviceTable, profile: &ProfileFile, problems: &mut Problems) -> Vec<Row> {
-    let default = profile.default.as_ref().map(|default| default.value.clone());
-    let mut rows = Vec::new();
-    for tags in [&profile.tags, &device.tags] {
-        let mut seen = Unique::default();
-        for tag in tags {
-            let (short, at) = short_name(&tag.value);
-            if !short.is_empty() && !seen.insert(&short, at, format!("duplicate tag `{short}`"), problems) {
-                continue;
-            }
-            let raw = tag.value.clone();
-            match rows.iter_mut().find(|row: &&mut Row| row.short == short && !short.is_empty()) {
-                Some(row) => row.layers.insert(0, raw),
-                None => rows.push(Row { short, layers: std::iter::once(raw).chain(default.clone()).collect() }),
-            }
-        }
-    }
-    rows
-}
-
-/// The name of a row and where it stands; empty if it has none, which is reported when the row is read.
-fn short_name(raw: &Raw) -> (String, Span) {
-    match raw.table.get("name") {
-        Some((_, At { value: Node::Text(name), at })) => (name.clone(), *at),
-        _ => (String::new(), raw.at),
-    }
-}
 
 /// What a device needs of time and of its line.
 #[derive(Debug, Clone, Copy, Default)]
@@ -174,6 +141,15 @@ pub(super) fn limits(device: &DeviceTable, profile: &ProfileFile, problems: &mut
     (limits, timing)
 }
 
+/// A poll period that a line can keep and an operator can wait for.
+pub(super) fn period(written: Option<At<Duration>>, default_s: u64, problems: &mut Problems) -> Duration {
+    let Some(period) = written else { return Duration::from_secs(default_s) };
+    if period.value < Duration::from_millis(50) || period.value > Duration::from_secs(86_400) {
+        problems.add(period.at, "this is not a poll period").label("expected 50ms to 1 day");
+    }
+    period.value
+}
+
 /// The function codes that the profile lists, against those that its tags need.
 pub(super) fn functions(profile: &ProfileFile, tags: &[Defined], problems: &mut Problems) -> Vec<u8> {
     let listed: Vec<u8> = profile.functions.iter().map(|function| function.value).collect();
@@ -200,7 +176,7 @@ pub(super) fn check_overlaps(tags: &[Defined], problems: &mut Problems) {
         for (next, next_at) in neighbours {
             let (a, b) = (tag.point, next.point);
             let same = a.address == b.address && (a.kind, a.order) == (b.kind, b.order);
-            let fields = a.len() == 1 && b.len() == 1 && (a.field.is_some() || b.field.is_some());
+            let fields = a.len() == 1 && b.len() == 1 && (a.part().is_some() || b.part().is_some());
             if same || fields {
                 continue;
             }
@@ -253,7 +229,7 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
                 let problem = problems.add(need.at, message);
                 problem.label("1 would be read as one decimal, and a power of ten of 1 is ten times as much");
                 problem
-                    .help("give it scale = -1 if it holds a power of ten (SunSpec), or min = 0 if it counts decimals");
+                    .help("write scale_from instead if it holds a power of ten (SunSpec), or give it min = 0 if it counts decimals");
             }
             if target.is_text() {
                 check_number(need.at, target, problems);
@@ -285,7 +261,19 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
         }
         tag
     };
-    defined.into_iter().map(finish).collect()
+    let mut tags: Vec<TagDef> = defined.into_iter().map(finish).collect();
+    read_powers_with_values(&mut tags);
+    tags
+}
+
+/// A power of ten is read as often as the fastest of the values that it scales: only then are both of one cycle.
+fn read_powers_with_values(tags: &mut [TagDef]) {
+    let scaled: Vec<(TagId, Poll)> =
+        tags.iter().filter_map(|tag| Some((tag.decimals.power_source()?, tag.poll))).collect();
+    for (source, poll) in scaled {
+        let source = &mut tags[source.index()];
+        source.poll = source.poll.min(poll);
+    }
 }
 
 /// Can it be below 0? Decimals never are, a power of ten that makes decimals always is.
@@ -334,11 +322,17 @@ pub(super) fn stated(stated: &Stated, scope: &Scope, listens: bool, problems: &m
             problem.label("`stated` is for devices of a line that only listens");
         } else if !scales && !scope.tags.iter().any(is_unit) {
             let problem = problems.add(name.at, format!("no value is scaled by {}", tag.name));
-            problem.label("expected a tag that is named in `decimals_from` or `unit_from`");
+            problem.label("expected a tag that is named in `decimals_from`, `scale_from` or `unit_from`");
         } else if let Some(value) = number_of(choice, tag, problems) {
-            if scales && Decimals::announced(value).is_none() {
-                let problem = problems.add(choice.at, format!("{value} is no number of decimals"));
-                problem.label(format!("expected 0 to {}", Decimals::MAX));
+            let scaled = scope.tags.iter().map(|other| other.decimals);
+            let mut unusable =
+                scaled.filter(|decimals| decimals.source() == Some(tag.id) && decimals.announced(value).is_none());
+            if let Some(decimals) = unusable.next() {
+                let is_power = decimals.power_source().is_some();
+                let what = if is_power { "power of ten" } else { "number of decimals" };
+                let problem = problems.add(choice.at, format!("{value} is no {what}"));
+                let (least, most) = decimals.possible();
+                problem.label(format!("expected {least} to {most}"));
             }
             found.push((tag.id, value));
         }

@@ -64,6 +64,7 @@ impl Errors {
                 at: None,
                 label: String::new(),
                 also: None,
+                row: None,
                 surplus: false,
             }],
             severity: Severity::Error,
@@ -159,6 +160,8 @@ pub(crate) struct Problem {
     label: String,
     also: Option<(Span, String)>,
     help: Option<String>,
+    /// Of which row of a repeat it is; the same problem of the others is not reported.
+    row: Option<String>,
     /// One of so many that it may not be kept: no work is worth it.
     surplus: bool,
 }
@@ -248,6 +251,7 @@ pub(crate) struct Problems {
     sources: Vec<Source>,
     list: Vec<Problem>,
     warnings: Vec<Problem>,
+    row: Option<String>,
 }
 
 impl Problems {
@@ -266,7 +270,11 @@ impl Problems {
     }
     /// Adds a problem at a place.
     pub fn add(&mut self, at: Span, message: impl Into<String>) -> &mut Problem {
-        push(&mut self.list, at, message.into())
+        push(&mut self.list, at, message.into(), self.row.clone())
+    }
+    /// Says of which row of a repeat the following problems are.
+    pub fn of_row(&mut self, row: Option<String>) {
+        self.row = row;
     }
     /// Reports two keys of which only one may stand, at the first.
     pub fn exclusive(&mut self, (first, at): (&str, Span), (second, other): (&str, Span)) {
@@ -280,7 +288,7 @@ impl Problems {
     }
     /// Adds a warning at a place: the file can be used, but it could be better.
     pub fn warn(&mut self, at: Span, message: impl Into<String>) -> &mut Problem {
-        push(&mut self.warnings, at, message.into())
+        push(&mut self.warnings, at, message.into(), self.row.clone())
     }
     /// How many there are by now.
     pub fn count(&self) -> usize {
@@ -296,17 +304,22 @@ impl Problems {
         let good = self.list.is_empty();
         let (mut list, severity) = if good { (self.warnings, Severity::Warning) } else { (self.list, Severity::Error) };
         list.sort_by(|a, b| (a.at, &a.message).cmp(&(b.at, &b.message)));
-        list.dedup();
+        list.dedup_by(|other, first| *other == Problem { row: other.row.clone(), ..first.clone() });
+        for problem in &mut list {
+            if let Some(row) = problem.row.take() {
+                problem.message += &format!(" ({row})");
+            }
+        }
         let errors = Errors { sources: self.sources, list, severity };
         if good { Ok((value, errors)) } else { Err(errors) }
     }
 }
 
-fn push(list: &mut Vec<Problem>, at: Span, message: String) -> &mut Problem {
+fn push(list: &mut Vec<Problem>, at: Span, message: String, row: Option<String>) -> &mut Problem {
     // Beyond the limit the last one gives up its place.
     list.truncate(KEPT_MAX - 1);
     let surplus = list.len() == KEPT_MAX - 1;
-    list.push(Problem { at: Some(at), message, label: String::new(), also: None, help: None, surplus });
+    list.push(Problem { at: Some(at), message, label: String::new(), also: None, help: None, row, surplus });
     list.last_mut().expect("it was pushed one line above")
 }
 

@@ -11,7 +11,7 @@ use super::{
 use crate::plant::{
     def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
     keyword::keyword_enum,
-    line_check::{SettingError, check_settings},
+    line_check::{BAUD_RANGE, BAUDS, SettingError, check_settings},
     number::to_u16,
 };
 
@@ -44,6 +44,7 @@ keyword_enum! {
         Ascii => "ascii",
         Tcp => "tcp",
         RtuOverTcp => "rtu-over-tcp",
+        AsciiOverTcp => "ascii-over-tcp",
         // Another master polls.
         Listen => "listen",
     }
@@ -56,6 +57,7 @@ impl ListenFraming {
             ListenFraming::Ascii => (false, Framing::Ascii),
             ListenFraming::Tcp => (true, Framing::Mbap),
             ListenFraming::RtuOverTcp => (true, Framing::Rtu),
+            ListenFraming::AsciiOverTcp => (true, Framing::Ascii),
         }
     }
 }
@@ -68,6 +70,7 @@ impl Mode {
             Mode::Ascii => Some((false, Framing::Ascii)),
             Mode::Tcp => Some((true, Framing::Mbap)),
             Mode::RtuOverTcp => Some((true, Framing::Rtu)),
+            Mode::AsciiOverTcp => Some((true, Framing::Ascii)),
             Mode::Listen => None,
         }
     }
@@ -94,7 +97,16 @@ fn serial(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &
         ..usual
     };
     report_wrong(&line, |key| table.span_of(key), problems);
+    warn_of_baud(table.baud, problems);
     Some(line)
+}
+
+/// A number that was mistyped is seldom a usual one.
+fn warn_of_baud(baud: Option<At<u32>>, problems: &mut Problems) {
+    if let Some(baud) = baud.filter(|baud| BAUD_RANGE.contains(&baud.value) && !BAUDS.contains(&baud.value)) {
+        let problem = problems.warn(baud.at, format!("{} is not a usual baud rate", baud.value));
+        problem.label("the driver of the port is asked for it, and may refuse");
+    }
 }
 
 fn tcp(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut Problems) -> Option<LineDef> {
@@ -141,6 +153,7 @@ fn listening(raw: Raw, id: LineId, seen: &mut Unique, problems: &mut Problems) -
         let line =
             LineDef { frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout), listens: true, ..usual };
         report_wrong(&line, |key| table.span_of(key), problems);
+        warn_of_baud(table.baud, problems);
         line
     };
     Some(line)
@@ -166,7 +179,8 @@ fn listen_framing(written: &Option<At<ListenFraming>>, is_tcp: bool, problems: &
         return framing;
     }
     let word = written.value.word();
-    let (found, expected) = if is_tcp { ("a host", "tcp or rtu-over-tcp") } else { ("a serial port", "rtu or ascii") };
+    let (found, expected) =
+        if is_tcp { ("a host", "tcp, rtu-over-tcp or ascii-over-tcp") } else { ("a serial port", "rtu or ascii") };
     problems.add(written.at, format!("framing `{word}` on {found}")).label(format!("expected {expected}"));
     usual
 }
@@ -199,7 +213,7 @@ pub fn usual_data_bits(ascii: bool) -> u8 {
     if ascii { 7 } else { 8 }
 }
 
-/// The word of a mode in the plant file: `rtu`, `ascii`, `tcp`, `rtu-over-tcp`; `None` for a mode that has none.
+/// The word of a mode in the plant file: `rtu`, `ascii`, `tcp`, `rtu-over-tcp`, `ascii-over-tcp`; `None` for a mode that has none.
 pub(super) fn mode_word(transport: &Transport) -> Option<&'static str> {
     let written = (matches!(transport, Transport::Tcp { .. }), transport.framing());
     Mode::ALL.into_iter().find(|mode| mode.transport() == Some(written)).map(Mode::word)

@@ -23,6 +23,7 @@ mod run;
 mod calculated;
 mod condition;
 mod device;
+mod device_alarms;
 pub(crate) mod diagnostic;
 mod edit;
 mod expr;
@@ -42,7 +43,9 @@ mod program;
 mod raw_pattern;
 pub(crate) mod reader;
 pub(crate) mod renamed;
+mod repeat;
 mod report;
+mod rows;
 mod schema;
 mod signature;
 mod simulate;
@@ -71,7 +74,7 @@ pub use self::{
     own::OwnProfiles,
     set_file::{read_set, text_of_set},
 };
-pub use crate::plant::line_check::BAUDS;
+pub use crate::plant::line_check::{BAUD_RANGE, BAUDS};
 use crate::plant::{def::PlantDef, keyword::keyword_enum};
 
 /// Loads a plant, or returns every error in it.

@@ -227,6 +227,10 @@ pub(crate) fn held_number_of(choice: &At<Choice>, tag: &TagDef, problems: &mut P
 /// The value as the device will hold it. Reports one that it cannot hold, or only rounded. Decimals that it announces are not
 /// known here: they only make the raw number greater.
 pub(super) fn check_held(at: Span, value: Exact, tag: &TagDef, problems: &mut Problems) -> Option<Exact> {
+    // A power of ten may make it smaller.
+    if tag.decimals.power_source().is_some() {
+        return Some(value);
+    }
     let Some(held) = scale::rounded_to_device(tag, value, 0) else {
         let message = format!("{} does not fit the register of {}", digits(value, None), tag.name);
         problems.add(at, message).label("expected a value that its type can hold");

@@ -10,7 +10,7 @@ use crate::plant::{
     address::of_modicon,
     def::{LineDef, TagId},
     live::ReplyTimes,
-    tag::{Access, Bound, ByteOrder, DataType, Decimals, Poll, TagDef},
+    tag::{Access, Bound, ByteOrder, Decimals, Poll, TagDef},
 };
 
 /// Most values on the mimic, pens of the trend and tags of the report.
@@ -359,11 +359,7 @@ fn tag_text(tag: &TagDef) -> String {
         format!("address = {}", point.address),
     ];
     if !point.table.is_bits() {
-        let kind = match point.kind {
-            DataType::Text(bytes) => format!("string({bytes})"),
-            kind => kind.name().to_owned(),
-        };
-        keys.push(format!("type = {}", quoted(&kind)));
+        keys.push(format!("type = {}", quoted(&point.kind.to_string())));
     }
     if point.order != ByteOrder::Abcd {
         keys.push(format!("order = {}", quoted(point.order.word())));

@@ -1,6 +1,6 @@
 //! A plant file and the profiles it names become one `PlantDef`. Pure: the texts come from outside.
 
-use std::{collections::BTreeMap, rc::Rc, time::Duration};
+use std::{collections::BTreeMap, rc::Rc};
 
 use jiff::tz::TimeZone;
 use sha2::{Digest, Sha256};
@@ -10,13 +10,15 @@ use super::{
     address::{check_base, warn_unclear},
     alarm,
     automatic_report::Rules,
-    batch, calculated, device,
+    batch, calculated,
+    condition::AlarmTable,
+    device, device_alarms,
     diagnostic::{Errors, Problems},
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
     north, procedure, program, reader,
     reader::{At, OptionalKey, text},
-    report, run,
+    report, rows, run,
     schema::{DeviceTable, PlantFile, ProfileFile},
     sets,
     signature::probes,
@@ -68,7 +70,7 @@ pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(Plan
 fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> Option<PlantDef> {
     let lines = line::lines(&file.lines, problems);
     line::warn_of_limits(&file.devices, &lines, problems);
-    let Devices { devices, mut tags, names, classes, exprs } = devices(file, &lines, library, problems)?;
+    let Devices { devices, mut tags, names, classes, exprs, alarms } = devices(file, &lines, library, problems)?;
     calculated::calculate(
         exprs,
         &mut tags,
@@ -76,7 +78,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         problems,
     );
     let defs = Defs { names: &names, lines: &lines, devices: &devices, tags: &tags };
-    let alarms = alarm::alarms(&file.alarms, &defs, problems);
+    let alarms = alarm::alarms(&file.alarms, &alarms, &defs, problems);
     lint::lint(&file.alarms, &tags, problems);
     let mimic = file.mimic.as_ref().map_or_else(MimicDef::default, |mimic| mimic::mimic(&mimic.value, &defs, problems));
     let access = access::access(file.access.as_ref().map(|table| &table.value), problems);
@@ -145,6 +147,8 @@ struct Devices {
     classes: Vec<Option<PollClass>>,
     /// What is calculated.
     exprs: Vec<(TagId, At<String>)>,
+    /// Those of their profiles.
+    alarms: Vec<At<AlarmTable>>,
 }
 
 /// `None` where they have too many tags together.
@@ -156,7 +160,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     let mut count = 0;
     let mut rows = Vec::new();
     for device in &known {
-        let of_device = device::rows(device.table, &device.profile, problems);
+        let of_device = rows::rows(device.table, &device.profile, problems);
         if TAGS_MAX < count + of_device.len() {
             let at = device.table.name.as_ref().map_or(file.at, |name| name.at);
             let message = format!("too many tags: {} has number {}", device.name, TAGS_MAX + 1);
@@ -177,7 +181,9 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         let (mut def, context) = define_device(DeviceId(to_u16(devices.len())), device, lines, &names, problems);
         let first = defined.len();
         for row in rows {
+            problems.of_row(row.repeat);
             defined.push(tag::define(TagId(to_u16(defined.len())), row.layers, &context, problems));
+            problems.of_row(None);
         }
         device::check_overlaps(&defined[first..], problems);
         device::check_roles(&context.roles, &defined[first..], problems);
@@ -192,7 +198,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     let written = defined.iter().map(|defined| defined.in_sets).collect::<Vec<_>>();
     let mut tags = device::link(defined, &names, problems);
     check_broadcasts(&devices, &known, lines, &tags, problems);
-    let mut stated = Vec::new();
+    let (mut stated, mut alarms) = (Vec::new(), Vec::new());
     for (def, device) in devices.iter_mut().zip(&known) {
         let scope = Scope { names: &names, tags: &tags, device: device.name };
         let face = device.profile.faceplate.as_ref().map(|face| &face.value);
@@ -204,6 +210,8 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         def.program = program.and_then(|table| program::program(table, &scope, problems));
         let signature = device.profile.signature.as_ref().map(|signature| &signature.value);
         def.signature = signature.map_or(Vec::new(), |table| probes(table, &scope, problems));
+        let priorities = &device.table.alarm_priority;
+        alarms.extend(device_alarms::of_device(&device.profile.alarms, priorities, &scope, problems));
         if let Some(table) = &device.table.stated {
             let listens = lines.get(def.line.index()).is_some_and(|line| line.listens);
             stated.extend(device::stated(&table.value, &scope, listens, problems));
@@ -211,7 +219,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     }
     stated.into_iter().for_each(|(tag, value)| tags[tag.index()].stated = Some(value));
     sets::mark(&devices, &mut tags, &written, problems);
-    Some(Devices { devices, tags, names, classes, exprs })
+    Some(Devices { devices, tags, names, classes, exprs, alarms })
 }
 
 /// Unit 0 of a serial line is a broadcast: it can be written, and no unit answers a read.
@@ -306,8 +314,8 @@ fn define_device<'a>(
         limits,
         has_default: profile.default.is_some(),
         has_base: table.address_base.or(profile.address_base).is_some(),
-        fast: period(table.fast, 1, problems),
-        slow: period(table.slow, 10, problems),
+        fast: device::period(table.fast, 1, problems),
+        slow: device::period(table.slow, 10, problems),
         names,
         roles: [&table.roles, &profile.roles].map(|roles| roles.as_ref().map(|roles| &roles.value)),
     };
@@ -315,18 +323,9 @@ fn define_device<'a>(
 }
 
 /// Most tags of a plant, those of its profiles with them; an id has 16 bits, and a terminal plant is far from it.
-const TAGS_MAX: usize = 20_000;
+pub(super) const TAGS_MAX: usize = 20_000;
 /// Most bytes of a plant file and its profiles together.
 const BYTES_MAX: usize = 16 << 20;
-
-/// A poll period that a line can keep and an operator can wait for.
-fn period(written: Option<At<Duration>>, default_s: u64, problems: &mut Problems) -> Duration {
-    let Some(period) = written else { return Duration::from_secs(default_s) };
-    if period.value < Duration::from_millis(50) || period.value > Duration::from_secs(86_400) {
-        problems.add(period.at, "this is not a poll period").label("expected 50ms to 1 day");
-    }
-    period.value
-}
 
 fn line_of(table: &DeviceTable, lines: &[LineDef]) -> Option<LineId> {
     let name = table.line.as_ref()?;
@@ -351,8 +350,8 @@ fn check_devices(file: &PlantFile, lines: &[LineDef], problems: &mut Problems) {
         let Some(def) = lines.iter().find(|line| line.id == id) else { continue };
         // 0 is the broadcast address: allowed for what is only written, which is checked with the tags.
         if def.transport.serial().is_some() && !(0..=247).contains(&unit.value) {
-            let problem = problems.add(unit.at, format!("unit {} cannot be used on a serial line", unit.value));
-            problem.label("expected 1 to 247, or 0 for a broadcast");
+            let problem = problems.warn(unit.at, format!("unit {} is reserved on serial lines", unit.value));
+            problem.label("1 to 247 are for devices; a few use others all the same");
         }
         let place = format!("unit {} is used twice on line {}", unit.value, line.value);
         units.insert(&place, unit.at, place.as_str(), problems);

@@ -47,6 +47,9 @@ impl Value for BadIf {
             }
             _ => wrong_type(value, at, "an array of raw numbers", problems),
         };
+        if let Node::Text(word) = value {
+            return sunspec(word, at, problems);
+        }
         let Node::Table(_) = value else { return Some(BadIf(vec![(None, numbers(value, at, problems)?)])) };
         let raw = Raw::read(value, at, problems)?;
         let mut of_type = |(word, (key, node)): (&String, &(Span, At<Node>))| {
@@ -55,6 +58,27 @@ impl Value for BadIf {
         };
         Some(BadIf(raw.table.iter().filter_map(&mut of_type).collect()))
     }
+}
+
+/// What each type of SunSpec holds where a point is not implemented (SunSpec device information model, data types). A float
+/// holds NaN then, which is no number in any case.
+const SUNSPEC: [(DataType, i128); 6] = [
+    (DataType::I16, 0x8000),
+    (DataType::U16, 0xFFFF),
+    (DataType::I32, 0x8000_0000),
+    (DataType::U32, 0xFFFF_FFFF),
+    (DataType::I64, 0x8000_0000_0000_0000),
+    (DataType::U64, 0xFFFF_FFFF_FFFF_FFFF),
+];
+
+/// The patterns of a word for them all, `"sunspec"`.
+fn sunspec(word: &str, at: Span, problems: &mut Problems) -> Option<BadIf> {
+    if word != "sunspec" {
+        problems.add(at, format!("`{word}` stands for no raw numbers")).label("expected \"sunspec\", or an array");
+        return None;
+    }
+    let mark = |number| At { value: RawPattern { number, is_pattern: true }, at };
+    Some(BadIf(SUNSPEC.map(|(kind, number)| (Some(kind), vec![mark(number)])).into()))
 }
 
 impl BadIf {
@@ -84,7 +108,7 @@ fn type_of(point: Point) -> String {
 }
 
 fn held_words(point: Point) -> String {
-    let bits = point.field.map_or(16 * point.kind.registers(), |(_, bits)| u16::from(bits));
+    let bits = point.field.map_or(point.kind.bits(), |(_, bits)| bits);
     match point.raw_range() {
         Some((low, high)) if low < 0 => {
             format!("it holds {low} to {high}, as patterns 0 to 0x{:X}", (1_i128 << bits) - 1)

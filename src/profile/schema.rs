@@ -1,14 +1,18 @@
 //! The tables and keys of a plant file; those of alarms are in [`super::condition`].
 
 mod device;
+mod keys;
 
 use std::time::Duration;
 
 use jiff::civil::Time;
 
-pub(super) use self::device::{
-    ActionTable, CheckTable, CounterKey, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, Roles,
-    Scheme, SignatureTable, SimulateTable, Stated, StepTable, TagTable, TypeName,
+pub(super) use self::{
+    device::{
+        ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, RepeatTable, Scheme,
+        SignatureTable, SimulateTable, StepTable, TagTable,
+    },
+    keys::{CounterKey, PollKey, Priorities, Roles, Stated, TypeName},
 };
 use super::{
     condition::AlarmTable,
@@ -29,6 +33,7 @@ keyword_enum! {
         Ascii => "ascii",
         Tcp => "tcp",
         RtuOverTcp => "rtu-over-tcp",
+        AsciiOverTcp => "ascii-over-tcp",
     }
 }
 
@@ -129,6 +134,10 @@ toml_tables! {
         opt "address_base" address_base: u8,
         /// More tags, or other keys for the tags of the profile.
         list "tag" tags: Raw,
+        /// Tags that it has many times.
+        list "repeat" repeats: RepeatTable,
+        /// Another priority for alarms of the profile, or `off`.
+        opt "alarm_priority" alarm_priority: Priorities,
         /// The least role that may write the tags of a group; what the profile says of the same group does not count.
         opt "roles" roles: Roles,
         /// Names of the eight states that function 07 reads; they stand for those of the profile.

@@ -1,23 +1,26 @@
 //! One row of a register map becomes the definition of a tag, and is checked against itself and its device.
 
+mod access;
 mod bits;
 mod place;
 mod scaling;
 
 use std::time::Duration;
 
-pub(super) use self::{bits::named_bits, place::field_of, scaling::range_of};
 use self::{
+    access::{access, write_at},
     bits::{bit_labels, enum_labels},
     place::place,
     scaling::check_scaling,
 };
+pub(super) use self::{bits::named_bits, place::field_of, scaling::range_of};
 use super::{
     address::is_unclear as is_unclear_at,
+    device::period,
     diagnostic::{Problems, Span},
     names::{Names, check_name, number_of},
     reader::{At, Choice, OptionalKey, Raw, either, supersede, text},
-    schema::{CounterKey, PollWord, Roles, Scheme, SimulateTable, TagTable},
+    schema::{CounterKey, PollKey, PollWord, Roles, Scheme, SimulateTable, TagTable},
     tag_keys::strip_default,
     units,
 };
@@ -81,13 +84,14 @@ pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, probl
     let (row, has_default_marks) = row_of(layers, context, problems);
     let (point, kind, is_text) = place(&row, context, problems);
     let links = links(&row, context, problems);
-    let decimals = match links.decimals {
-        Some(tag) => Decimals::From(tag),
-        None => Decimals::Fixed(decimals(&row, kind, problems)),
+    let decimals = match (links.decimals, links.power) {
+        (Some(tag), _) => Decimals::From(tag),
+        (None, Some(tag)) => Decimals::PowerFrom(tag),
+        (None, None) => Decimals::Fixed(decimals(&row, kind, problems)),
     };
     check_scaling(&row, kind, decimals, problems);
     let access = access(&row, point, problems);
-    let poll = poll(&row, context);
+    let poll = poll(&row, context, problems);
     if let Some(name) = &row.name {
         check_name(name, "tag", problems);
     }
@@ -113,6 +117,8 @@ pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, probl
         bad_if: bad_if(&row, point, has_default_marks, problems),
         quality_from: links.quality.map(|tag| (tag, row.quality_mask.value_or(u64::MAX))),
         write_fc: row.write_fc.map(|fc| fc.value),
+        write_at: point.and_then(|point| write_at(&row, point, context.scheme, problems)),
+        read_modify_write: row.write.is_some(),
         group: text(&row.group),
         poll,
         // Known when all tags and alarms are.
@@ -145,7 +151,13 @@ pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, probl
 
 /// The row of its layers, and whether its marks of no value are those of the defaults.
 fn row_of(mut layers: Vec<Raw>, context: &DeviceContext, problems: &mut Problems) -> (TagTable, bool) {
-    for (first, second) in [("min", "min_from"), ("max", "max_from"), ("decimals", "decimals_from")] {
+    for (first, second) in [
+        ("min", "min_from"),
+        ("max", "max_from"),
+        ("decimals", "decimals_from"),
+        ("decimals", "scale_from"),
+        ("decimals_from", "scale_from"),
+    ] {
         either(&mut layers, first, second, problems);
     }
     // A plant file that moves a tag need not repeat the number of the manual.
@@ -182,6 +194,7 @@ const NOWHERE: Point =
 /// The other tags that a row names.
 struct Links {
     decimals: Option<TagId>,
+    power: Option<TagId>,
     unit: Option<TagId>,
     min: Option<TagId>,
     max: Option<TagId>,
@@ -204,6 +217,7 @@ fn links(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Li
     });
     Links {
         decimals: refer(&row.decimals_from, "decimals_from", problems),
+        power: refer(&row.scale_from, "scale_from", problems),
         unit: refer(&row.unit_from, "unit_from", problems),
         min: refer(&row.min_from, "min_from", problems),
         max: refer(&row.max_from, "max_from", problems),
@@ -237,13 +251,16 @@ fn decimals(row: &TagTable, kind: Option<Raws>, problems: &mut Problems) -> u8 {
 }
 
 /// How often it is read: what is calculated never is.
-fn poll(row: &TagTable, context: &DeviceContext) -> Poll {
-    match row.poll.value_or(PollWord::Slow) {
-        _ if row.expr.is_some() => Poll::Never,
-        PollWord::Fast => Poll::Every(context.fast),
-        PollWord::Slow => Poll::Every(context.slow),
-        PollWord::Once => Poll::Once,
-        PollWord::Never => Poll::Never,
+fn poll(row: &TagTable, context: &DeviceContext, problems: &mut Problems) -> Poll {
+    if row.expr.is_some() {
+        return Poll::Never;
+    }
+    match row.poll.value_or(PollKey::Word(PollWord::Slow)) {
+        PollKey::Word(PollWord::Fast) => Poll::Every(context.fast),
+        PollKey::Word(PollWord::Slow) => Poll::Every(context.slow),
+        PollKey::Word(PollWord::Once) => Poll::Once,
+        PollKey::Word(PollWord::Never) => Poll::Never,
+        PollKey::Every(value) => Poll::Every(period(row.poll.map(|poll| At { value, at: poll.at }), 1, problems)),
     }
 }
 
@@ -283,40 +300,6 @@ fn store_every(row: &TagTable, problems: &mut Problems) -> Duration {
         problems.add(every.at, "a value can be stored every 1 to 60 s").label("expected \"1 s\" … \"60 s\"");
     }
     every.value
-}
-
-fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Access {
-    let access = row.access.value_or(Access::Read);
-    let Some(point) = point.filter(|_| access != Access::Read) else { return access };
-    let at = row.access.map_or(row.at, |access| access.at);
-    // A few devices read a bit with function 02 and write it with 05 all the same (Delta DTB 0810H); they say so.
-    let bit = point.table == Table::Discrete && row.write_fc.is_some();
-    if matches!(point.table, Table::Discrete | Table::Input) && !bit {
-        problems.add(at, format!("a {} can only be read", point.table.word())).label("expected access = \"r\"");
-    }
-    if point.field.is_some() && row.write_fc.is_none() {
-        problems
-            .add(at, "a field of bits inside a word cannot be written by a whole word")
-            .label("expected access = \"r\", or write_fc = 22")
-            .help("it would overwrite the other bits; function 22, mask write, does not, if the device has it");
-    }
-    if let Some(verify) = row.verify.filter(|verify| !verify.value) {
-        let problem = problems.add(verify.at, "a write is always verified").label("leave this out");
-        problem.help("a tag that cannot be read back has access = \"w\"");
-    }
-    if let Some(fc) = row.write_fc {
-        let allowed: &[u8] = match (point.table.is_bits(), point.field.is_some(), point.len()) {
-            (true, ..) => &[5, 15],
-            (false, true, _) => &[22],
-            (false, false, 1) => &[6, 16, 23],
-            (false, false, _) => &[16, 23],
-        };
-        if !allowed.contains(&fc.value) {
-            let problem = problems.add(fc.at, format!("function {} cannot write this tag", fc.value));
-            problem.label(format!("expected {allowed:?}"));
-        }
-    }
-    access
 }
 
 fn fixed(bound: &Option<At<Exact>>) -> Option<Bound> {

@@ -3,26 +3,27 @@
 use super::{
     address::memory_table,
     diagnostic::{Problems, Span},
-    reader::{Node, Raw},
+    reader::{At, Node, Raw},
     schema::{Scheme, TagTable},
 };
 use crate::plant::{
     address::{in_table, table_named},
-    tag::{Access, ByteOrder, Point, StorePolicy},
+    data_type::Clock,
+    tag::{Access, ByteOrder, DataType, Point, StorePolicy},
 };
 
 /// Keys that a text does not have.
 #[rustfmt::skip]
-const FOR_NUMBERS: [&str; 16] = [
-    "scale", "offset", "decimals", "decimals_from", "unit", "unit_from", "min", "max", "min_from", "max_from", "enum", "bits",
+const FOR_NUMBERS: [&str; 17] = [
+    "scale", "offset", "decimals", "decimals_from", "scale_from", "unit", "unit_from", "min", "max", "min_from", "max_from", "enum", "bits",
     "bad_if", "quality_from", "deadband", "normal",
 ];
 
 /// Keys that belong to a register.
 #[rustfmt::skip]
-const FOR_REGISTERS: [&str; 26] = [
-    "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "unit_from", "access", "verify",
-    "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_unlock", "poll",
+const FOR_REGISTERS: [&str; 29] = [
+    "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "scale_from", "unit_from", "access", "verify",
+    "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_address", "write", "write_unlock", "poll",
     "poll_class", "simulate", "default", "set",
 ];
 
@@ -45,7 +46,7 @@ pub(super) fn strip_default(mut defaults: Raw, own: &[Raw], scheme: Scheme) -> R
         foreign.extend(FOR_REGISTERS);
     } else if table.is_some_and(|table| table.is_bits()) {
         foreign.extend(["type", "order", "field"].into_iter().chain(FOR_NUMBERS));
-    } else if kind.starts_with("string") {
+    } else if kind.parse().is_ok_and(DataType::is_text) {
         foreign.extend(FOR_NUMBERS);
         // Only the bytes of a text have an order.
         foreign.extend(written(of_default, "order").filter(|order| order == ByteOrder::Cdab.word()).map(|_| "order"));
@@ -76,7 +77,8 @@ pub(super) fn check_text(row: &TagTable, point: Point, problems: &mut Problems) 
     for (key, at) in FOR_NUMBERS.into_iter().filter_map(|key| Some((key, row.span_of(key)?))) {
         problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
     }
-    if let Some(order) = row.order.filter(|order| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba)) {
+    let is_reversed = |order: &At<ByteOrder>| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba);
+    if let Some(order) = row.order.filter(|order| is_reversed(order) && point.kind != DataType::Clock(Clock::Epoch)) {
         let problem = problems.add(order.at, "the words of a text cannot be reversed");
         problem.label("expected \"ABCD\", high byte first, or \"BADC\", low byte first");
     }

@@ -41,8 +41,9 @@ impl TagDescription {
     pub fn new(def: &TagDef, latest: &HashMap<TagId, f64>) -> TagDescription {
         let decimals = match def.decimals {
             Decimals::Fixed(decimals) => decimals,
-            Decimals::From(tag) => {
-                latest.get(&tag).and_then(|value| Decimals::announced(*value)).unwrap_or(DECIMALS_UNKNOWN)
+            Decimals::From(tag) | Decimals::PowerFrom(tag) => {
+                let scaling = latest.get(&tag).and_then(|value| def.decimals.announced(*value));
+                scaling.map_or(DECIMALS_UNKNOWN, Decimals::shown)
             }
         };
         let unit = def.unit_by(|tag| latest.get(&tag).copied()).unwrap_or(&def.unit).to_owned();

@@ -45,6 +45,6 @@ pub(crate) fn record_decimals(report: &ShiftReport, def: &PlantDef) -> u8 {
     match (report.tags.iter().find(|tag| tag.tag == pv.name), pv.decimals) {
         (Some(tag), _) => tag.decimals,
         (None, Decimals::Fixed(decimals)) => decimals,
-        (None, Decimals::From(_)) => DECIMALS_UNKNOWN,
+        (None, Decimals::From(_) | Decimals::PowerFrom(_)) => DECIMALS_UNKNOWN,
     }
 }

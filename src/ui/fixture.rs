@@ -184,7 +184,7 @@ impl Fixture {
     pub fn snapshot(&self) -> Arc<Snapshot> {
         let decimals = self.def.tags.iter().map(|tag| match tag.decimals {
             Decimals::Fixed(n) => n,
-            Decimals::From(_) => 1,
+            Decimals::From(_) | Decimals::PowerFrom(_) => 1,
         });
         Arc::new(Snapshot {
             actuators: crate::plant::interlock::ActuatorTracker::default(),

@@ -44,7 +44,7 @@ fn two_states(def: &TagDef) -> Option<(f64, f64)> {
     }
 }
 
-fn decimals(cx: &ViewContext, tag: TagId) -> Option<u8> {
+fn decimals(cx: &ViewContext, tag: TagId) -> Option<i8> {
     Some(cx.snapshot.scaling_decimals(tag))
 }
 

@@ -87,6 +87,7 @@ fn set(port: &std::fs::File, serial: Serial) -> rustix::io::Result<()> {
         ControlModes::CSIZE
             | ControlModes::PARENB
             | ControlModes::PARODD
+            | ControlModes::CMSPAR
             | ControlModes::CSTOPB
             | ControlModes::CRTSCTS,
     );
@@ -96,6 +97,8 @@ fn set(port: &std::fs::File, serial: Serial) -> rustix::io::Result<()> {
         Parity::None => ControlModes::empty(),
         Parity::Even => ControlModes::PARENB,
         Parity::Odd => ControlModes::PARENB | ControlModes::PARODD,
+        Parity::Mark => ControlModes::PARENB | ControlModes::PARODD | ControlModes::CMSPAR,
+        Parity::Space => ControlModes::PARENB | ControlModes::CMSPAR,
     });
     modes.set(ControlModes::CSTOPB, serial.stop_bits == 2);
     termios::tcsetattr(port, OptionalActions::Now, &settings)?;

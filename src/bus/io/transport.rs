@@ -79,6 +79,12 @@ async fn open(transport: &Transport) -> Result<Opened, String> {
 
 fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, String> {
     let stream = serial_stream(path, serial)?;
+    if matches!(serial.parity, Parity::Mark | Parity::Space) {
+        uart::set_fixed_parity(&stream).map_err(|error| {
+            let parity = serial.parity.word();
+            format!("{path}: its driver has no parity {parity} ({error})")
+        })?;
+    }
     // A driver remembers what an earlier opening has switched on; one that never could needs no call.
     let switched = uart::set_rs485(&stream, rs485);
     if rs485 != Rs485::Off {
@@ -97,8 +103,8 @@ pub(super) fn serial_stream(path: &str, serial: Serial) -> Result<SerialStream, 
         .data_bits(if serial.data_bits == 7 { DataBits::Seven } else { DataBits::Eight })
         .parity(match serial.parity {
             Parity::None => tokio_serial::Parity::None,
-            Parity::Even => tokio_serial::Parity::Even,
-            Parity::Odd => tokio_serial::Parity::Odd,
+            Parity::Even | Parity::Space => tokio_serial::Parity::Even,
+            Parity::Odd | Parity::Mark => tokio_serial::Parity::Odd,
         })
         .stop_bits(if serial.stop_bits == 2 { StopBits::Two } else { StopBits::One })
         .flow_control(FlowControl::None);

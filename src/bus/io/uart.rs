@@ -83,6 +83,17 @@ pub fn set_rs485(port: &SerialStream, mode: Rs485) -> io::Result<()> {
     unsafe { rustix::ioctl::ioctl(borrowed(port), SetRs485(config)) }.map_err(io::Error::from)
 }
 
+/// Makes the parity bit always 1 where it was odd, always 0 where it was even.
+pub fn set_fixed_parity(port: &SerialStream) -> io::Result<()> {
+    use rustix::termios::{ControlModes, OptionalActions, tcgetattr, tcsetattr};
+    let mut settings = tcgetattr(borrowed(port))?;
+    settings.control_modes.insert(ControlModes::CMSPAR);
+    tcsetattr(borrowed(port), OptionalActions::Now, &settings)?;
+    // A driver may take the rest and leave this out.
+    let is_set = tcgetattr(borrowed(port))?.control_modes.contains(ControlModes::CMSPAR);
+    if is_set { Ok(()) } else { Err(io::ErrorKind::Unsupported.into()) }
+}
+
 /// Holds the data line low for a quarter of a second.
 pub(super) fn send_break(port: &SerialStream) -> io::Result<()> {
     rustix::termios::tcsendbreak(borrowed(port)).map_err(io::Error::from)

@@ -25,7 +25,7 @@ use crate::{
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
         traffic::Exchange,
     },
-    profile::BAUDS,
+    profile::{BAUD_RANGE, BAUDS},
 };
 
 use super::{CliError, menu, runtime, say, say_error};
@@ -36,14 +36,14 @@ pub struct PortArgs {
     /// A serial port (/dev/ttyUSB0), or HOST, HOST:TCPPORT or [IPV6]:TCPPORT
     #[arg(value_name = "PORT")]
     port: String,
-    /// rtu, ascii, tcp or rtu-over-tcp [default: rtu on a serial port, else tcp]
-    #[arg(long, value_parser = ["rtu", "ascii", "tcp", "rtu-over-tcp"])]
+    /// rtu, ascii, tcp, rtu-over-tcp or ascii-over-tcp [default: rtu on a serial port, else tcp]
+    #[arg(long, value_parser = ["rtu", "ascii", "tcp", "rtu-over-tcp", "ascii-over-tcp"])]
     mode: Option<String>,
     /// Baud rate [default: 9600]
     #[arg(long)]
     baud: Option<u32>,
     /// Parity: N, E or O [default: N]
-    #[arg(long, ignore_case = true, value_parser = ["N", "E", "O"])]
+    #[arg(long, ignore_case = true, value_parser = ["N", "E", "O", "M", "S"])]
     parity: Option<String>,
     /// Data bits [default: 8, in ASCII 7]
     #[arg(long, value_name = "BITS", value_parser = clap::value_parser!(u8).range(7..=8))]
@@ -134,6 +134,7 @@ impl PortArgs {
             "rtu" => (true, Framing::Rtu),
             "ascii" => (true, Framing::Ascii),
             "rtu-over-tcp" => (false, Framing::Rtu),
+            "ascii-over-tcp" => (false, Framing::Ascii),
             _ => (false, Framing::Mbap),
         };
         if serial_mode != is_path {
@@ -182,21 +183,24 @@ impl PortArgs {
     }
 }
 
-/// `N`, `E` or `O`, checked by the arguments.
+/// `N`, `E`, `O`, `M` or `S`, checked by the arguments.
 fn parity(letter: &str) -> Parity {
     match letter.to_ascii_uppercase().as_str() {
         "E" => Parity::Even,
         "O" => Parity::Odd,
+        "M" => Parity::Mark,
+        "S" => Parity::Space,
         _ => Parity::None,
     }
 }
 
 fn baud(baud: u32) -> Result<u32, CliError> {
     let known = || BAUDS.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
-    if BAUDS.contains(&baud) {
+    if BAUD_RANGE.contains(&baud) {
         return Ok(baud);
     }
-    Err(CliError::Usage(format!("--baud: found {baud}, expected one of {}", known())))
+    let (least, most) = (BAUD_RANGE.start(), BAUD_RANGE.end());
+    Err(CliError::Usage(format!("--baud: found {baud}, expected {least} to {most}, usually one of {}", known())))
 }
 
 /// Runs a diagnostic and prints each finding at once. Ctrl-C ends it between two steps.
@@ -321,6 +325,7 @@ mod tests {
             ("plc", "TCP plc:502"),
             ("src", "TCP src:502"),
             ("plc:1502 --mode rtu-over-tcp", "RTU over TCP plc:1502"),
+            ("plc:1502 --mode ascii-over-tcp", "ASCII over TCP plc:1502"),
             ("[::1]:1502", "TCP [::1]:1502"),
             ("[fe80::1]", "TCP [fe80::1]:502"),
             ("::1", "TCP [::1]:502"),
@@ -348,9 +353,9 @@ mod tests {
             ("[::1]x", "or [IPV6]:TCPPORT"),
             ("10.0.0.0/24", "found a network; `sightglass scan 10.0.0.0/24`"),
             ("10.0.0.0/8", "at most 256 addresses"),
-            ("/dev/ttyUSB0 --baud 9601", "found 9601, expected one of 300"),
+            ("/dev/ttyUSB0 --baud 49", "found 49, expected 50 to 4000000, usually one of 300"),
             ("/dev/ttyUSB0 --data 7", "found 7, expected 8"),
-            ("/dev/ttyUSB0 --parity X", "[possible values: N, E, O]"),
+            ("/dev/ttyUSB0 --parity X", "[possible values: N, E, O, M, S]"),
         ] {
             assert!(line(args).is_err_and(|error| error.contains(part)), "{args}: {:?}", line(args));
         }

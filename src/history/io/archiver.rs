@@ -32,7 +32,7 @@ const RETRY_AFTER: Duration = Duration::from_secs(600);
 
 /// A job that was asked for and takes no step for so long is given up; a step is a file, or the database.
 const STEP_MAX: Duration = Duration::from_secs(600);
-/// Jobs may hang in so many disks while others are begun: each keeps a thread.
+/// Jobs may hang in this many disks while others are begun: each keeps a thread.
 const HUNG_MAX: usize = 2;
 
 /// What became of a look.

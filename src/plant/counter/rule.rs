@@ -5,6 +5,7 @@ use jiff::Timestamp;
 use crate::plant::{
     data_type::{DataType, Encoding},
     exact::Exact,
+    number::to_i8,
     tag::{Decimals, TagDef},
 };
 
@@ -26,18 +27,18 @@ pub struct CounterRule {
 
 impl CounterRule {
     /// Of a tag; `decimals` are those that its device announces, where it does.
-    pub fn of(tag: &TagDef, decimals: Option<u8>) -> CounterRule {
-        let shown = |decimals: u8| 10f64.powi(-i32::from(decimals));
+    pub fn of(tag: &TagDef, decimals: Option<i8>) -> CounterRule {
+        let shown = |decimals: i8| 10f64.powi(-i32::from(decimals));
         let scale = match tag.decimals {
             Decimals::Fixed(_) => tag.scale.abs(),
-            Decimals::From(_) => tag.scale.abs() * shown(decimals.unwrap_or(0)),
+            Decimals::From(_) | Decimals::PowerFrom(_) => tag.scale.abs() * shown(decimals.unwrap_or(0)),
         };
         let kind = tag.point.kind;
         let whole = tag.calculation.is_none().then(|| kind.whole_range()).flatten();
         let digit = match (whole, tag.decimals) {
             (Some(_), _) => scale,
-            (None, Decimals::Fixed(decimals)) => shown(decimals),
-            (None, Decimals::From(_)) => shown(decimals.unwrap_or(Decimals::MAX)),
+            (None, Decimals::Fixed(decimals)) => shown(to_i8(decimals)),
+            (None, Decimals::From(_) | Decimals::PowerFrom(_)) => shown(decimals.unwrap_or(to_i8(Decimals::MAX))),
         };
         let moduli = match (tag.modulus, tag.point.field.filter(|_| whole.is_some()), whole) {
             (Some(modulus), ..) => [Some(modulus), None],

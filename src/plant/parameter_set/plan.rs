@@ -13,7 +13,7 @@ use crate::plant::{
     interlock,
     sample::{Cause, Sample},
     scale,
-    tag::{Decimals, TagDef},
+    tag::TagDef,
 };
 use crate::t;
 
@@ -148,7 +148,7 @@ fn other_units<'a>(
 /// Do other values get their decimals or their unit from this tag?
 fn carries(def: &PlantDef, device: DeviceId, tag: TagId) -> bool {
     def.tags_of(device).any(|other| {
-        other.decimals == Decimals::From(tag) || other.unit_from.as_ref().is_some_and(|(from, _)| *from == tag)
+        other.decimals.source() == Some(tag) || other.unit_from.as_ref().is_some_and(|(from, _)| *from == tag)
     })
 }
 

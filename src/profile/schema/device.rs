@@ -2,19 +2,19 @@
 
 use std::time::Duration;
 
+use super::keys::{CounterKey, PollKey, Roles, TypeName, WriteRole};
 use crate::{
     plant::{
-        def::{Reauthentication, Role},
+        def::Reauthentication,
         exact::Exact,
         keyword::keyword_enum,
         output::Output,
-        tag::{Access, ByteOrder, Confidence, DataType, PollClass, StorePolicy, Table},
+        tag::{Access, ByteOrder, Confidence, PollClass, StorePolicy, Table},
     },
     profile::{
         address::{Location, Modicon},
-        diagnostic::{Problems, Span},
         raw_pattern::{BadIf, RawPattern},
-        reader::{At, Choice, Node, Numbered, Raw, Value, toml_tables},
+        reader::{Choice, Numbered, Raw, toml_tables},
         simulate::Choices,
     },
 };
@@ -44,10 +44,23 @@ toml_tables! {
         /// What its output is at the terminals.
         opt "output" output: Output,
         list "tag" tags: Raw,
+        /// Tags that it has many times.
+        list "repeat" repeats: RepeatTable,
+        /// What each such device has alarms for.
+        list "alarm" alarms: Raw,
         list "action" actions: ActionTable,
         opt "faceplate" faceplate: FaceplateTable,
         opt "program" program: ProgramTable,
         opt "signature" signature: SignatureTable,
+    }
+
+    /// A `[[repeat]]` of a profile, or a `[[device.repeat]]` of a plant file.
+    RepeatTable, "a repeat" {
+        opt "count" count: u16,
+        list "names" names: String,
+        /// From the address of one to that of the next.
+        opt "step" step: u16,
+        list "tag" tags: Raw,
     }
 
     /// By what a device is recognised.
@@ -97,6 +110,8 @@ toml_tables! {
         opt "offset" offset: f64,
         opt "decimals" decimals: u8,
         opt "decimals_from" decimals_from: String,
+        /// A tag that holds the power of ten by which it is multiplied.
+        opt "scale_from" scale_from: String,
         opt "unit" unit: String,
         opt "unit_from" unit_from: String,
         opt "min" min: Exact,
@@ -118,9 +133,13 @@ toml_tables! {
         opt "quality_from" quality_from: String,
         opt "quality_mask" quality_mask: u64,
         opt "write_fc" write_fc: u8,
+        /// Where it is written, if not where it is read.
+        opt "write_address" write_address: Location,
+        /// How a part of a register is written.
+        opt "write" write: WriteWord,
         opt "write_unlock" write_unlock: UnlockTable,
         opt "group" group: String,
-        opt "poll" poll: PollWord,
+        opt "poll" poll: PollKey,
         opt "poll_class" poll_class: PollClass,
         opt "deadband" deadband: f64,
         opt "store" store: StorePolicy,
@@ -265,6 +284,14 @@ keyword_enum! {
     }
 }
 keyword_enum! {
+    /// How a field of bits, or one byte of a register, is written.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub(crate) enum WriteWord: "way to write" {
+        /// Read, set and written back.
+        ReadModifyWrite => "rmw",
+    }
+}
+keyword_enum! {
     /// How often a tag is read; the device says what fast and slow are.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub(crate) enum PollWord: "poll" {
@@ -272,81 +299,5 @@ keyword_enum! {
         Slow => "slow",
         Once => "once",
         Never => "never",
-    }
-}
-/// The least role that may write something: one that writes at all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct WriteRole(pub Role);
-
-/// Whether a tag counts up, and after how much it shows the same again.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum CounterKey {
-    Counts(bool),
-    Rolls(Option<At<f64>>),
-}
-
-impl Value for CounterKey {
-    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<CounterKey> {
-        match value {
-            Node::Table(_) => CounterTable::read(value, at, problems).map(|table| CounterKey::Rolls(table.modulus)),
-            _ => bool::read(value, at, problems).map(CounterKey::Counts),
-        }
-    }
-}
-
-impl Value for WriteRole {
-    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
-        let role = <Role as Value>::read(value, at, problems)?;
-        if role == Role::Viewer {
-            let problem = problems.add(at, "a viewer writes nothing");
-            problem.label("expected \"technician\" or \"supervisor\"");
-        }
-        Some(WriteRole(role))
-    }
-}
-
-/// A table with names for keys.
-#[derive(Debug, Clone)]
-pub(crate) struct ByName<T>(pub Vec<(At<String>, At<T>)>);
-
-/// The names are those of groups: `{ PID = "supervisor" }`.
-pub(crate) type Roles = ByName<WriteRole>;
-/// The names are those of tags: `{ P-DP = 1 }`.
-pub(crate) type Stated = ByName<Choice>;
-
-impl<T: Value> Value for ByName<T> {
-    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
-        let raw = Raw::read(value, at, problems)?;
-        let mut of_name = |(name, (at, node)): (&String, &(Span, At<Node>))| {
-            let value = T::read(&node.value, node.at, problems)?;
-            Some((At { value: name.clone(), at: *at }, At { value, at: node.at }))
-        };
-        Some(ByName(raw.table.iter().filter_map(&mut of_name).collect()))
-    }
-}
-
-/// The type of a raw value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct TypeName(pub DataType);
-
-impl Value for TypeName {
-    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
-        let word = <String as Value>::read(value, at, problems)?;
-        if let Some(rest) = word.strip_prefix("string") {
-            let count = rest.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
-            let count =
-                count.and_then(|count| count.trim().parse().ok()).filter(|n| (1..=DataType::TEXT_MAX).contains(n));
-            if count.is_none() {
-                let problem = problems.add(at, format!("`{word}` does not say how long the text is"));
-                problem.label(format!("expected \"string(N)\" with N bytes, 1 to {}", DataType::TEXT_MAX));
-            }
-            return count.map(|count| TypeName(DataType::Text(count)));
-        }
-        let found = DataType::NUMBERS.into_iter().find(|kind| kind.name() == word);
-        if found.is_none() {
-            let names = DataType::NUMBERS.into_iter().map(DataType::name);
-            problems.add(at, format!("unknown type `{word}`")).label("not a type").suggest(&word, names);
-        }
-        found.map(TypeName)
     }
 }

@@ -40,7 +40,7 @@ pub(super) fn bit_field(
             None => word.trim().parse().ok().map(|bit: u8| (bit, bit)),
         },
     };
-    let size = kind.registers() * 16;
+    let size = u16::from(kind.bits());
     let valid = bounds.filter(|(high, low)| low <= high && u16::from(*high) < size);
     if valid.is_none() {
         let problem = problems.add(field.at, "this is not a field of bits");
@@ -76,11 +76,7 @@ pub(super) fn bit_labels(
     kind: Option<Raws>,
     problems: &mut Problems,
 ) -> Vec<(u8, String)> {
-    named_bits(
-        bits.as_ref(),
-        kind.map_or(64, |(kind, field)| field.map_or(i128::from(kind.registers()) * 16, i128::from)),
-        problems,
-    )
+    named_bits(bits.as_ref(), kind.map_or(64, |(kind, field)| field.unwrap_or(kind.bits()).into()), problems)
 }
 
 /// The names of bits of a word of this many.

@@ -26,7 +26,7 @@ pub(super) fn place(
     }
     let point = point(row, context, problems);
     let kind = point.filter(|_| row.expr.is_none()).map(|point| (point.kind, point.field.map(|(_, bits)| bits)));
-    let is_text = point.is_some_and(|point| matches!(point.kind, DataType::Text(_)));
+    let is_text = point.is_some_and(|point| point.kind.is_text());
     if let Some(point) = point.filter(|_| is_text) {
         check_text(row, point, problems);
     }

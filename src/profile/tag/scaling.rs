@@ -65,7 +65,7 @@ pub(in crate::profile) fn range_of(tag: &TagDef) -> Option<(Exact, Exact)> {
     let kind = (tag.point.kind, tag.point.field.map(|(_, bits)| bits));
     match tag.decimals {
         Decimals::Fixed(_) => value_range(kind, tag.scale, tag.offset),
-        Decimals::From(_) => None,
+        Decimals::From(_) | Decimals::PowerFrom(_) => None,
     }
 }
 

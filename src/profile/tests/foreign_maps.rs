@@ -1,9 +1,14 @@
 //! Maps as the world writes them: addresses beyond 10000, patterns of bits, defaults for registers beside coils and texts.
 
+mod device_alarms;
+mod repeats;
+
+use std::time::Duration;
+
 use super::*;
 use crate::plant::{
     exact::Exact,
-    tag::{Table, TagDef},
+    tag::{DataType, Decimals, Poll, Table, TagDef},
 };
 
 fn meter(more: &str) -> String {
@@ -152,7 +157,7 @@ fn defaults_of_registers_leave_coils_and_texts_alone() {
 #[test]
 fn a_signed_power_of_ten_is_no_number_of_decimals() {
     let signed = METER.replace("address = 1004\ntype = \"uint16\"", "address = 1004\ntype = \"int16\"");
-    for piece in ["[meter.toml:17:17]", "D1.DP may hold a power of ten", "scale = -1"] {
+    for piece in ["[meter.toml:17:17]", "D1.DP may hold a power of ten", "write scale_from instead"] {
         assert!(errors(&signed).contains(piece), "{}", errors(&signed));
     }
     for settled in ["int16\"\nscale = -1", "int16\"\nmin = 0", "int16\"\nenum = { 0 = \"0\", 1 = \"1\" }"] {
@@ -167,4 +172,119 @@ fn any_text_is_a_unit_and_a_known_one_has_one_spelling() {
     {
         assert_eq!(tag(&METER.replace("°C", written), "D1.T").unit, unit, "{written}");
     }
+}
+
+#[test]
+fn a_power_of_ten_is_read_with_its_values() {
+    let map = "[[tag]]\nname = \"W\"\ntable = \"holding\"\naddress = 40083\ntype = \"int16\"\npoll = \"fast\"\n\
+               scale_from = \"W_SF\"\nbad_if = \"sunspec\"\n\
+               [[tag]]\nname = \"W_SF\"\ntable = \"holding\"\naddress = 40084\ntype = \"int16\"\npoll = \"once\"\n\
+               bad_if = \"sunspec\"\n";
+    let map = meter(map).replacen("vendor", "address_base = 0\nvendor", 1);
+    let (value, power) = (tag(&map, "D1.W"), tag(&map, "D1.W_SF"));
+    assert_eq!(value.decimals, Decimals::PowerFrom(power.id));
+    assert_eq!(power.poll, value.poll, "in the same cycle");
+    assert!(value.is_bad(Exact::whole(-32_768)) && power.is_bad(Exact::whole(-32_768)));
+    let both = map.replace("bad_if = \"sunspec\"\n[[", "decimals_from = \"W_SF\"\n[[");
+    assert!(errors(&both).contains("`decimals_from` and `scale_from`"), "{}", errors(&both));
+    let shown = map.replace("bad_if = \"sunspec\"\n[[", "decimals = 1\n[[");
+    assert!(errors(&shown).contains("`decimals` and `scale_from`"), "{}", errors(&shown));
+    let unknown = map.replace("= \"sunspec\"", "= \"solar\"");
+    assert!(errors(&unknown).contains("`solar` stands for no raw numbers"), "{}", errors(&unknown));
+}
+
+#[test]
+fn a_part_of_a_register_says_how_it_is_written() {
+    let map = |keys: &str| {
+        meter(&format!("[[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 500\naccess = \"rw\"\n{keys}"))
+    };
+    for keys in ["type = \"uint16\"\nfield = \"7-4\"", "type = \"uint8\"", "type = \"int8\"\norder = \"BADC\""] {
+        let refused = errors(&map(keys));
+        assert!(refused.contains("cannot be written by a whole word"), "{refused}");
+        let written = tag(&map(&format!("{keys}\nwrite = \"rmw\"")), "D1.X");
+        assert!(written.read_modify_write && written.write_function() == Some(6), "{keys}");
+        let masked = tag(&map(&format!("{keys}\nwrite_fc = 22")), "D1.X");
+        assert!(!masked.read_modify_write && masked.write_function() == Some(22), "{keys}");
+        let both = errors(&map(&format!("{keys}\nwrite = \"rmw\"\nwrite_fc = 22")));
+        assert!(both.contains("function 22 cannot write this tag"), "{both}");
+    }
+    let whole = errors(&map("type = \"uint16\"\nwrite = \"rmw\""));
+    assert!(whole.contains("only a part of a register"), "{whole}");
+    let halves = map("type = \"uint8\"\nwrite = \"rmw\"")
+        + "[[tag]]\nname = \"Y\"\ntable = \"holding\"\naddress = 500\ntype = \"uint8\"\norder = \"BADC\"\n";
+    assert_eq!(tag(&halves, "D1.Y").point.address, 500, "two bytes share a register");
+}
+
+#[test]
+fn every_type_is_written_in_a_profile_as_it_is_shown() {
+    for word in DataType::NUMBERS
+        .map(|kind| kind.to_string())
+        .into_iter()
+        .chain(["chars(5)", "cstring(7)", "epoch32", "clock_bcd"].map(str::to_owned))
+    {
+        let map = meter(&format!("[[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 500\ntype = \"{word}\"\n"));
+        assert_eq!(tag(&map, "D1.X").point.kind.to_string(), word);
+    }
+    for (word, why) in [
+        ("chars", "`chars` does not say how long the text is"),
+        ("chars(126)", "expected \"chars(N)\" with N registers, 1 to 125"),
+        ("mod10k(5)", "unknown type `mod10k(5)`"),
+        ("uint12", "unknown type `uint12`"),
+    ] {
+        let map = meter(&format!("[[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 500\ntype = \"{word}\"\n"));
+        assert!(errors(&map).contains(why), "{}", errors(&map));
+    }
+}
+
+#[test]
+fn a_tag_may_have_a_poll_period_of_its_own() {
+    let map = |poll: &str| {
+        meter(&format!(
+            "[[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 500\ntype = \"int16\"\npoll = \"{poll}\""
+        ))
+    };
+    for (poll, millis) in [("250ms", 250), ("5 min", 300_000), ("1h", 3_600_000)] {
+        assert_eq!(tag(&map(poll), "D1.X").poll, Poll::Every(Duration::from_millis(millis)), "{poll}");
+    }
+    for (poll, why) in
+        [("10ms", "this is not a poll period"), ("5 apples", "is not a duration"), ("quick", "unknown poll `quick`")]
+    {
+        assert!(errors(&map(poll)).contains(why), "{}", errors(&map(poll)));
+    }
+}
+
+#[test]
+fn a_tag_may_be_written_elsewhere_than_it_is_read() {
+    let map = |keys: &str| {
+        meter(&format!(
+            "[[tag]]\nname = \"X\"\ntable = \"input\"\naddress = 500\ntype = \"int16\"\naccess = \"rw\"\n{keys}"
+        ))
+    };
+    assert_eq!(tag(&map("write_address = 0x700"), "D1.X").write_at, Some((Table::Holding, 0x700)));
+    assert_eq!(tag(&map("write_address = \"holding:9\"\nwrite_fc = 16"), "D1.X").write_function(), Some(16));
+    for (keys, why) in [
+        ("", "a input can only be read"),
+        ("write_address = \"coil:9\"", "a input cannot be written to a coil"),
+        ("write_address = 9\nfield = 3\nwrite = \"rmw\"", "is not what would be written back"),
+    ] {
+        assert!(errors(&map(keys)).contains(why), "{}", errors(&map(keys)));
+    }
+    let read = map("write_address = 9").replace("access = \"rw\"\nwrite", "write");
+    assert!(errors(&read).contains("it is not written"), "{}", errors(&read));
+}
+
+#[test]
+fn numbers_of_64_bits_have_names_and_so_have_their_bits() {
+    let map = meter(
+        "[[tag]]\nname = \"E\"\ntable = \"holding\"\naddress = 500\ntype = \"uint64\"\n\
+         enum = { \"0xFFFFFFFFFFFFFFFF\" = \"none\", 9007199254740993 = \"odd\" }\n\
+         [[tag]]\nname = \"B\"\ntable = \"holding\"\naddress = 504\ntype = \"uint48\"\nfield = \"47-32\"\nbits = { 15 = \"top\" }\n",
+    );
+    let named = tag(&map, "D1.E");
+    assert_eq!(named.label_of(Exact::whole(u64::MAX.into())), Some("none"));
+    let (odd, even) = (Exact::whole(9_007_199_254_740_993), Exact::whole(9_007_199_254_740_992));
+    assert_eq!((named.label_of(odd), named.label_of(even)), (Some("odd"), None), "to the last digit");
+    assert_eq!(tag(&map, "D1.B").bit_labels, [(15, "top".to_owned())]);
+    let beyond = map.replace("bits = { 15", "bits = { 16");
+    assert!(errors(&beyond).contains("there is no bit 16"), "{}", errors(&beyond));
 }

@@ -54,12 +54,12 @@ fn all_problems_come_at_once_and_in_file_order() {
         ("unit = 2", "unit = 0"),
         ("V2000", "V2008"),
         ("min = 0", "min = 200"),
-        ("baud = 9600", "baud = 9601"),
+        ("baud = 9600", "baud = 49"),
     ]);
     let lines: Vec<String> = errors.lines().collect();
     insta::assert_snapshot!(lines.join("\n"), @"
     small.toml:2:13: unknown time zone `Mars/Base`
-    small.toml:8:8: 9601 is not a usual baud rate
+    small.toml:8:8: 49 baud is out of range
     small.toml:22:8: unit 0 is a broadcast, which no unit answers: PLC.STEP can never be read
     small.toml:27:1: unknown key `deadbnd` in an alarm
     meter.toml:19:7: max 100 is not above min 200

@@ -110,6 +110,8 @@ pub enum Mode {
     Tcp,
     /// RTU frames over TCP.
     RtuOverTcp,
+    /// ASCII frames over TCP.
+    AsciiOverTcp,
 }
 
 impl Mode {
@@ -119,17 +121,18 @@ impl Mode {
             Transport::Serial { framing: Framing::Ascii, .. } => Mode::Ascii,
             Transport::Serial { .. } => Mode::Rtu,
             Transport::Tcp { framing: Framing::Mbap, .. } => Mode::Tcp,
+            Transport::Tcp { framing: Framing::Ascii, .. } => Mode::AsciiOverTcp,
             Transport::Tcp { .. } => Mode::RtuOverTcp,
         }
     }
 
     /// Whether it runs over TCP.
     pub fn is_tcp(self) -> bool {
-        matches!(self, Mode::Tcp | Mode::RtuOverTcp)
+        matches!(self, Mode::Tcp | Mode::RtuOverTcp | Mode::AsciiOverTcp)
     }
 }
 
-/// `Modbus RTU`, `Modbus ASCII`, `Modbus TCP`, `Modbus RTU over TCP`.
+/// `Modbus RTU`, `Modbus ASCII`, `Modbus TCP`, `Modbus RTU over TCP`, `Modbus ASCII over TCP`.
 impl std::fmt::Display for Mode {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
@@ -137,6 +140,7 @@ impl std::fmt::Display for Mode {
             Mode::Ascii => "Modbus ASCII",
             Mode::Tcp => "Modbus TCP",
             Mode::RtuOverTcp => "Modbus RTU over TCP",
+            Mode::AsciiOverTcp => "Modbus ASCII over TCP",
         })
     }
 }
@@ -161,7 +165,7 @@ impl Service {
 
     /// What is spoken on any stream of bytes that stands for the line.
     pub fn tcp_framing(&self) -> TcpFraming {
-        let wire = Wire { serial: self.serial, ascii: self.mode == Mode::Ascii };
+        let wire = Wire { serial: self.serial, ascii: matches!(self.mode, Mode::Ascii | Mode::AsciiOverTcp) };
         if self.mode == Mode::Tcp { TcpFraming::Mbap } else { TcpFraming::Line(wire) }
     }
 }

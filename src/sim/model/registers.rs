@@ -10,9 +10,9 @@ use crate::{
     plant::event::ExceptionCode,
     plant::{
         def::{DeviceDef, Limits, TagId},
-        number::{to_u8, to_u32},
+        number::to_u32,
         scale,
-        tag::{Access, Bound, Decimals, Table, TagDef},
+        tag::{Access, Bound, Table, TagDef},
     },
     sim::pdu::Registers,
 };
@@ -75,7 +75,7 @@ fn functions(tags: &[TagDef]) -> Vec<u8> {
         if tag.access != Access::Write {
             functions.insert(tag.point.table.read_fc());
         }
-        match (tag.writable(), tag.write_fc, tag.point.table.is_bits()) {
+        match (tag.writable(), tag.write_fc, tag.write_point().table.is_bits()) {
             (true, Some(function), _) => functions.extend([function]),
             (true, None, true) => functions.extend([5, 15]),
             (true, None, false) => functions.extend([6, 16]),
@@ -118,8 +118,8 @@ impl Model {
 
     fn set(&mut self, tag: &TagDef, value: f64) -> bool {
         let Some(raw) = scale::to_raw(tag, value, self.decimals(tag)) else { return false };
-        let words = match codec::field_masks(tag.point, raw) {
-            Some((and, or)) => self.words(tag).map(|words| words.iter().map(|word| word & and | or & !and).collect()),
+        let words = match tag.point.part() {
+            Some(_) => self.words(tag).and_then(|words| codec::modified(tag.point, &words, raw)),
             None => codec::encode(tag.point, raw),
         };
         let Some(words) = words else { return false };
@@ -132,11 +132,8 @@ impl Model {
         (tag.point.address..).take(usize::from(tag.point.len())).map(|address| cells.get(&address).copied()).collect()
     }
 
-    fn decimals(&self, tag: &TagDef) -> u8 {
-        match tag.decimals {
-            Decimals::From(from) => self.value(from).map_or(0, to_u8),
-            Decimals::Fixed(_) => 0,
-        }
+    fn decimals(&self, tag: &TagDef) -> i8 {
+        tag.scaling_decimals(|from| self.value(from)).unwrap_or(0)
     }
 
     fn bound(&self, bound: Option<Bound>) -> Option<f64> {
@@ -150,13 +147,20 @@ impl Model {
     /// its bounds, is no state of its tag, or the device is locked.
     fn write_cells(&mut self, table: Table, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
         let chart = self.chart.clone();
+        let is_for = |tag: &&TagDef| {
+            tag.writable() && tag.write_at == Some((table, address)) && usize::from(tag.point.len()) == values.len()
+        };
+        if let Some(tag) = chart.tags.iter().find(is_for) {
+            self.cells[place(tag.point.table)].extend((tag.point.address..=u16::MAX).zip(values.iter().copied()));
+            return if self.admits(tag) { Ok(()) } else { Err(ExceptionCode::ILLEGAL_VALUE) };
+        }
         let span = u32::from(address)..u32::from(address) + to_u32(values.len());
         let extent =
             |tag: &TagDef| u32::from(tag.point.address)..u32::from(tag.point.address) + u32::from(tag.point.len());
         let touched: Vec<&TagDef> = chart
             .tags
             .iter()
-            .filter(|tag| tag.point.table == table && tag.writable())
+            .filter(|tag| tag.point.table == table && tag.writable() && tag.write_at.is_none())
             .filter(|tag| extent(tag).start < span.end && span.start < extent(tag).end)
             .collect();
         let taken = |at: u32| touched.iter().any(|tag| extent(tag).contains(&at));

@@ -124,3 +124,36 @@ fn the_second_controller_of_a_tank_plant_is_a_model() {
             .is_err_and(|error| error.to_string().contains("`tank`") || error.to_string().contains("\"tank\""))
     );
 }
+
+#[test]
+fn rare_types_and_places_are_simulated_as_they_are_read() {
+    let device = plant(
+        r#"
+tag = [
+    { name = "LOW", table = "holding", address = 0, type = "int8", access = "rw", write = "rmw" },
+    { name = "HIGH", table = "holding", address = 0, type = "uint8", order = "BADC", access = "rw", write = "rmw" },
+    { name = "ENERGY", table = "holding", address = 1, type = "mod10k(2)", scale_from = "SF" },
+    { name = "SF", table = "holding", address = 3, type = "int16", simulate = { start = 2 } },
+    { name = "T", table = "input", address = 9, type = "sm16", access = "rw", write_address = 0x20, max = 100 },
+    { name = "PART", table = "holding", address = 4, type = "uint32", field = "19-12" },
+]
+"#,
+    );
+    let mut simulator = Simulator::new(&device).expect("no rig is named");
+    let id = |name: &str| device.tag_named(name).expect("it is in the profile");
+    for (name, value) in [("LOW", -2.0), ("HIGH", 200.0), ("ENERGY", 1_234_567_800.0), ("T", -5.0), ("PART", 171.0)] {
+        let name = format!("D-1.{name}");
+        assert!(simulator.set_value(id(&name), value), "{name}");
+        assert_eq!(simulator.value(id(&name)), Some(value), "{name}");
+    }
+    let words = [3, 12, 0xC8, 0xFE, 0x04, 0xD2, 0x16, 0x2E, 0, 2, 0x00, 0x0A, 0xB0, 0x00];
+    assert_eq!(simulator.respond(L1, 1, &[3, 0, 0, 0, 6]), Some(words.to_vec()), "1234 5678 hundreds");
+    assert_eq!(simulator.respond(L1, 1, &[4, 0, 9, 0, 1]), Some(vec![4, 2, 0x80, 0x05]));
+    let sent = [6, 0, 0x20, 0x00, 0x07];
+    assert_eq!(simulator.respond(L1, 1, &sent), Some(sent.to_vec()), "written elsewhere");
+    assert_eq!(simulator.value(id("D-1.T")), Some(7.0));
+    assert_eq!(simulator.respond(L1, 1, &[6, 0, 0x20, 0, 101]), Some(vec![0x86, 3]), "beyond its greatest value");
+    assert!(simulator.set_value(id("D-1.LOW"), -2.0));
+    assert_eq!(simulator.respond(L1, 1, &[6, 0, 0, 0xC8, 0x05]), Some(vec![6, 0, 0, 0xC8, 0x05]));
+    assert_eq!((simulator.value(id("D-1.LOW")), simulator.value(id("D-1.HIGH"))), (Some(5.0), Some(200.0)));
+}

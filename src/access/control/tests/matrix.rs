@@ -13,6 +13,7 @@ use crate::{
         event::{Event, LineState},
         interlock::{InterlockCondition, InterlockDef},
         live::LiveRead,
+        number::to_i8,
         parameter_set::{ParameterSet, PlannedChange},
         port_signals::{OutputSignal, SignalTest},
         procedure::{ProcedureDef, ProcedureStep},
@@ -363,7 +364,7 @@ fn rules_hold_for_what_is_sent_not_for_what_is_typed() {
         for (of_tag, signed) in [(Role::Technician, false), (Role::Supervisor, false), (Role::Technician, true)] {
             let def = with_rules(register, of_tag, signed);
             let tag = def.tag(fixture::SV);
-            let raw = |rule: f64| scale::to_raw(tag, rule, register.3.unwrap_or(0));
+            let raw = |rule: f64| scale::to_raw(tag, rule, register.3.map_or(0, to_i8));
             for (role, value) in [Role::Technician, Role::Supervisor]
                 .into_iter()
                 .flat_map(|r| candidates(tag.scale).into_iter().map(move |v| (r, v)))

@@ -179,8 +179,10 @@ impl Task<'_> {
         if backed_off && !urgent {
             return Ok(WriteResult::NotSent(Fault::BackedOff));
         }
-        // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
-        let Some(request) = write_request(tag, raw) else { return Ok(WriteResult::NotSent(Fault::NotANumber)) };
+        let request = match self.request_for(link, tag, raw).await? {
+            Ok(request) => request,
+            Err(not_sent) => return Ok(not_sent),
+        };
         // A stop does not wait for an unambiguous response: its refusal may then be reported as a missing response.
         let own =
             (urgent && is_clear(link, device)) || (!urgent && self.has_no_outstanding_reply(link, device).await?);
@@ -200,6 +202,20 @@ impl Task<'_> {
             Err(LinkError::Fault(Fault::Exception(code))) if own && code.is_refusal() => Ok(WriteResult::Refused(code)),
             Err(LinkError::Fault(fault)) => Ok(WriteResult::NoValidResponse(fault)),
         }
+    }
+
+    /// The request that writes a number, or the result where there is none. `Err`: the port closed.
+    async fn request_for(
+        &mut self,
+        link: &mut Link,
+        tag: &TagDef,
+        raw: Exact,
+    ) -> Result<Result<Request<'static>, WriteResult>, String> {
+        if tag.read_modify_write {
+            return self.modified(link, tag, raw).await;
+        }
+        // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
+        Ok(write_request(tag, raw).ok_or(WriteResult::NotSent(Fault::NotANumber)))
     }
 
     /// Writes once and reads back.
@@ -305,20 +321,21 @@ fn is_clear(link: &Link, device: &DeviceDef) -> bool {
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for
 /// a field of bits, 23 where the profile wants the new value in the response.
 fn write_request(tag: &TagDef, raw: Exact) -> Option<Request<'static>> {
-    let address = tag.point.address;
-    match tag.point.table {
+    let point = tag.write_point();
+    let address = point.address;
+    match point.table {
         // A discrete input is written only where the profile names the function for it.
         Table::Discrete if tag.write_fc.is_none() => None,
         Table::Coil | Table::Discrete => Some(match tag.write_fc {
             Some(15) => Request::WriteMultipleCoils(address, Cow::Owned(vec![raw != 0.0])),
             Some(_) | None => Request::WriteSingleCoil(address, raw != 0.0),
         }),
-        Table::Holding if tag.point.field.is_some() => {
-            let (and, or) = codec::field_masks(tag.point, raw)?;
+        Table::Holding if point.part().is_some() => {
+            let (and, or) = codec::field_masks(point, raw)?;
             Some(Request::MaskWriteRegister(address, and, or))
         }
         Table::Holding => {
-            let words = codec::encode(tag.point, raw)?;
+            let words = codec::encode(point, raw)?;
             Some(match (words.as_slice(), tag.write_fc) {
                 ([word], None | Some(6)) => Request::WriteSingleRegister(address, *word),
                 (_, Some(23)) => {
@@ -333,47 +350,4 @@ fn write_request(tag: &TagDef, raw: Exact) -> Option<Request<'static>> {
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
-mod tests {
-    use super::*;
-    use crate::plant::{
-        def::{DeviceId, TagId},
-        tag::{ByteOrder, DataType, Point},
-    };
-
-    /// The bytes of the request after the function code, as tokio-modbus would send them, by its own encoder.
-    fn request(kind: DataType, field: Option<(u8, u8)>, write_fc: Option<u8>, raw: f64) -> Option<Request<'static>> {
-        let point = Point { table: Table::Holding, address: 100, kind, order: ByteOrder::Abcd, field };
-        write_request(&TagDef { write_fc, ..TagDef::new(TagId(0), DeviceId(0), "D.T", point) }, raw.into())
-    }
-
-    #[test]
-    fn each_tag_is_written_by_the_function_that_its_device_has() {
-        let one = Request::WriteSingleRegister(100, 7);
-        assert_eq!(request(DataType::U16, None, None, 7.0), Some(one.clone()));
-        assert_eq!(request(DataType::U16, None, Some(6), 7.0), Some(one));
-        let many = |words: Vec<u16>| Request::WriteMultipleRegisters(100, Cow::Owned(words));
-        assert_eq!(request(DataType::U16, None, Some(16), 7.0), Some(many(vec![7])));
-        assert_eq!(request(DataType::U32, None, None, 65_537.0), Some(many(vec![1, 1])));
-        let both = Request::ReadWriteMultipleRegisters(100, 1, 100, Cow::Owned(vec![7]));
-        assert_eq!(request(DataType::U16, None, Some(23), 7.0), Some(both));
-        let masked = Request::MaskWriteRegister(100, 0xFFCF, 0x0020);
-        assert_eq!(request(DataType::U16, Some((4, 2)), Some(22), 2.0), Some(masked));
-        assert_eq!(request(DataType::U16, None, None, 65_536.0), None, "what does not fit is not sent");
-    }
-
-    #[test]
-    fn coils_are_written_one_by_one_by_default() {
-        let point = Point { table: Table::Coil, address: 5, kind: DataType::Bool, order: ByteOrder::Abcd, field: None };
-        let coil = TagDef::new(TagId(0), DeviceId(0), "D.C", point);
-        assert_eq!(write_request(&coil, Exact::plain(1.0)), Some(Request::WriteSingleCoil(5, true)));
-        let fifteen = TagDef { write_fc: Some(15), ..coil };
-        assert_eq!(
-            write_request(&fifteen, Exact::plain(0.0)),
-            Some(Request::WriteMultipleCoils(5, Cow::Owned(vec![false])))
-        );
-        let input = TagDef { point: Point { table: Table::Discrete, ..point }, write_fc: None, ..fifteen };
-        assert_eq!(write_request(&input, Exact::plain(1.0)), None);
-        let five = TagDef { write_fc: Some(5), ..input };
-        assert_eq!(write_request(&five, Exact::plain(1.0)), Some(Request::WriteSingleCoil(5, true)));
-    }
-}
+mod tests;

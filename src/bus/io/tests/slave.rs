@@ -39,6 +39,7 @@ pub enum Mode {
     Rtu,
     Ascii,
     RtuOverTcp,
+    AsciiOverTcp,
     Tcp,
     /// With sixteen requests under way.
     Tcp16,
@@ -67,6 +68,7 @@ impl Mode {
             Mode::Rtu => serial(Framing::Rtu, 8),
             Mode::Ascii => serial(Framing::Ascii, 7),
             Mode::RtuOverTcp => Transport::Tcp { host: "memory".into(), port: 502, framing: Framing::Rtu },
+            Mode::AsciiOverTcp => Transport::Tcp { host: "memory".into(), port: 502, framing: Framing::Ascii },
             Mode::Tcp | Mode::Tcp16 => Transport::tcp("memory", 502),
         }
     }

@@ -62,6 +62,7 @@ async fn a_broadcast_is_sent_once_and_never_called_verified() {
     let expected = [
         (Mode::Rtu, WriteResult::Sent),
         (Mode::Ascii, WriteResult::Sent),
+        (Mode::AsciiOverTcp, WriteResult::Sent),
         (Mode::RtuOverTcp, WriteResult::Sent),
         (Mode::Tcp, WriteResult::Accepted),
     ];
@@ -246,5 +247,43 @@ async fn a_write_that_loses_the_port_counts_no_other_exchange() {
             }
             _ => {}
         }
+    }
+}
+
+/// A field of four bits in register 10, which holds 0xAB0A when it is read alone: the other bits are written back.
+#[tokio::test(start_paused = true)]
+async fn a_part_of_a_register_is_written_with_the_rest_as_read() {
+    let read = vec![3, 0, 10, 0, 1];
+    for (refused, expect, sent) in [
+        (false, WriteResult::ReadBack(10.0.into()), vec![read.clone(), vec![6, 0, 10, 0xAB, 5], read.clone()]),
+        (true, WriteResult::NotSent(Fault::Exception(ExceptionCode(2))), vec![read]),
+    ] {
+        let mut def = plant(Mode::Rtu);
+        (def.tags[0].point.field, def.tags[0].read_modify_write) = (Some((0, 4)), true);
+        let mut line = line(def.clone());
+        let heard = Arc::new(std::sync::Mutex::new(Vec::new()));
+        let log = heard.clone();
+        line.plug(Mode::Rtu, move |_, message| {
+            let is_alone = message[0] == 1 && message[1] == 3 && message[2..6] == [0, 10, 0, 1];
+            if message[1] == 6 || is_alone {
+                log.lock().expect("one at a time").push(message[1..6].to_vec());
+            }
+            match (is_alone, refused) {
+                (true, true) => SlaveAction::Exception(2),
+                (true, false) => SlaveAction::Instead(vec![1, 3, 2, 0xAB, 0x0A]),
+                (false, _) => SlaveAction::Answer,
+            }
+        });
+        line.read(&def).await;
+        let job =
+            WriteJob { id: WriteId(1), tag: TagId(0), raw: 5.0.into(), unlock: None, verify: true, urgent: false };
+        line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
+        let result = line
+            .until(&def, |event| match event {
+                Event::Wrote { result, .. } => Some(result.clone()),
+                _ => None,
+            })
+            .await;
+        assert_eq!((result, heard.lock().expect("one at a time").clone()), (expect, sent));
     }
 }

@@ -71,16 +71,17 @@ impl Field {
     }
 }
 
-/// The four modes of a line.
+/// The modes of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
     Rtu,
     Ascii,
     Tcp,
     RtuOverTcp,
+    AsciiOverTcp,
 }
 
-const MODES: [Mode; 4] = [Mode::Rtu, Mode::Ascii, Mode::Tcp, Mode::RtuOverTcp];
+const MODES: [Mode; 5] = [Mode::Rtu, Mode::Ascii, Mode::Tcp, Mode::RtuOverTcp, Mode::AsciiOverTcp];
 
 /// Settings as they stand in the form. What another mode needs is kept while this one is chosen.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,7 +119,11 @@ impl Draft {
                 (draft.port, draft.serial, draft.rs485) = (Line::new(port), *serial, *rs485);
             }
             Transport::Tcp { host, port, framing } => {
-                draft.mode = if *framing == Framing::Rtu { Mode::RtuOverTcp } else { Mode::Tcp };
+                draft.mode = match framing {
+                    Framing::Rtu => Mode::RtuOverTcp,
+                    Framing::Ascii => Mode::AsciiOverTcp,
+                    Framing::Mbap => Mode::Tcp,
+                };
                 (draft.host, draft.tcp_port) = (Line::new(host), number(u128::from(*port)));
             }
         }
@@ -161,6 +166,7 @@ impl Draft {
             Mode::Ascii => Ok(serial(Framing::Ascii)),
             Mode::Tcp => tcp(Framing::Mbap),
             Mode::RtuOverTcp => tcp(Framing::Rtu),
+            Mode::AsciiOverTcp => tcp(Framing::Ascii),
         }
     }
 
@@ -169,7 +175,7 @@ impl Draft {
         use Field::{Baud, DataBits, Gap, Host, Mode as ModeRow, Parity, Port, StopBits, TcpPort, Timeout};
         match self.mode {
             Mode::Rtu | Mode::Ascii => &[ModeRow, Port, Baud, DataBits, Parity, StopBits, Timeout, Gap],
-            Mode::Tcp | Mode::RtuOverTcp => &[ModeRow, Host, TcpPort, Timeout, Gap],
+            Mode::Tcp | Mode::RtuOverTcp | Mode::AsciiOverTcp => &[ModeRow, Host, TcpPort, Timeout, Gap],
         }
     }
 
@@ -184,6 +190,7 @@ impl Draft {
                 Mode::Ascii => "ASCII".to_owned(),
                 Mode::Tcp => "TCP".to_owned(),
                 Mode::RtuOverTcp => t!("RTU over TCP").to_owned(),
+                Mode::AsciiOverTcp => t!("ASCII over TCP").to_owned(),
             },
             Field::Baud => self.serial.baud.to_string(),
             Field::DataBits => self.serial.data_bits.to_string(),
@@ -191,6 +198,8 @@ impl Draft {
                 Parity::None => t!("none").to_owned(),
                 Parity::Even => t!("even").to_owned(),
                 Parity::Odd => t!("odd").to_owned(),
+                Parity::Mark => t!("mark (always 1)").to_owned(),
+                Parity::Space => t!("space (always 0)").to_owned(),
             },
             Field::StopBits => self.serial.stop_bits.to_string(),
             Field::Port | Field::Host | Field::TcpPort | Field::Timeout | Field::Gap => {
@@ -251,7 +260,7 @@ impl Draft {
             Field::Baud => serial.baud = next(BAUDS, serial.baud, by),
             Field::DataBits if self.mode == Mode::Ascii => serial.data_bits = next(&[7, 8], serial.data_bits, by),
             Field::DataBits => return Err(t!("Modbus RTU always has 8 data bits; 7 are for ASCII").to_owned()),
-            Field::Parity => serial.parity = next(&[Parity::None, Parity::Even, Parity::Odd], serial.parity, by),
+            Field::Parity => serial.parity = next(&Parity::ALL, serial.parity, by),
             Field::StopBits => serial.stop_bits = next(&[1, 2], serial.stop_bits, by),
             Field::Port | Field::Host | Field::TcpPort | Field::Timeout | Field::Gap => {}
         }

@@ -93,6 +93,9 @@ fn because(
             Decimals::From(from) => {
                 Some(t!("its decimals come from another value: {words_of}", words_of = words_of(from)))
             }
+            Decimals::PowerFrom(from) => {
+                Some(t!("its power of ten comes from another value: {words_of}", words_of = words_of(from)))
+            }
             Decimals::Fixed(_) => None,
         },
         Cause::Stale => match def.poll {
@@ -183,10 +186,7 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     if def.is_text() {
         return text(cx, def, found);
     }
-    let scaling = match def.decimals {
-        Decimals::From(_) => cx.snapshot.decimals[def.id.index()],
-        Decimals::Fixed(_) => 0,
-    };
+    let scaling = cx.snapshot.scaling_decimals(def.id);
     let from_answer = found.and_then(|found| found.raw);
     // Without an answer that holds it: the number behind the value that is still shown.
     let shown = cx.snapshot.sample(def.id).exact().and_then(|value| scale::to_raw(def, value, scaling));
@@ -199,8 +199,8 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
     };
     let hex = hex.filter(|_| !def.point.table.is_bits()).map(|hex| format!(" ({})", hex.trim_start()));
     let mut words = t!("raw {raw}{hex}", raw, hex = hex.unwrap_or_default());
-    if 0 < scaling {
-        words += &format!(" × 10^-{scaling}");
+    if scaling != 0 {
+        words += &format!(" × 10^{}", -scaling);
     }
     if def.scale != 1.0 {
         words += &format!(" × {}", def.scale);
@@ -216,6 +216,7 @@ pub(super) fn number(cx: &ViewContext, def: &TagDef, exchange: Option<&Exchange>
             words += &t!(", decimals as the plant file states {name}", name = cx.def().tag(from).name);
         }
         Decimals::From(from) => words += &t!(", decimals from {name}", name = cx.def().tag(from).name),
+        Decimals::PowerFrom(from) => words += &t!(", power of ten from {name}", name = cx.def().tag(from).name),
         Decimals::Fixed(_) if def.scale == 1.0 && def.offset == 0.0 && def.enum_labels.is_empty() => {
             words += t!(", not scaled")
         }

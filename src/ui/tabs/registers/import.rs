@@ -171,6 +171,7 @@ impl Rule {
         }
         let order = self.word_order.as_deref().map_or(Some(usual), words::order_of);
         let order = order.ok_or_else(|| t!("unknown word order").to_owned())?;
+        let order = if kind.is_half() { ByteOrder::Abcd } else { order };
         let (mut scale, mut offset) = (1.0, 0.0);
         for op in &self.ops {
             let wrong = || t!("{op} is not a step that a scale and an offset can do", op);
@@ -228,7 +229,8 @@ fn exported(cell: impl Fn(&str) -> String, of: AddressContext) -> Result<Named, 
         return Err(t!("{written}: no name", written));
     }
     let kind = if word == "int1" { Some(DataType::Bool) } else { words::kind_of(&word) };
-    let kind = kind.filter(|kind| table.is_bits() == (*kind == DataType::Bool));
+    // Its 8-bit types are those of devices whose registers have 8 bits.
+    let kind = kind.filter(|kind| table.is_bits() == (*kind == DataType::Bool) && !kind.is_half());
     let kind = kind.ok_or_else(|| t!("{written}: `{word}` is not a known type", written, word))?;
     let number = |name: &str, usual: f64| {
         let text = cell(name);
@@ -305,11 +307,12 @@ mod tests {
             "40051 set voltage uint16 CDAB 0.1 0 1 V",
             "40055 state uint16 CDAB 1 0 0 ",
             "40061 holding-60 float32 ABCD 2 5 2 ",
+            "40081 half float16 CDAB 1 0 2 ",
             "00001 breaker bool CDAB 1 0 0 ",
         ];
         assert_eq!(named, expect);
-        assert_eq!(problems.len(), 4, "{problems:?}");
-        assert!(problems[0].starts_with("40071: names of bits") && problems[3].contains("\"^2\""), "{problems:?}");
+        assert_eq!(problems.len(), 3, "{problems:?}");
+        assert!(problems[0].starts_with("40071: names of bits") && problems[2].contains("\"^2\""), "{problems:?}");
     }
 
     #[test]

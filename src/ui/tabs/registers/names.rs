@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::{
-    bus::interpret,
+    bus::{codec, interpret},
     plant::{
         exact::Exact,
         number::digits,
@@ -58,13 +58,14 @@ impl Named {
 
     /// A tag, with its decimals and unit. Where the device has not said where its point is, the number is shown as it came,
     /// and says so.
-    pub fn of_tag(tag: &TagDef, scaling: Option<(u8, String)>) -> Named {
+    pub fn of_tag(tag: &TagDef, scaling: Option<(i8, String)>) -> Named {
         let point = tag.point;
         let plain = Named::new(point.table, point.address, point.kind, point.order, &tag.short);
         let Some((decimals, unit)) = scaling else { return Named { unit: t!("raw").to_owned(), ..plain } };
-        let scaling = if let Decimals::From(_) = tag.decimals { decimals } else { 0 };
+        let power = if tag.decimals.source().is_some() { -decimals } else { 0 };
         // As a person would write the product.
-        let scale = format!("{}e-{scaling}", tag.scale).parse().unwrap_or(tag.scale);
+        let scale = format!("{}e{power}", tag.scale).parse().unwrap_or(tag.scale);
+        let decimals = Decimals::shown(decimals);
         let enum_labels = tag.enum_labels.clone();
         Named { scale, offset: tag.offset, decimals, unit, enum_labels, ..plain }
     }
@@ -81,8 +82,8 @@ impl Named {
 
     /// `70.0 °C`, `RUN`; `None` as for [`Named::value`].
     pub fn text(&self, words: &[u16]) -> Option<String> {
-        if let DataType::Text(_) = self.kind {
-            return words.get(..usize::from(self.len())).map(interpret::text);
+        if self.kind.is_text() {
+            return codec::decode_text(self.point(), words.get(..usize::from(self.len()))?);
         }
         let raw = self.raw(words)?;
         if let Some((_, label)) = self.enum_labels.iter().find(|(number, _)| Exact::whole(*number) == raw) {

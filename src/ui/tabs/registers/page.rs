@@ -1,7 +1,10 @@
 //! The registers as a page of the tab Bus, of a unit that the plant file knows.
 
 use super::{Registers, names::Named};
-use crate::plant::tag::{Decimals, Table, TagDef};
+use crate::plant::{
+    number::to_i8,
+    tag::{Decimals, Table, TagDef},
+};
 use crate::ui::tabs::prelude::*;
 
 impl Registers {
@@ -64,11 +67,11 @@ impl Registers {
 }
 
 /// Decimals and unit of a tag now; `None` while the device has not said them.
-fn scaling(snapshot: &Snapshot, tag: &TagDef) -> Option<(u8, String)> {
+fn scaling(snapshot: &Snapshot, tag: &TagDef) -> Option<(i8, String)> {
     let value = |of| snapshot.sample(of).scaling_value();
     let decimals = match tag.decimals {
-        Decimals::Fixed(decimals) => decimals,
-        Decimals::From(_) => tag.scaling_decimals(value)?,
+        Decimals::Fixed(decimals) => to_i8(decimals),
+        Decimals::From(_) | Decimals::PowerFrom(_) => tag.scaling_decimals(value)?,
     };
     Some((decimals, tag.unit_by(value)?.to_owned()))
 }

@@ -17,7 +17,7 @@ use crate::{
         live::{AddressSpan, LiveReading},
         number::{to_f32, to_u32},
         sample::{Cause, Quality, Sample},
-        tag::{ByteOrder, DataType, Table},
+        tag::{ByteOrder, DataType, Encoding, Table},
     },
     profile::unit_of,
     report::value_log,
@@ -276,21 +276,17 @@ fn sample(reading: &LiveReading, named: &Named, before: Sample) -> Sample {
 
 /// A value for the log: a plain float with all its digits, others with the decimals of their scale.
 fn logged(named: &Named, value: Exact) -> String {
-    match named.kind {
-        DataType::F32 if named.scale == 1.0 => to_f32(value.near()).to_string(),
-        DataType::F64 if named.scale == 1.0 => value.to_string(),
-        DataType::Bool
-        | DataType::I16
-        | DataType::U16
-        | DataType::I32
-        | DataType::U32
-        | DataType::I64
-        | DataType::U64
-        | DataType::F32
-        | DataType::F64
-        | DataType::Bcd16
-        | DataType::Bcd32
-        | DataType::Text(_) => digits(value, Some(named.decimals)),
+    match named.kind.encoding() {
+        Encoding::Float if named.scale == 1.0 && named.kind == DataType::F64 => value.to_string(),
+        Encoding::Float if named.scale == 1.0 => to_f32(value.near()).to_string(),
+        Encoding::Float
+        | Encoding::Bit
+        | Encoding::Unsigned
+        | Encoding::Signed
+        | Encoding::Bcd
+        | Encoding::SignMagnitude
+        | Encoding::Mod10k
+        | Encoding::Text => digits(value, Some(named.decimals)),
     }
 }
 
@@ -300,14 +296,14 @@ fn named(text: &str, plain: Named) -> Result<Named, String> {
     let name = words.next().ok_or_else(|| t!("expected a name").to_owned())?.to_owned();
     let mut named = Named { name, unit: String::new(), ..plain };
     for word in words {
-        let kind = DataType::NUMBERS.into_iter().find(|kind| kind.name() == word);
+        let kind = word.parse::<DataType>().ok().filter(|kind| !kind.is_text());
         let order = ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(word));
         match (kind, order, word.parse::<f64>()) {
             (Some(kind), ..) if named.table.is_bits() && kind != DataType::Bool => {
                 return Err(t!("{word}: a bit holds 0 or 1", word));
             }
             (Some(kind), ..) => {
-                let decimals = if matches!(kind, DataType::F32 | DataType::F64) { 3 } else { 0 };
+                let decimals = if kind.encoding() == Encoding::Float { 3 } else { 0 };
                 (named.kind, named.decimals) = (kind, decimals);
             }
             (_, Some(order), _) => named.order = order,

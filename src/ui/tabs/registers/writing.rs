@@ -16,7 +16,7 @@ use crate::{
         event::ExceptionCode,
         live::number,
         scale,
-        tag::{ByteOrder, DataType, Point, Table},
+        tag::{ByteOrder, DataType, Encoding, Point, Table},
     },
 };
 
@@ -109,7 +109,7 @@ impl Registers {
         if let Some((named, held)) = self.named_and_held() {
             let title =
                 t!("write {name}, now {value}", name = named.name, value = named.text(&held).unwrap_or_default());
-            let hint = if let DataType::Text(most) = named.kind {
+            let hint = if let Some(most) = named.kind.length().filter(|_| named.kind.is_text()) {
                 t!("at most {most} characters", most)
             } else if named.enum_labels.is_empty() {
                 t!("a value as it is shown, or +1; 0x2BC: words as they are").to_owned()
@@ -238,7 +238,10 @@ fn unknown() -> UiAction {
 
 /// The words of a named value: a number as it is shown, `+1` to add, one of its words, or a text.
 fn typed_as(text: &str, named: &Named, held: &[u16]) -> Result<Vec<u16>, String> {
-    if let DataType::Text(most) = named.kind {
+    if named.kind.is_half() {
+        return Err(t!("{name} is one byte of a register: write the register", name = named.name));
+    }
+    if let Some(most) = named.kind.length().filter(|_| named.kind.is_text()) {
         let words = codec::encode_text(named.point(), text);
         return words.ok_or_else(|| t!("found `{text}`, expected at most {most} printable characters", text, most));
     }
@@ -260,7 +263,7 @@ fn typed_as(text: &str, named: &Named, held: &[u16]) -> Result<Vec<u16>, String>
     };
     let value = value.ok_or_else(wrong)?;
     let raw = (value.near() - named.offset) / named.scale;
-    if matches!(named.kind, DataType::F32 | DataType::F64) {
+    if named.kind.encoding() == Encoding::Float {
         return encode(named, raw.into()).ok_or_else(|| does_not_fit(text, named));
     }
     let whole = scale::whole_raw(value, named.scale, named.offset, 0).map(Exact::whole);
@@ -282,8 +285,8 @@ fn does_not_fit(text: &str, named: &Named) -> String {
 /// One step of its last digit up or down; `None` where the type ends.
 fn next_step(named: &Named, held: &[u16], by: i16) -> Option<Vec<u16>> {
     let raw = named.raw(held)?;
-    let step = match named.kind {
-        DataType::F32 | DataType::F64 => f64::from(by) * 10_f64.powi(-i32::from(named.decimals)) / named.scale,
+    let step = match named.kind.encoding() {
+        Encoding::Float => f64::from(by) * 10_f64.powi(-i32::from(named.decimals)) / named.scale,
         _ => f64::from(by),
     };
     encode(named, raw + step.into())

@@ -184,8 +184,11 @@ impl Row {
             None => (DataType::U16, None),
             Some(word) => type_of(word, self.length).map_err(because)?,
         };
-        let order =
-            self.order.or(order).unwrap_or(if let DataType::Text(_) = kind { ByteOrder::Abcd } else { assumed.order });
+        let order = self.order.or(order).unwrap_or(if kind.is_text() || kind.is_half() {
+            ByteOrder::Abcd
+        } else {
+            assumed.order
+        });
         let scale = self.scale.unwrap_or(1.0);
         let (decimals, unit) = (decimals_of(scale, kind), unit_of(&self.unit));
         let named = Named::new(table, address, kind, order, &self.name);

@@ -1,7 +1,7 @@
 //! The words of a cell: types with their byte order, tables, factors.
 
 use crate::{
-    plant::tag::{ByteOrder, DataType, Table},
+    plant::tag::{ByteOrder, DataType, Encoding, Table},
     t,
 };
 
@@ -69,6 +69,13 @@ pub fn kind_of(text: &str) -> Option<DataType> {
         "double" | "float64" | "f64" | "lreal" => DataType::F64,
         "bcd" | "bcd16" => DataType::Bcd16,
         "bcd32" => DataType::Bcd32,
+        "int24" | "i24" | "s24" => DataType::I24,
+        "uint24" | "u24" => DataType::U24,
+        "int48" | "i48" | "s48" => DataType::I48,
+        "uint48" | "u48" => DataType::U48,
+        "float16" | "f16" | "half" => DataType::F16,
+        "int8" | "i8" | "s8" | "sint8" | "signed8" => DataType::I8,
+        "uint8" | "u8" | "byte" | "unsigned8" => DataType::U8,
         "bool" | "boolean" | "bit" => DataType::Bool,
         _ => return None,
     })
@@ -92,8 +99,7 @@ fn suffixed(text: &str) -> Option<(DataType, ByteOrder)> {
 /// Is it the word of a type that says its size, which no name of a value is?
 pub fn is_sized_type(text: &str) -> bool {
     let has_size = text.ends_with(|c: char| c.is_ascii_digit());
-    let small = ["s8", "u8", "i8", "int8", "uint8"].contains(&text.to_lowercase().as_str());
-    small || suffixed(text).is_some() || has_size && kind_of(text).is_some()
+    suffixed(text).is_some() || has_size && kind_of(text).is_some()
 }
 
 /// The type and, where the word says it, the order; by the registers that it takes where the word does not say how many.
@@ -116,9 +122,6 @@ pub fn type_of(word: &str, length: Option<u16>) -> Result<(DataType, Option<Byte
                 .map(|bytes| (DataType::Text(bytes), order))
                 .ok_or_else(|| t!("`{word}` does not say how long the text is", word));
         }
-        "s8" | "u8" | "i8" | "int8" | "uint8" | "byte" | "int8be" | "uint8be" | "int8le" | "uint8le" => {
-            return Err(t!("`{word}`: a half of a register cannot be taken", word));
-        }
         _ => {}
     }
     let found = kind_of(word).map(|kind| (kind, None));
@@ -133,7 +136,7 @@ pub fn type_of(word: &str, length: Option<u16>) -> Result<(DataType, Option<Byte
 /// Decimals that show what a scale leaves of a raw number.
 pub fn decimals_of(scale: f64, kind: DataType) -> u8 {
     let fraction = format!("{scale}").split_once('.').map_or(0, |(_, digits)| digits.len().min(6));
-    let float = matches!(kind, DataType::F32 | DataType::F64);
+    let float = kind.encoding() == Encoding::Float;
     u8::try_from(if float { fraction.max(2) } else { fraction }).unwrap_or(0)
 }
 
@@ -157,7 +160,10 @@ mod tests {
         check("floatle", Some(2), Some((DataType::F32, Some(ByteOrder::Dcba))));
         check("int16le", Some(1), Some((DataType::I16, Some(ByteOrder::Badc))));
         check("uint32sb", Some(2), None);
-        check("s8", None, None);
+        check("s8", None, Some((DataType::I8, None)));
+        check("uint8le", Some(1), Some((DataType::U8, Some(ByteOrder::Badc))));
+        check("int8be", None, Some((DataType::I8, Some(ByteOrder::Abcd))));
+        check("uint48", Some(3), Some((DataType::U48, None)));
     }
 
     #[test]

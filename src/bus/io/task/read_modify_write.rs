@@ -1,0 +1,52 @@
+//! A field of bits, or one byte, that is written with the whole register: read, set, written back.
+
+use std::borrow::Cow;
+
+use tokio_modbus::Request;
+
+use super::{Task, read::ReadValues};
+use crate::{
+    bus::{
+        codec,
+        io::link::{Link, LinkError},
+        plan,
+    },
+    plant::{
+        event::{Fault, WriteResult},
+        exact::Exact,
+        tag::TagDef,
+    },
+};
+
+impl Task<'_> {
+    /// The request that writes the registers as they are read right before it, with the number of a tag set. Without a valid
+    /// reading nothing is written: the inner `Err` is then the result of the write. The outer one: the port closed.
+    pub(super) async fn modified(
+        &mut self,
+        link: &mut Link,
+        tag: &TagDef,
+        raw: Exact,
+    ) -> Result<Result<Request<'static>, WriteResult>, String> {
+        let def = self.def.clone();
+        let block = plan::single(def.device(tag.device), tag);
+        let held = match self.read_unless_stopped(link, &block, None).await {
+            Some(Ok(ReadValues::Registers(words))) => words,
+            Some(Ok(ReadValues::Bits(_))) => return Ok(Err(WriteResult::NotSent(Fault::NotANumber))),
+            Some(Err(LinkError::Fault(fault))) => return Ok(Err(WriteResult::NotSent(fault))),
+            Some(Err(LinkError::Gone(why))) => return Err(why),
+            None => return Ok(Err(WriteResult::Superseded)),
+        };
+        // A block may begin before the tag where the device wants it so.
+        let first = usize::from(tag.point.address - block.address);
+        let own = held.get(first..first + usize::from(tag.point.len()));
+        let words = own.and_then(|own| codec::modified(tag.point, own, raw));
+        Ok(words.map(|words| request(tag, words)).ok_or(WriteResult::NotSent(Fault::NotANumber)))
+    }
+}
+
+fn request(tag: &TagDef, words: Vec<u16>) -> Request<'static> {
+    match (words.as_slice(), tag.write_fc) {
+        ([word], None | Some(6)) => Request::WriteSingleRegister(tag.point.address, *word),
+        _ => Request::WriteMultipleRegisters(tag.point.address, Cow::Owned(words)),
+    }
+}
