@@ -22,7 +22,14 @@ mod tests;
 
 pub use device::signal_mark;
 
-use self::{compare::Compare, procedures::Procedures, program::Cell, runs::Runs, table::Table};
+use self::{
+    compare::Compare,
+    procedures::Procedures,
+    program::Cell,
+    runs::{ControlRuns, Runs},
+    sets::{Sets, SetsOf},
+    table::Table,
+};
 use crate::ui::tabs::prelude::*;
 use crate::{history::Series, plant::parameter_set, ui::layout::Size};
 
@@ -76,8 +83,7 @@ pub struct Controllers {
     runs: Runs,
     procedures: Procedures,
     lamps: lamps::Live,
-    /// The selected row of the sets.
-    set: usize,
+    sets: Sets,
     asked_for: Asked,
     /// The small trend, of which tag, and the query for it.
     trend: Answered<Vec<Series>>,
@@ -88,13 +94,21 @@ pub struct Controllers {
 
 impl TabView for Controllers {
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        if let Some(list) = self.list() {
+            return list.copied(cx);
+        }
         let device = cx.def().devices.get(self.device.index());
         let tag = device.and_then(|device| match self.page {
             Page::Device => self.table.tag(cx, device.id).map(|tag| tag.id),
             Page::List => device.faceplate.as_ref().map(|faceplate| faceplate.pv),
             Page::Program => device.program.as_ref().and_then(|program| self.cell.tag(program)),
-            Page::Lamps | Page::Sets | Page::Compare(..) | Page::Runs | Page::Guide(..) => None,
-            Page::Procedures | Page::Overlay(_) => None,
+            Page::Sets
+            | Page::Runs
+            | Page::Procedures
+            | Page::Lamps
+            | Page::Compare(..)
+            | Page::Overlay(_)
+            | Page::Guide(..) => None,
         });
         tag.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
@@ -105,6 +119,9 @@ impl TabView for Controllers {
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
+        if self.list_mut().is_some_and(|list| list.back(cx)) {
+            return true;
+        }
         let page = std::mem::replace(&mut self.page, Page::List);
         let alone = cx.def().devices.len() <= 1;
         self.page = match page {
@@ -134,13 +151,23 @@ impl TabView for Controllers {
         true
     }
 
-    fn fingerprint(&self, cx: &ViewContext) -> Rows {
-        match (&self.page, cx.def().devices.get(self.device.index())) {
-            (Page::Sets, Some(device)) => {
-                Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
-            }
-            (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_), _)
-            | (Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay(_) | Page::Guide(..), _) => Rows::default(),
+    fn list(&self) -> Option<&dyn ListPage> {
+        match self.page {
+            Page::Sets => Some(&self.sets),
+            Page::Runs => self.runs.shown(),
+            Page::Procedures => Some(&self.procedures),
+            Page::List | Page::Device | Page::Lamps | Page::Program | Page::Compare(_) => None,
+            Page::Overlay(_) | Page::Guide(..) => None,
+        }
+    }
+
+    fn list_mut(&mut self) -> Option<&mut dyn ListPage> {
+        match self.page {
+            Page::Sets => Some(&mut self.sets),
+            Page::Runs => self.runs.shown_mut(),
+            Page::Procedures => Some(&mut self.procedures),
+            Page::List | Page::Device | Page::Lamps | Page::Program | Page::Compare(_) => None,
+            Page::Overlay(_) | Page::Guide(..) => None,
         }
     }
 
@@ -149,10 +176,11 @@ impl TabView for Controllers {
             self.page = Page::Device;
         }
         let device = cx.def().devices.get(self.device.index());
+        let number = (Tab::Controllers, &mut self.asked);
         match (&self.page, device) {
-            (Page::Runs | Page::Overlay(_), Some(device)) => return self.runs.ask(cx, device, &mut self.asked),
+            (Page::Runs | Page::Overlay(_), _) => return self.runs.ask(cx, number),
             (Page::Lamps, Some(device)) => return self.lamps.ask(cx, device, &mut self.asked),
-            (Page::Procedures, _) => return self.procedures.ask(cx, &mut self.asked),
+            (Page::Procedures, _) => return self.procedures.ask(cx, number).into_iter().collect(),
             _ => {}
         }
         let faceplate = device.and_then(|device| device.faceplate.as_ref());
@@ -176,14 +204,14 @@ impl TabView for Controllers {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        let (runs, procedures, lamps) = (&self.runs, &self.procedures, &self.lamps);
-        self.trend.query.awaits(number) || runs.awaits(number) || procedures.awaits(number) || lamps.awaits(number)
+        let queries = [&self.trend.query, &self.procedures.answered.query];
+        queries.iter().any(|query| query.awaits(number)) || self.runs.awaits(number) || self.lamps.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.trend.on_answer(cx, number, &answer);
         self.runs.on_answer(cx, number, &answer);
-        self.procedures.on_answer(cx, number, &answer);
+        self.procedures.answered.on_answer(cx, number, &answer);
         self.lamps.on_answer(cx, number, &answer);
         Vec::new()
     }
@@ -233,8 +261,8 @@ impl TabView for Controllers {
                 device::view(cx, &mut canvas, device, &self.table, trend)
             }
             (Page::Procedures, _) => self.procedures.view(cx, &mut canvas),
-            (Page::Runs | Page::Overlay(_), _) => self.runs.view(cx, &mut canvas, device),
-            (Page::Sets, _) => sets::view(cx, &mut canvas, device, self.set),
+            (Page::Runs | Page::Overlay(_), _) => self.runs.list.view(cx, &mut canvas),
+            (Page::Sets, _) => self.sets.view(cx, &mut canvas),
             (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
             (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
         }
@@ -244,7 +272,7 @@ impl TabView for Controllers {
 impl Controllers {
     fn on_page(page: Page, device: DeviceId, table: Table) -> Controllers {
         let (cell, asked_for, trend) = (Cell::default(), Asked::Filter, Answered::default());
-        let (runs, procedures, curves) = (Runs::default(), Procedures::default(), Vec::new());
+        let runs = Runs::new(ControlRuns { device });
         Controllers {
             page,
             device,
@@ -252,12 +280,12 @@ impl Controllers {
             cell,
             wall: None,
             runs,
-            procedures,
+            procedures: Procedures::default(),
             lamps: lamps::Live::default(),
-            set: 0,
+            sets: Sets::new(SetsOf { device }),
             asked_for,
             trend,
-            curves,
+            curves: Vec::new(),
             asked: 0,
         }
     }

@@ -22,10 +22,8 @@ impl Controllers {
                 let steps = device.program.as_ref().map_or(0, |program| program.steps.len());
                 self.cell.row = to(self.cell.row, steps);
             }
-            Page::Sets => self.set = to(self.set, sets::sources(cx, device).len()),
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
-            Page::Runs => self.runs.select(cx, motion),
-            Page::Procedures => self.procedures.move_by(cx, motion),
+            Page::Sets | Page::Runs | Page::Procedures => {}
             Page::Lamps | Page::Overlay(_) | Page::Guide(..) => {}
         }
     }
@@ -40,7 +38,7 @@ impl Controllers {
         if before == Page::Procedures {
             self.runs.overlay = self.procedures.overlay(cx);
         } else {
-            self.runs.lay_over(cx, self.device);
+            self.runs.lay_over(cx);
         }
         self.page = if self.runs.overlay.is_some() { Page::Overlay(Box::new(before)) } else { before };
     }
