@@ -126,7 +126,7 @@ impl Modal {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
                 Modal::UserForm(form) => form.below(),
                 Modal::Prompt(prompt) => {
-                    prompt.cancel(tabs);
+                    prompt.cancel(cx, tabs);
                     None
                 }
                 Modal::Help(_)

@@ -51,8 +51,8 @@ impl Prompt {
     }
 
     /// The filter of the list of the tab, in force while it is typed.
-    pub fn filter(text: &str) -> Prompt {
-        Prompt { taker: Taker::Filter(text.to_owned()), ..Prompt::new(t!("filter"), "", text) }
+    pub fn filter(text: &str, hint: &str) -> Prompt {
+        Prompt { taker: Taker::Filter(text.to_owned()), ..Prompt::new(t!("filter"), hint, text) }
     }
 
     /// Is it typed below what it changes?
@@ -61,9 +61,9 @@ impl Prompt {
     }
 
     /// Esc: a filter is again what it was.
-    pub(super) fn cancel(&self, tabs: &mut Tabs) {
-        if let (Taker::Filter(before), Some(list)) = (&self.taker, tabs.shown_mut().list_mut()) {
-            list.set_filter(before);
+    pub(super) fn cancel(&self, cx: &ViewContext, tabs: &mut Tabs) {
+        if let (Taker::Filter(before), Some(list)) = (&self.taker, tabs.shown_mut().list_mut(cx)) {
+            list.set_filter(cx, before);
         }
     }
 
@@ -73,7 +73,7 @@ impl Prompt {
             let taken = match self.taker {
                 Taker::Replay(asked) => replay::typed(cx, &text, asked),
                 Taker::Tab => tabs.shown_mut().on_text(cx, &text),
-                Taker::Filter(_) => Ok(filter(cx, tabs, |list| list.set_filter(&text))),
+                Taker::Filter(_) => Ok(filter(cx, tabs, |list| list.set_filter(cx, &text))),
             };
             match taken {
                 Ok(acts) => return Next::Do(acts),
@@ -82,7 +82,7 @@ impl Prompt {
         } else if self.line.on_key(event) {
             self.problem = None;
             if self.is_filter() {
-                let actions = filter(cx, tabs, |list| list.set_filter(&self.line.text()));
+                let actions = filter(cx, tabs, |list| list.set_filter(cx, &self.line.text()));
                 return Next::Both(Modal::Prompt(self), actions);
             }
         } else if let Some(motion) = Motion::from_key(event).filter(|_| self.is_filter()) {
@@ -97,8 +97,11 @@ impl Prompt {
             let area = Rect { y: body.bottom().saturating_sub(1), height: body.height.min(1), ..body };
             let mut canvas = Canvas::new(frame.buffer_mut(), area);
             canvas.clear();
-            let x = canvas.text(1, 0, &self.title, cx.theme.dim());
-            self.line.view(cx.theme, &mut canvas, x + 1, 0);
+            let x = canvas.text(1, 0, &self.title, cx.theme.dim()) + 1;
+            self.line.view(cx.theme, &mut canvas, x, 0);
+            if self.line.text().is_empty() {
+                canvas.text(x + 2, 0, &self.hint, cx.theme.dim());
+            }
             return;
         }
         let problem = self.problem.clone().unwrap_or_default();
@@ -113,7 +116,7 @@ impl Prompt {
 
 /// Changes the list of the tab, which then asks for what it shows.
 fn filter(cx: &ViewContext, tabs: &mut Tabs, change: impl FnOnce(&mut dyn ListPage)) -> Vec<UiAction> {
-    if let Some(list) = tabs.shown_mut().list_mut() {
+    if let Some(list) = tabs.shown_mut().list_mut(cx) {
         change(list);
     }
     tabs.shown_mut().on_snapshot(cx)

@@ -9,7 +9,7 @@ use std::{borrow::Cow, fmt::Debug, hash::Hash};
 
 pub use self::{
     column::{Column, left, rest, right},
-    keys::{acting, choosing},
+    keys::{all as all_keys, filter as ask_filter},
 };
 use crate::ui::tabs::prelude::*;
 
@@ -28,6 +28,12 @@ pub trait Listing: Debug + 'static {
 
     /// Can several rows be marked, for what is done with them together?
     const MARKS: bool = false;
+    /// Is there a trend of what a row is about?
+    const TRENDS: bool = false;
+    /// Has it columns to be sorted by?
+    const SORTS: bool = true;
+    /// Is something done with a row, which its operator must have seen?
+    const ACTS: bool = true;
 
     /// Its title, and what is said of it.
     fn heading<'a>(&self, cx: &ViewContext<'a>, answer: Option<&'a Self::Answer>) -> Heading<'a>;
@@ -38,7 +44,7 @@ pub trait Listing: Debug + 'static {
     }
 
     /// The rows in their first order, from what was answered last.
-    fn rows<'a>(&self, cx: &ViewContext<'a>, answer: Option<&'a Self::Answer>) -> Vec<Cow<'a, Self::Row>>;
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, answer: Option<&'a Self::Answer>) -> Vec<Cow<'a, Self::Row>>;
 
     /// What identifies a row.
     fn id(row: &Self::Row) -> Self::Id;
@@ -53,6 +59,11 @@ pub trait Listing: Debug + 'static {
 
     /// Words in place of the columns.
     fn words(&self, _cx: &ViewContext, _row: &Self::Row) -> Option<String> {
+        None
+    }
+
+    /// What a filter looks through in place of the texts of a row.
+    fn searched(&self, _row: &Self::Row) -> Option<String> {
         None
     }
 
@@ -105,12 +116,15 @@ pub struct Heading<'a> {
     right: String,
     empty: &'static str,
     limit: Option<(usize, String)>,
+    trouble: Option<String>,
+    waits: bool,
 }
 
 impl<'a> Heading<'a> {
     /// Of this title, and these words where there is no row.
     pub fn new(title: impl Into<Cow<'a, str>>, empty: &'static str) -> Heading<'a> {
-        Heading { title: title.into(), words: None, right: String::new(), empty, limit: None }
+        let (title, right) = (title.into(), String::new());
+        Heading { title, words: None, right, empty, limit: None, trouble: None, waits: false }
     }
     /// With words behind the title.
     pub fn words(self, words: impl Into<String>, style: Style) -> Heading<'a> {
@@ -124,36 +138,62 @@ impl<'a> Heading<'a> {
     pub fn limit(self, rows: usize, words: String) -> Heading<'a> {
         Heading { limit: Some((rows, words)), ..self }
     }
+    /// Of queries that are not the list's: why the last one failed, and whether the first has not been answered.
+    pub fn asked(self, trouble: Option<&String>, waits: bool) -> Heading<'a> {
+        Heading { trouble: trouble.cloned(), waits, ..self }
+    }
 }
 
 /// The list of a page, whatever it shows.
 pub trait ListPage {
-    /// Esc: takes the marks off, then the filter, then the order, then gives up the query; `false` if there is nothing of these.
-    fn back(&mut self, cx: &ViewContext) -> bool;
     /// Moves the selection.
     fn step(&mut self, cx: &ViewContext, motion: Motion);
-    /// Are there no rows?
-    fn is_empty(&self, cx: &ViewContext) -> bool;
-    /// Can several rows be marked?
-    fn has_marks(&self) -> bool;
-    /// Marks the selected row, or takes its mark off.
-    fn mark(&mut self, cx: &ViewContext);
+    /// Esc: takes the marks off, then the filter, then the order, then gives up the query; `false` if there is nothing of
+    /// these.
+    fn back(&mut self, cx: &ViewContext) -> bool;
+    /// The marked rows, else the selected one, a line each.
+    fn copied(&self, cx: &ViewContext) -> Vec<String>;
     /// The words of the filter.
     fn filter(&self) -> String;
     /// Shows only rows with all of these words.
-    fn set_filter(&mut self, text: &str);
-    /// The order of the next column, and after the last one the first order again.
-    fn next_order(&mut self, cx: &ViewContext);
-    /// The other way round.
-    fn reverse(&mut self);
-    /// The trend of the selected row.
-    fn trend(&self, cx: &ViewContext) -> Option<UiAction>;
+    fn set_filter(&mut self, cx: &ViewContext, text: &str);
+    /// What may be typed, while nothing is.
+    fn filter_hint(&self) -> &'static str {
+        t!("words that a row must have; all of them")
+    }
     /// The list that keys act on.
-    fn fingerprint(&self, cx: &ViewContext) -> Rows;
-    /// The marked rows, else the selected one, a line each.
-    fn copied(&self, cx: &ViewContext) -> Vec<String>;
+    fn fingerprint(&self, _cx: &ViewContext) -> Rows {
+        Rows::default()
+    }
     /// When the selected row was.
-    fn moment(&self, cx: &ViewContext) -> Option<Timestamp>;
+    fn moment(&self, _cx: &ViewContext) -> Option<Timestamp> {
+        None
+    }
+    /// Which keys of every list it has.
+    fn has(&self, _what: Can) -> bool {
+        false
+    }
+    /// Marks the selected row, or takes its mark off.
+    fn mark(&mut self, _cx: &ViewContext) {}
+    /// The order of the next column, and after the last one the first order again.
+    fn next_order(&mut self, _cx: &ViewContext) {}
+    /// The other way round.
+    fn reverse(&mut self) {}
+    /// The trend of the selected row.
+    fn trend(&self, _cx: &ViewContext) -> Option<UiAction> {
+        None
+    }
+}
+
+/// What not every list can.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Can {
+    /// Several rows can be marked.
+    Mark,
+    /// It can be sorted.
+    Sort,
+    /// Its rows have trends.
+    Trend,
 }
 
 /// The list of a page: what it shows, and what its operator looks at.
@@ -194,7 +234,8 @@ impl<L: Listing> List<L> {
     pub fn rows<'a>(&'a self, cx: &ViewContext<'a>) -> Vec<Cow<'a, L::Row>> {
         let mut rows = self.all(cx);
         if !self.filter.is_empty() {
-            rows.retain(|row| self.filter.fit(&self.cells(cx, row).join(" ")));
+            let text = |row: &L::Row| self.of.searched(row).unwrap_or_else(|| self.cells(cx, row).join(" "));
+            rows.retain(|row| self.filter.fit(&text(row)));
         }
         let columns = self.order.map(|_| self.columns(cx)).unwrap_or_default();
         if let Some(column) = self.order.and_then(|order| columns.get(order)) {
@@ -244,13 +285,32 @@ impl<L: Listing> List<L> {
         let query = self.of.query(cx)?;
         self.answered.ask(cx, number, real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
     }
+
+    /// Is there a filter?
+    pub fn is_filtered(&self) -> bool {
+        !self.filter.is_empty()
+    }
+
+    /// Takes all marks off; `false` if there was none.
+    pub fn unmark(&mut self) -> bool {
+        !std::mem::take(&mut self.marked).is_empty()
+    }
 }
 
 impl<L: Listing> ListPage for List<L> {
+    fn step(&mut self, cx: &ViewContext, motion: Motion) {
+        let rows = self.rows(cx);
+        let place = motion.to(self.place(&rows), rows.len(), self.room(cx, &rows));
+        // At the top it is the newest that is selected.
+        let id = rows.get(place).filter(|_| 0 < place).map(|row| L::id(row));
+        self.selected = id;
+    }
+
     fn back(&mut self, cx: &ViewContext) -> bool {
-        if !self.marked.is_empty() {
-            self.marked.clear();
-        } else if !self.filter.is_empty() {
+        if self.unmark() {
+            return true;
+        }
+        if !self.filter.is_empty() {
             self.filter = Words::default();
         } else if self.order.is_some() {
             (self.order, self.reversed) = (None, false);
@@ -260,20 +320,43 @@ impl<L: Listing> ListPage for List<L> {
         true
     }
 
-    fn step(&mut self, cx: &ViewContext, motion: Motion) {
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
         let rows = self.rows(cx);
-        let place = motion.to(self.place(&rows), rows.len(), self.room(cx, &rows));
-        // At the top it is the newest that is selected.
-        let id = rows.get(place).filter(|_| 0 < place).map(|row| L::id(row));
-        self.selected = id;
+        let (place, marks) = (self.place(&rows), rows.iter().any(|row| self.is_marked(row)));
+        let meant = rows.iter().enumerate().filter(|(n, row)| if marks { self.is_marked(row) } else { *n == place });
+        let line = |row: &L::Row| {
+            let own = self.of.copied(row, self.answered.value.as_ref());
+            own.unwrap_or_else(|| self.cells(cx, row).join("\t").trim_end().to_owned())
+        };
+        meant.map(|(_, row)| line(row)).filter(|line| !line.is_empty()).collect()
     }
 
-    fn is_empty(&self, cx: &ViewContext) -> bool {
-        self.all(cx).is_empty()
+    fn filter(&self) -> String {
+        self.filter.to_string()
     }
 
-    fn has_marks(&self) -> bool {
-        L::MARKS
+    fn set_filter(&mut self, _cx: &ViewContext, text: &str) {
+        self.filter = Words::parse(text);
+    }
+
+    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+        if !L::ACTS {
+            return Rows::default();
+        }
+        let rows = self.rows(cx);
+        Rows::of(rows.iter().map(|row| (L::id(row), self.of.state(cx, row))), self.place(&rows))
+    }
+
+    fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
+        self.selected(cx).and_then(|row| self.of.moment(&row))
+    }
+
+    fn has(&self, what: Can) -> bool {
+        match what {
+            Can::Mark => L::MARKS,
+            Can::Sort => L::SORTS,
+            Can::Trend => L::TRENDS,
+        }
     }
 
     fn mark(&mut self, cx: &ViewContext) {
@@ -282,14 +365,6 @@ impl<L: Listing> ListPage for List<L> {
             Some(place) => drop(self.marked.remove(place)),
             None => self.marked.push(id),
         }
-    }
-
-    fn filter(&self) -> String {
-        self.filter.to_string()
-    }
-
-    fn set_filter(&mut self, text: &str) {
-        self.filter = Words::parse(text);
     }
 
     fn next_order(&mut self, cx: &ViewContext) {
@@ -307,25 +382,5 @@ impl<L: Listing> ListPage for List<L> {
         let row = self.selected(cx)?;
         let (tag, span) = self.of.trend(cx, &row)?;
         Some(UiAction::ShowOnTrends(tag, span))
-    }
-
-    fn fingerprint(&self, cx: &ViewContext) -> Rows {
-        let rows = self.rows(cx);
-        Rows::of(rows.iter().map(|row| (L::id(row), self.of.state(cx, row))), self.place(&rows))
-    }
-
-    fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        let rows = self.rows(cx);
-        let (place, marks) = (self.place(&rows), rows.iter().any(|row| self.is_marked(row)));
-        let meant = rows.iter().enumerate().filter(|(n, row)| if marks { self.is_marked(row) } else { *n == place });
-        let line = |row: &L::Row| {
-            let own = self.of.copied(row, self.answered.value.as_ref());
-            own.unwrap_or_else(|| self.cells(cx, row).join("\t").trim_end().to_owned())
-        };
-        meant.map(|(_, row)| line(row)).filter(|line| !line.is_empty()).collect()
-    }
-
-    fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
-        self.selected(cx).and_then(|row| self.of.moment(&row))
     }
 }

@@ -82,29 +82,29 @@ pub trait TabView: Keyed {
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect);
 
     /// The list that is shown, if the page is one.
-    fn list(&self) -> Option<&dyn ListPage> {
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
         None
     }
 
     /// The same, to change it.
-    fn list_mut(&mut self) -> Option<&mut dyn ListPage> {
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
         None
     }
 
     /// The list whose rows keys act on, each row with what an operator should have seen of it; nothing where rows stand
     /// where they are in the plant file.
     fn fingerprint(&self, cx: &ViewContext) -> Rows {
-        self.list().map_or(Rows::default(), |list| list.fingerprint(cx))
+        self.list(cx).map_or(Rows::default(), |list| list.fingerprint(cx))
     }
 
     /// What is selected, a line each, to be copied; its parts are separated by tabs, as for a spreadsheet.
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        self.list().map_or(Vec::new(), |list| list.copied(cx))
+        self.list(cx).map_or(Vec::new(), |list| list.copied(cx))
     }
 
     /// The past moment that is selected, for a replay to begin at.
     fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
-        self.list().and_then(|list| list.moment(cx))
+        self.list(cx).and_then(|list| list.moment(cx))
     }
 
     /// The mouse is pressed at this place of the screen: selects what stands there; `false` where arrow keys do that.
@@ -205,10 +205,7 @@ impl<T: KeyTable> Keyed for T {
 /// The keys of a page, among those of every list where it is one.
 fn all_keys<T: KeyTable>(page: &T, cx: &ViewContext) -> Keys<T> {
     let own = page.keys(cx);
-    if page.list().is_none() {
-        return own;
-    }
-    Keys::of(&[listing::choosing()]).and(own).and(Keys::of(&[listing::acting()]))
+    if page.list(cx).is_some() { listing::all_keys(own) } else { own }
 }
 
 /// The table of tabs, in the order of their number keys from 0: name, field, state, title, help.

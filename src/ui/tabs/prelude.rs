@@ -13,7 +13,7 @@ pub(super) use ratatui::{
 pub(super) use super::{
     KeyTable, Keyed, Tab, TabView,
     draw::{self, around, open, row_style},
-    listing::{Column, Heading, List, ListPage, Listing, left, rest, right},
+    listing::{self, Column, Heading, List, ListPage, Listing, left, rest, right},
     periodic_query::{Answered, FromAnswer, PeriodicQuery, real},
     reports::period,
 };

@@ -210,7 +210,7 @@ impl TabView for Reports {
         }
     }
 
-    fn list(&self) -> Option<&dyn ListPage> {
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
         match (self.made.shown, self.batches_shown && !self.rows.shown) {
             (true, _) => self.made.list(),
             (false, true) => self.batches.shown(),
@@ -218,7 +218,7 @@ impl TabView for Reports {
         }
     }
 
-    fn list_mut(&mut self) -> Option<&mut dyn ListPage> {
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
         match (self.made.shown, self.batches_shown && !self.rows.shown) {
             (true, _) => self.made.list_mut(),
             (false, true) => self.batches.shown_mut(),
@@ -227,7 +227,7 @@ impl TabView for Reports {
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
-        if self.list_mut().is_some_and(|list| list.back(cx)) {
+        if self.list_mut(cx).is_some_and(|list| list.back(cx)) {
             return true;
         }
         if self.made.shown {

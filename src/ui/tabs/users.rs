@@ -55,14 +55,14 @@ pub struct Users {
 
 impl TabView for Users {
     fn back(&mut self, cx: &ViewContext) -> bool {
-        self.list_mut().is_some_and(|list| list.back(cx)) || self.audit.take().is_some()
+        self.list_mut(cx).is_some_and(|list| list.back(cx)) || self.audit.take().is_some()
     }
 
-    fn list(&self) -> Option<&dyn ListPage> {
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
         Some(self.audit.as_ref().map_or(&self.list as &dyn ListPage, |audit| audit))
     }
 
-    fn list_mut(&mut self) -> Option<&mut dyn ListPage> {
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
         Some(self.audit.as_mut().map_or(&mut self.list as &mut dyn ListPage, |audit| audit))
     }
 
@@ -165,7 +165,7 @@ impl Listing for UserList {
         Heading::new(t!("Users"), t!("No users: a demonstration needs no login."))
     }
 
-    fn rows<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, UserRow>> {
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, UserRow>> {
         cx.session.users.iter().map(Cow::Borrowed).collect()
     }
 
@@ -176,7 +176,7 @@ impl Listing for UserList {
     fn columns(&self, _cx: &ViewContext, room: u16) -> Vec<Column<UserRow>> {
         let name = (room / 4).clamp(14, 34);
         vec![
-            left(name.cast_signed() - 1, t!("user"), |_, row| row.user.to_string()),
+            left(name - 1, t!("user"), |_, row| row.user.to_string()),
             left(12, t!("role"), |_, row| rights::title(row.role).to_owned()),
             left(26, t!("state"), state),
             left(16, t!("last login"), |cx, row| {

@@ -1,7 +1,7 @@
 //! What keys do with a device on its pages, and the windows that ask before it.
 
 use super::{
-    Asked, Controllers, Page,
+    Controllers, Page,
     compare::Compare,
     guide,
     keys::{run, tune},
@@ -151,12 +151,6 @@ impl Controllers {
             None => Vec::new(),
         }
     }
-
-    pub(super) fn ask_filter(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
-        self.asked_for = Asked::Filter;
-        let (title, hint) = (t!("find a parameter"), t!("words in name or meaning; empty shows all"));
-        open(Modal::Prompt(Prompt::new(title, hint, &self.table.filter.to_string())))
-    }
 }
 
 /// The pages of a device.
@@ -230,8 +224,7 @@ impl Controllers {
     }
 
     pub(super) fn ask_set_name(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.on_device(cx, |tab, device| {
-            tab.asked_for = Asked::SetName;
+        self.on_device(cx, |_, device| {
             let title = t!("save the settings of {name} as a set", name = device.name);
             open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))
         })

@@ -92,7 +92,7 @@ const DEVICE: &[Key] = &[
     ACTIONS,
     WHY,
     REFRESH,
-    Key::new(char('/'), "find", "show only parameters with some words in name or meaning", Controllers::ask_filter),
+    Key::new(char('/'), "find", "show only parameters with some words in name or meaning", listing::ask_filter),
     Key::change(char('d'), "defaults", "mark differences from the factory default", |tab, _| {
         tab.table.defaults = !tab.table.defaults;
     })

@@ -69,7 +69,7 @@ impl Listing for PlantProcedures {
         Some(Query::ControlRuns { controller: None, from: to - SPAN, to, limit: ROWS })
     }
 
-    fn rows<'a>(&self, cx: &ViewContext<'a>, runs: Option<&'a Vec<ControlRun>>) -> Vec<Cow<'a, Procedure>> {
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, runs: Option<&'a Vec<ControlRun>>) -> Vec<Cow<'a, Procedure>> {
         let all = cx.def().procedures.iter().enumerate();
         let row = |(n, def)| Procedure { id: ProcedureId(to_u16(n)), run: run_of(cx, def, runs) };
         all.map(row).map(Cow::Owned).collect()

@@ -35,6 +35,7 @@ impl Listing for ControlRuns {
     type Id = u32;
 
     const MARKS: bool = true;
+    const TRENDS: bool = true;
 
     fn heading<'a>(&self, cx: &ViewContext<'a>, runs: Option<&'a Vec<ControlRun>>) -> Heading<'a> {
         let name = cx.def().devices.get(self.device.index()).map_or("", |device| &device.name);
@@ -51,7 +52,7 @@ impl Listing for ControlRuns {
         Some(Query::ControlRuns { controller, from: to - SPAN, to, limit: ROWS })
     }
 
-    fn rows<'a>(&self, _cx: &ViewContext<'a>, runs: Option<&'a Vec<ControlRun>>) -> Vec<Cow<'a, ControlRun>> {
+    fn rows<'a>(&'a self, _cx: &ViewContext<'a>, runs: Option<&'a Vec<ControlRun>>) -> Vec<Cow<'a, ControlRun>> {
         runs.into_iter().flatten().map(Cow::Borrowed).collect()
     }
 

@@ -133,7 +133,7 @@ impl Listing for SetsOf {
         Heading::new(&device.name, empty).words(words, cx.theme.normal())
     }
 
-    fn rows<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, SourceRow>> {
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, SourceRow>> {
         let Some(device) = cx.def().devices.get(self.device.index()) else { return Vec::new() };
         sources(cx, device).into_iter().map(|source| Cow::Owned(SourceRow::new(cx, self.device, source))).collect()
     }

@@ -8,13 +8,24 @@ use crate::ui::tabs::prelude::*;
 pub struct Column<R: ?Sized> {
     /// Its heading.
     pub head: &'static str,
-    /// Negative: filled from the left. `None`: what the others leave, at least so much.
-    width: i16,
-    takes_rest: bool,
+    width: Width,
+    /// Filled from the left.
+    is_right: bool,
     /// Where there is no room those of the highest rank are left out first; never one of rank 0.
     rank: u8,
     text: Text<R>,
     order: Option<fn(&R, &R) -> Ordering>,
+    /// It is read after the others.
+    pub is_dim: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Width {
+    Fixed(u16),
+    /// That of the widest of its texts.
+    Widest,
+    /// What the others leave, at least so much.
+    Rest(u16),
 }
 
 enum Text<R: ?Sized> {
@@ -24,21 +35,32 @@ enum Text<R: ?Sized> {
 }
 
 /// A column that is filled from the right.
-pub fn left<R: ?Sized>(width: i16, head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
-    Column { head, width, takes_rest: false, rank: 0, text: Text::Plain(text), order: None }
+pub fn left<R: ?Sized>(width: u16, head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
+    Column::new(Width::Fixed(width), head, Text::Plain(text))
 }
 
 /// A column of figures, filled from the left.
-pub fn right<R: ?Sized>(width: i16, head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
-    left(-width, head, text)
+pub fn right<R: ?Sized>(width: u16, head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
+    Column { is_right: true, ..left(width, head, text) }
 }
 
 /// The last column, which has what the others leave, at least so much; its text is given the room.
-pub fn rest<R: ?Sized>(least: i16, head: &'static str, text: fn(&ViewContext, &R, u16) -> String) -> Column<R> {
-    Column { head, width: least, takes_rest: true, rank: 0, text: Text::Fitting(text), order: None }
+pub fn rest<R: ?Sized>(least: u16, head: &'static str, text: fn(&ViewContext, &R, u16) -> String) -> Column<R> {
+    Column::new(Width::Rest(least), head, Text::Fitting(text))
 }
 
 impl<R: ?Sized> Column<R> {
+    fn new(width: Width, head: &'static str, text: Text<R>) -> Column<R> {
+        Column { head, width, is_right: false, rank: 0, text, order: None, is_dim: false }
+    }
+    /// A column of words that is as wide as the widest of its texts.
+    pub fn words(head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
+        Column::new(Width::Widest, head, Text::Plain(text))
+    }
+    /// The same of figures, filled from the left.
+    pub fn number(head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
+        Column { is_right: true, ..Column::words(head, text) }
+    }
     /// The same, left out where there is no room: those of the highest rank first.
     pub fn rank(self, rank: u8) -> Column<R> {
         Column { rank, ..self }
@@ -46,6 +68,11 @@ impl<R: ?Sized> Column<R> {
     /// The same where its texts do not give the order.
     pub fn by(self, order: fn(&R, &R) -> Ordering) -> Column<R> {
         Column { order: Some(order), ..self }
+    }
+
+    /// The same, dim.
+    pub fn dim(self) -> Column<R> {
+        Column { is_dim: true, ..self }
     }
 
     /// Its text in so many cells.
@@ -63,35 +90,40 @@ impl<R: ?Sized> Column<R> {
             None => natural(&self.text(cx, a, u16::MAX), &self.text(cx, b, u16::MAX)),
         }
     }
-
-    fn least(&self) -> u16 {
-        self.width.unsigned_abs()
-    }
 }
 
-/// The columns that there is room for, each with its width.
-pub fn placed<R: ?Sized>(mut columns: Vec<Column<R>>, room: u16) -> Vec<(Column<R>, u16)> {
-    let taken = |columns: &[Column<R>]| columns.iter().map(|column| column.least() + 1).sum::<u16>().saturating_sub(1);
+/// The columns that there is room for, each with its width; of some it is that of their widest text.
+pub fn placed<R: ?Sized>(
+    columns: Vec<Column<R>>,
+    room: u16,
+    widest: impl Fn(&Column<R>) -> u16,
+) -> Vec<(Column<R>, u16)> {
+    let least = |column: Column<R>| {
+        let width = match column.width {
+            Width::Fixed(width) | Width::Rest(width) => width,
+            Width::Widest => widest(&column).max(width(column.head)),
+        };
+        (column, width)
+    };
+    let mut columns: Vec<(Column<R>, u16)> = columns.into_iter().map(least).collect();
+    let taken =
+        |columns: &[(Column<R>, u16)]| columns.iter().map(|(_, width)| width + 1).sum::<u16>().saturating_sub(1);
     while room < taken(&columns) {
-        let last =
-            columns.iter().enumerate().filter(|(_, column)| 0 < column.rank).max_by_key(|(_, column)| column.rank);
-        let Some(place) = last.map(|(place, _)| place) else { break };
-        columns.remove(place);
+        let Some(last @ 1..) = columns.iter().map(|(column, _)| column.rank).max() else { break };
+        columns.retain(|(column, _)| column.rank < last);
     }
     let all = taken(&columns);
-    let width = |column: &Column<R>| match column.takes_rest {
-        true => (column.least() + room.saturating_sub(all)).saturating_sub(all.saturating_sub(room)),
-        false => column.least(),
-    };
-    let widths: Vec<u16> = columns.iter().map(width).collect();
-    columns.into_iter().zip(widths).collect()
+    let of_rest = columns.iter_mut().filter(|(column, _)| matches!(column.width, Width::Rest(_)));
+    of_rest
+        .for_each(|(_, width)| *width = (*width + room.saturating_sub(all)).saturating_sub(all.saturating_sub(room)));
+    columns
 }
 
 /// These columns in a row, with a blank between them.
 pub fn join<R: ?Sized>(columns: &[(Column<R>, u16)], text: impl Fn(&Column<R>, u16) -> String) -> String {
     let cell = |(column, width): &(Column<R>, u16)| {
         let text = text(column, *width);
-        if column.width < 0 { pad_left(&text, *width) } else { pad(&text, *width) }
+        if column.is_right { pad_left(&text, *width) } else { pad(&text, *width) }
     };
     columns.iter().map(cell).collect::<Vec<_>>().join(" ")
 }
@@ -106,15 +138,15 @@ fn natural(a: &str, b: &str) -> Ordering {
 }
 
 /// Runs of digits and of letters; digits stand before letters, and an unknown or empty text behind both.
-fn parts(text: &str) -> (bool, Vec<(Option<u64>, String)>) {
+fn parts(text: &str) -> (bool, Vec<(bool, u64, String)>) {
     let text = text.to_lowercase();
-    let mut parts: Vec<(Option<u64>, String)> = Vec::new();
+    let mut parts = Vec::new();
     let mut rest = text.as_str();
     while let Some(first) = rest.chars().next() {
         let is_number = first.is_ascii_digit();
         let end = rest.find(|letter: char| letter.is_ascii_digit() != is_number).unwrap_or(rest.len());
         let (part, behind) = rest.split_at(end);
-        parts.push((part.parse().ok(), part.to_owned()));
+        parts.push((!is_number, part.parse().unwrap_or(0), part.to_owned()));
         rest = behind;
     }
     (!text.contains(char::is_alphanumeric), parts)
@@ -132,7 +164,7 @@ mod tests {
             assert_eq!(texts, sorted);
         };
         check(&["-2.5", "-1", "0.5", ">1.2", "10"]);
-        check(&["9:05", "10:01", "10:15"]);
+        check(&["9:05", "10:01", "10:15", "never"]);
         check(&["anna", "Berta", "carl"]);
         check(&["hot-water-9", "hot-water-10"]);
         check(&["1.5", "–"]);
@@ -142,16 +174,13 @@ mod tests {
     fn columns_of_the_highest_rank_give_way_first() {
         let columns = || {
             let text: fn(&ViewContext, &u8) -> String = |_, _| String::new();
-            vec![
-                left(10, "a", text),
-                right(8, "b", text).rank(1),
-                left(6, "c", text).rank(2),
-                rest(4, "d", |_, _, _| "".into()),
-            ]
+            let last = rest(4, "d", |_, _, _| String::new());
+            vec![left(10, "a", text), right(8, "b", text).rank(1), Column::words("c", text).rank(2), last]
         };
-        let shown =
-            |room| placed(columns(), room).into_iter().map(|(column, width)| (column.head, width)).collect::<Vec<_>>();
-        assert_eq!(shown(40), [("a", 10), ("b", 8), ("c", 6), ("d", 13)]);
+        let shown = |room| {
+            placed(columns(), room, |_| 3).into_iter().map(|(column, width)| (column.head, width)).collect::<Vec<_>>()
+        };
+        assert_eq!(shown(40), [("a", 10), ("b", 8), ("c", 3), ("d", 16)]);
         assert_eq!(shown(25), [("a", 10), ("b", 8), ("d", 5)]);
         assert_eq!(shown(13), [("a", 10), ("d", 2)], "the others always stand");
     }

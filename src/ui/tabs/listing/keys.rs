@@ -1,65 +1,63 @@
 //! The keys of every list, from one place.
 
+use super::Can;
 use crate::ui::{keys::Key, tabs::prelude::*};
 
-/// The keys that move the selection, before those of the page.
-pub fn choosing<P: KeyTable>() -> &'static [Key<P>] {
-    <P as Tables>::CHOOSING
-}
-
-/// What can be done in every list, behind the keys of the page.
-pub fn acting<P: KeyTable>() -> &'static [Key<P>] {
-    <P as Tables>::ACTING
+/// The keys of a page that is a list: those that move the selection, its own, and what can be done in every list. A key that
+/// the page itself has is the page's.
+pub fn all<P: KeyTable>(own: Keys<P>) -> Keys<P> {
+    let moves = if own.has(code(KeyCode::Down)) { Keys::of(&[]) } else { Keys::of(&[P::MOVING]) };
+    moves.and(own).and(Keys::of(&[P::ACTING]))
 }
 
 /// The tables of a page.
 trait Tables: Sized + 'static {
-    const CHOOSING: &'static [Key<Self>];
+    const MOVING: &'static [Key<Self>];
     const ACTING: &'static [Key<Self>];
 }
 
 impl<P: KeyTable> Tables for P {
-    const CHOOSING: &'static [Key<P>] = &motions!("select", step);
+    const MOVING: &'static [Key<P>] = &motions!("select", step);
     const ACTING: &'static [Key<P>] = &[
-        Key::change(
-            char(' '),
-            "mark",
-            "mark several rows, for what is done with all of them; Esc: no marks",
-            |page: &mut P, cx| {
-                page.list_mut().into_iter().for_each(|list| list.mark(cx));
-            },
-        )
-        .when(|page: &P, cx| only_if(page, cx, char(' '), page.list().is_some_and(|list| list.has_marks()))),
-        Key::new(char('t'), "trend", "the curves of its time", |page: &mut P, cx| {
-            page.list().and_then(|list| list.trend(cx)).into_iter().collect()
-        })
-        .when(|page: &P, cx| only_if(page, cx, char('t'), page.list().is_some_and(|list| list.trend(cx).is_some()))),
-        Key::new(
-            char('/'),
-            "filter",
-            "show only rows with some words, while they are typed; Esc: all rows",
-            |page: &mut P, _| open(page.list().map(|list| Modal::Prompt(Prompt::filter(&list.filter())))),
-        )
-        .when(|page: &P, cx| only_if(page, cx, char('/'), true)),
-        Key::change(char('s'), "sort", "sort: by the next column, then as at first", |page: &mut P, cx| {
-            page.list_mut().into_iter().for_each(|list| list.next_order(cx));
-        })
-        .when(|page: &P, cx| only_if(page, cx, char('s'), true)),
-        Key::change(char('S'), "", "sort the other way round", |page: &mut P, _| {
-            page.list_mut().into_iter().for_each(|list| list.reverse());
-        })
-        .when(|page: &P, cx| only_if(page, cx, char('S'), true)),
+        Key::change(char(' '), "mark", "mark several rows, for what is done with all of them; Esc: no marks", mark)
+            .when(|page, cx| offer(page, cx, char(' '), Some(Can::Mark))),
+        Key::new(char('t'), "trend", "the curves of its time", trend)
+            .when(|page, cx| offer(page, cx, char('t'), Some(Can::Trend))),
+        Key::new(char('/'), "filter", "show only rows with some words, while they are typed; Esc: all rows", filter)
+            .when(|page, cx| offer(page, cx, char('/'), None)),
+        Key::change(char('s'), "sort", "sort: by the next column, after the last as at first", sort)
+            .when(|page, cx| offer(page, cx, char('s'), Some(Can::Sort))),
+        Key::change(char('S'), "", "sort the other way round", reverse)
+            .when(|page, cx| offer(page, cx, char('S'), Some(Can::Sort))),
     ];
 }
 
-fn step<P: KeyTable>(page: &mut P, cx: &ViewContext, motion: Motion) {
-    page.list_mut().into_iter().for_each(|list| list.step(cx, motion));
+fn offer<P: KeyTable>(page: &P, cx: &ViewContext, chord: keys::Chord, can: Option<Can>) -> Offer {
+    let has = |list: &dyn ListPage| can.is_none_or(|can| list.has(can));
+    Offer::only_if(page.list(cx).is_some_and(has) && !page.keys(cx).has(chord))
 }
 
-/// A key that the page itself has is the page's; the others are in the footer while there are rows.
-fn only_if<P: KeyTable>(page: &P, cx: &ViewContext, chord: keys::Chord, there: bool) -> Offer {
-    match there && !page.keys(cx).has(chord) {
-        true => Offer::footer_if(page.list().is_some_and(|list| !list.is_empty(cx))),
-        false => Offer::Absent,
-    }
+fn step<P: KeyTable>(page: &mut P, cx: &ViewContext, motion: Motion) {
+    page.list_mut(cx).into_iter().for_each(|list| list.step(cx, motion));
+}
+
+fn mark<P: KeyTable>(page: &mut P, cx: &ViewContext) {
+    page.list_mut(cx).into_iter().for_each(|list| list.mark(cx));
+}
+
+fn trend<P: KeyTable>(page: &mut P, cx: &ViewContext) -> Vec<UiAction> {
+    page.list(cx).and_then(|list| list.trend(cx)).into_iter().collect()
+}
+
+/// Opens the line that the words of the filter are typed into.
+pub fn filter<P: KeyTable>(page: &mut P, cx: &ViewContext) -> Vec<UiAction> {
+    open(page.list(cx).map(|list| Modal::Prompt(Prompt::filter(&list.filter(), list.filter_hint()))))
+}
+
+fn sort<P: KeyTable>(page: &mut P, cx: &ViewContext) {
+    page.list_mut(cx).into_iter().for_each(|list| list.next_order(cx));
+}
+
+fn reverse<P: KeyTable>(page: &mut P, cx: &ViewContext) {
+    page.list_mut(cx).into_iter().for_each(|list| list.reverse());
 }

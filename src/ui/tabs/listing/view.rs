@@ -8,8 +8,6 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 
-/// Rows of the screen above the list: heading and columns.
-const HEAD: u16 = 2;
 /// Rows of the list at least.
 const ROWS_MIN: u16 = 3;
 
@@ -23,13 +21,11 @@ impl<L: Listing> List<L> {
         if let Some((words, style)) = self.of.foot(cx) {
             canvas.text(1, height.saturating_sub(1), &fit_words(&words, width.saturating_sub(2)), style);
         }
-        let columns = placed(self.of.columns(cx, width), width.saturating_sub(1));
-        canvas.text(
-            1,
-            1,
-            &fit(&join(&columns, |column, _| column.head.to_owned()), width.saturating_sub(1)),
-            theme.dim(),
-        );
+        let columns = placed(self.of.columns(cx, width), width.saturating_sub(1), |column| {
+            rows.iter().map(|row| text::width(&column.text(cx, row, u16::MAX))).max().unwrap_or(0)
+        });
+        let heads = join(&columns, |column, _| column.head.to_owned());
+        canvas.text(1, 1, &fit(heads.trim_end(), width.saturating_sub(1)), theme.dim());
         if rows.is_empty() {
             let words = self.why_empty(cx, &heading);
             for (y, line) in (3..).zip(wrap(&words, width.saturating_sub(4))) {
@@ -37,18 +33,21 @@ impl<L: Listing> List<L> {
             }
             return;
         }
-        let (place, room) = (self.place(&rows), self.room(cx, &rows));
+        let (place, room, head) = (self.place(&rows), self.room(cx, &rows), self.head(cx));
         let begin = first(place, rows.len(), room);
         for (y, n, row) in on_screen(&rows, begin, room) {
-            let words = self.of.words(cx, row);
-            let words = words.unwrap_or_else(|| join(&columns, |column, width| column.text(cx, row, width)));
             let mark = match (self.is_marked(row), n == place) {
                 (true, _) => theme.pick("■", "*"),
                 (false, true) => theme.pick("▸", ">"),
                 (false, false) => " ",
             };
             let style = if n == place { theme.focus() } else { self.of.style(cx, row) };
-            canvas.text(0, y + HEAD, &pad(&fit(&format!("{mark}{words}"), width), width), style);
+            let words = self.of.words(cx, row);
+            let text = words.unwrap_or_else(|| join(&columns, |column, width| column.text(cx, row, width)));
+            canvas.text(0, y + head, &pad(&fit(&format!("{mark}{text}"), width), width), style);
+            if let Some((column, wide)) = columns.first().filter(|(column, _)| column.is_dim && n != place) {
+                canvas.text(1, y + head, &fit(&column.text(cx, row, *wide), *wide), theme.dim());
+            }
         }
         let shown = to_u16(room.min(rows.len()));
         let below = rows.len().saturating_sub(begin + room);
@@ -56,12 +55,12 @@ impl<L: Listing> List<L> {
             let words = t!("{below} more ▼", below);
             canvas.text_right(
                 width.saturating_sub(1),
-                HEAD + shown,
+                head + shown,
                 theme.pick(&words, &words.replace('▼', "")),
                 theme.dim(),
             );
         }
-        for ((text, style), y) in self.detail_lines(cx, &rows[place]).iter().zip(HEAD + shown + 1..height) {
+        for ((text, style), y) in self.detail_lines(cx, &rows[place]).iter().zip(head + shown + 1..height) {
             canvas.text(1, y, text, *style);
         }
     }
@@ -69,9 +68,14 @@ impl<L: Listing> List<L> {
     fn draw_heading(&self, cx: &ViewContext, canvas: &mut Canvas, heading: &Heading, count: usize) {
         let (theme, width) = (cx.theme, canvas.width());
         let end = width.saturating_sub(1);
-        let x = canvas.text(1, 0, &fit(&heading.title, end.saturating_sub(1)), theme.strong()) + 2;
+        let x = canvas.text(1, 0, &fit(&heading.title, end.saturating_sub(1)), theme.strong());
+        let x = if heading.title.is_empty() { x } else { x + 2 };
         let (all, limit) = (self.all(cx).len(), heading.limit.as_ref());
-        let mut words = match (&self.answered.trouble, limit.filter(|(most, _)| *most <= all), &heading.words) {
+        let mut words = match (
+            heading.trouble.as_ref().or(self.answered.trouble.as_ref()),
+            limit.filter(|(most, _)| *most <= all),
+            &heading.words,
+        ) {
             (Some(trouble), ..) => (trouble.clone(), theme.trouble()),
             (None, Some((_, words)), _) => (words.clone(), theme.normal()),
             (None, None, Some(words)) => words.clone(),
@@ -99,7 +103,7 @@ impl<L: Listing> List<L> {
 
     /// Why there is no row.
     fn why_empty(&self, cx: &ViewContext, heading: &Heading) -> String {
-        let is_answered = self.answered.value.is_some() || self.of.query(cx).is_none();
+        let is_answered = !heading.waits && (self.answered.value.is_some() || self.of.query(cx).is_none());
         match (is_answered, self.filter.is_empty()) {
             (false, _) => self.answered.query.shown_waiting(cx).unwrap_or_else(|| t!("collecting data").to_owned()),
             (true, true) => heading.empty.to_owned(),
@@ -107,9 +111,24 @@ impl<L: Listing> List<L> {
         }
     }
 
+    /// Rows of the screen above the list: heading and columns.
+    fn head(&self, cx: &ViewContext) -> u16 {
+        1 + u16::from(self.of.columns(cx, cx.area.width).iter().any(|column| !column.head.is_empty()))
+    }
+
+    /// Rows of the screen that heading and list take.
+    pub fn used(&self, cx: &ViewContext) -> u16 {
+        let rows = self.rows(cx);
+        self.head(cx) + to_u16(rows.len().min(self.room(cx, &rows)))
+    }
+
     fn detail_lines(&self, cx: &ViewContext, row: &L::Row) -> Vec<(String, Style)> {
         let room = cx.area.width.saturating_sub(2);
-        let lines = |(text, style): (String, Style)| wrap(&text, room).into_iter().map(move |line| (line, style));
+        let lines = |(text, style): (String, Style)| {
+            // What stands in columns keeps its blanks.
+            let lines = if text::width(&text) <= room { vec![text] } else { wrap(&text, room) };
+            lines.into_iter().map(move |line| (line, style))
+        };
         self.of
             .details(cx, row, self.answered.value.as_ref())
             .into_iter()
@@ -122,7 +141,7 @@ impl<L: Listing> List<L> {
     pub(super) fn room(&self, cx: &ViewContext, rows: &[Cow<L::Row>]) -> usize {
         let details = rows.get(self.place(rows)).map_or(0, |row| to_u16(self.detail_lines(cx, row).len()));
         let foot = u16::from(self.of.foot(cx).is_some());
-        let room = self.of.height(cx).saturating_sub(HEAD + foot);
+        let room = self.of.height(cx).saturating_sub(self.head(cx) + foot);
         let room = match details {
             0 if rows.len() <= usize::from(room) => room,
             details => room.saturating_sub(details + 1),

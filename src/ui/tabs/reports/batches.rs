@@ -53,6 +53,7 @@ impl Listing for BatchReports {
     type Id = String;
 
     const MARKS: bool = true;
+    const TRENDS: bool = true;
 
     fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a Vec<BatchReport>>) -> Heading<'a> {
         Heading::new(t!("Batches"), t!("No batch ran yet."))
@@ -65,7 +66,7 @@ impl Listing for BatchReports {
         Some(Query::Batches { from: to - SPAN, to, limit: ROWS })
     }
 
-    fn rows<'a>(&self, _cx: &ViewContext<'a>, batches: Option<&'a Vec<BatchReport>>) -> Vec<Cow<'a, BatchReport>> {
+    fn rows<'a>(&'a self, _cx: &ViewContext<'a>, batches: Option<&'a Vec<BatchReport>>) -> Vec<Cow<'a, BatchReport>> {
         batches.into_iter().flatten().map(Cow::Borrowed).collect()
     }
 

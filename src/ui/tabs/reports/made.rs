@@ -122,7 +122,7 @@ impl Listing for AutomaticReports {
         Some(Query::Reports { limit: ROWS })
     }
 
-    fn rows<'a>(&self, _cx: &ViewContext<'a>, made: Option<&'a MadeReports>) -> Vec<Cow<'a, ReportRecord>> {
+    fn rows<'a>(&'a self, _cx: &ViewContext<'a>, made: Option<&'a MadeReports>) -> Vec<Cow<'a, ReportRecord>> {
         made.into_iter().flat_map(|made| &made.reports).map(Cow::Borrowed).collect()
     }
 

@@ -82,7 +82,11 @@ impl Listing for AuditLog {
     }
 
     /// A search for an action folds nothing.
-    fn rows<'a>(&self, _cx: &ViewContext<'a>, entries: Option<&'a Vec<ActionRecord>>) -> Vec<Cow<'a, [ActionRecord]>> {
+    fn rows<'a>(
+        &'a self,
+        _cx: &ViewContext<'a>,
+        entries: Option<&'a Vec<ActionRecord>>,
+    ) -> Vec<Cow<'a, [ActionRecord]>> {
         let folds = !self.unfolded && self.action.is_empty();
         let entries = entries.map_or(&[][..], Vec::as_slice);
         let groups = entries.chunk_by(|entry, next| folds && is_terminal(entry) && is_terminal(next));
