@@ -127,6 +127,8 @@
 //! | a theme | a column of the table in `ui/theme/palette.rs` |
 //! | a report format | its file in `report`, its row in `report/mod.rs`, its name in `plant/report.rs` |
 //! | a tab | its file in `ui/tabs`, its row in `ui/tabs/mod.rs` |
+//! | a page with a list | a `Listing` in its file in `ui/tabs`, its rows in `list` and `list_mut` of the tab: see CONTRIBUTING.md |
+//! | what every list can | `ui/tabs/listing`; its key a row in `ui/tabs/listing/keys.rs` |
 //! | a key of a tab | its row in the tab's table of keys, with the function that it calls; footer, help, palette and clash check read the row |
 //! | a renamed TOML key | its row in `profile/renamed.rs` |
 //! | a column of the history | one numbered migration |

@@ -176,11 +176,19 @@ impl<P> Keys<P> {
         None
     }
 
+    /// Is this one of them?
+    pub fn has(&self, chord: Chord) -> bool {
+        self.rows().any(|key| key.chord == chord)
+    }
+
     /// Their chords, for the test that no key means two things.
     #[cfg(test)]
     pub fn chords(&self) -> Vec<Chord> {
-        let rows = self.0.iter().flat_map(|part| if let Part::Rows(rows) = part { *rows } else { &[] });
-        rows.filter(|key| !matches!(key.run, Run::Elsewhere)).map(|key| key.chord).collect()
+        self.rows().filter(|key| !matches!(key.run, Run::Elsewhere)).map(|key| key.chord).collect()
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &'static Key<P>> {
+        self.0.iter().flat_map(|part| if let Part::Rows(rows) = part { *rows } else { &[] })
     }
 }
 

@@ -125,10 +125,13 @@ impl Modal {
             let back = match self {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
                 Modal::UserForm(form) => form.below(),
+                Modal::Prompt(prompt) => {
+                    prompt.cancel(cx, tabs);
+                    None
+                }
                 Modal::Help(_)
                 | Modal::Entry(_)
                 | Modal::Choice(_)
-                | Modal::Prompt(_)
                 | Modal::Reason(_)
                 | Modal::Correction(_)
                 | Modal::Faceplate(_)
@@ -267,6 +270,11 @@ impl Modal {
                 let hints = [Hint::in_window("↑↓", t!("select")), Hint::in_window("⏎", t!("go"))];
                 hints.into_iter().chain(remove).chain([Hint::in_window(t!("Esc"), t!("cancel"))]).collect()
             }
+            Modal::Prompt(prompt) if prompt.is_filter() => vec![
+                Hint::in_window("↑↓", t!("select")),
+                Hint::in_window("⏎", t!("OK")),
+                Hint::in_window(t!("Esc"), t!("cancel")),
+            ],
             Modal::Prompt(_) => vec![Hint::in_window("⏎", t!("OK")), Hint::in_window(t!("Esc"), t!("cancel"))],
             Modal::Reason(reason) => reason.hints(),
             Modal::Correction(window) => window.hints(),

@@ -15,6 +15,7 @@ mod recent;
 mod select;
 mod side;
 mod span;
+mod suppressed;
 mod view;
 
 #[cfg(test)]
@@ -36,10 +37,11 @@ pub use go::faceplate;
 use handover::Handover;
 pub(in crate::ui) use handover::NO_CHANGE;
 pub use handover::suppressed_words;
-use journal::Journal;
+use journal::{Events, Journal};
 pub use journal::{action_text, event_text};
 use metrics::Metrics;
 use recent::Recent;
+use suppressed::Suppressed;
 
 /// A view of the tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -90,6 +92,7 @@ pub struct Alarms {
     filter: Filter,
     sort: Sort,
     recent: Recent,
+    suppressed: Suppressed,
     journal: Journal,
     metrics: Metrics,
     handover: Handover,
@@ -102,52 +105,31 @@ impl TabView for Alarms {
         Alarms::default()
     }
 
-    fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        self.selected(cx).map(|alarm| actions::line(cx, alarm)).into_iter().collect()
-    }
-
-    fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
         match self.page {
-            Page::Journal => self.journal.moment(cx),
-            Page::Active | Page::Suppressed | Page::System | Page::Metrics | Page::Handover => {
-                self.selected(cx).map(|alarm| alarm.raised_at)
-            }
+            Page::Active | Page::System => Some(self),
+            Page::Suppressed => Some(&self.suppressed),
+            Page::Journal => Some(&self.journal),
+            Page::Metrics | Page::Handover => None,
         }
     }
 
-    fn back(&mut self, _cx: &ViewContext) -> bool {
-        let list = matches!(self.page, Page::Active | Page::System);
-        if list && !self.marked.is_empty() {
-            self.marked.clear();
-            return true;
-        }
-        if list && !self.filter.is_off() {
-            self.filter = Filter::default();
-            return true;
-        }
-        std::mem::take(&mut self.page) != Page::Active
-    }
-
-    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
         match self.page {
-            Page::Active | Page::System => {
-                let rows = self.rows(cx);
-                let seen = |row: &list::Row| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
-                Rows::of(rows.iter().map(seen), self.place(&rows))
-            }
-            Page::Suppressed => {
-                let place = self.selected.place(cx.snapshot.suppressed.iter().map(|suppressed| suppressed.id));
-                Rows::of(
-                    cx.snapshot
-                        .suppressed
-                        .iter()
-                        .map(|suppressed| (suppressed.id, suppressed.state, suppressed.note.at)),
-                    place,
-                )
-            }
-            // Nothing is done with a row of these.
-            Page::Journal | Page::Metrics | Page::Handover => Rows::default(),
+            Page::Active | Page::System => Some(self),
+            Page::Suppressed => Some(&mut self.suppressed),
+            Page::Journal => Some(&mut self.journal),
+            Page::Metrics | Page::Handover => None,
         }
+    }
+
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        // What the journal was opened for is not in the way back.
+        let taken = match self.page {
+            Page::Journal => self.journal.unmark(),
+            _ => self.list_mut(cx).is_some_and(|list| list.back(cx)),
+        };
+        taken || std::mem::take(&mut self.page) != Page::Active
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
@@ -158,32 +140,30 @@ impl TabView for Alarms {
                 self.recent.ask(cx, subject, &mut self.asked)
             }
             Page::Suppressed => Vec::new(),
-            Page::Journal => self.journal.ask(cx, &mut self.asked),
+            Page::Journal => self.journal.ask_both(cx, &mut self.asked),
             Page::Metrics => self.metrics.ask(cx, &mut self.asked).into_iter().collect(),
             Page::Handover => self.handover.ask(cx, &mut self.asked).into_iter().collect(),
         }
     }
 
     fn awaits(&self, number: u32) -> bool {
-        let Journal { alarms, actions, .. } = &self.journal;
+        let Events { alarms, actions, .. } = &self.journal.of;
         let queries = [&alarms.query, &actions.query, &self.metrics.figures.query, &self.handover.actions.query];
         self.recent.awaits(number) || queries.iter().any(|query| query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.recent.on_answer(cx, number, &answer);
-        self.journal.alarms.on_answer(cx, number, &answer);
-        self.journal.actions.on_answer(cx, number, &answer);
+        self.journal.of.alarms.on_answer(cx, number, &answer);
+        self.journal.of.actions.on_answer(cx, number, &answer);
         self.metrics.figures.on_answer(cx, number, &answer);
         self.handover.actions.on_answer(cx, number, &answer);
         Vec::new()
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        match self.page {
-            Page::Active | Page::System => self.filter.type_words(text),
-            Page::Journal => self.journal.search(cx, text)?,
-            Page::Suppressed | Page::Metrics | Page::Handover => {}
+        if self.page == Page::Journal {
+            self.journal.search(cx, text)?;
         }
         Ok(self.on_snapshot(cx))
     }
@@ -247,18 +227,8 @@ impl Alarms {
         self.selected.place(rows.iter().map(|row| row.alarm.id))
     }
 
-    /// Rows of the list that the screen has room for.
-    fn page_rows(&self, cx: &ViewContext) -> usize {
-        match self.page {
-            Page::Active | Page::System | Page::Suppressed => view::room(self, cx, cx.area.width, cx.area.height),
-            Page::Journal | Page::Metrics | Page::Handover => usize::from(cx.area.height.saturating_sub(3)).max(1),
-        }
-    }
-
-    fn suppressed<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a SuppressedAlarm> {
-        let snapshot = cx.snapshot;
-        let place = self.selected.place(snapshot.suppressed.iter().map(|suppressed| suppressed.id));
-        snapshot.suppressed.get(place).filter(|_| self.page == Page::Suppressed)
+    fn suppressed<'a>(&'a self, cx: &ViewContext<'a>) -> Option<Cow<'a, SuppressedAlarm>> {
+        self.suppressed.selected(cx).filter(|_| self.page == Page::Suppressed)
     }
 
     /// The alarm that the keys of the page are about.
@@ -290,8 +260,51 @@ impl Alarms {
             return;
         }
         let of = self.target(cx).map(|alarm| guidance::journal_of(cx, cx.def().alarm(alarm).subject));
-        self.journal.search_for(of.unwrap_or_default());
+        self.journal.search_for(cx, of.unwrap_or_default());
         self.page = Page::Journal;
+    }
+}
+
+/// The list of active alarms.
+impl ListPage for Alarms {
+    fn step(&mut self, cx: &ViewContext, motion: Motion) {
+        let room = view::room(cx, cx.area.width, cx.area.height);
+        let ids: Vec<AlarmId> = self.rows(cx).iter().map(|row| row.alarm.id).collect();
+        self.selected.on(motion, ids, room);
+    }
+
+    fn back(&mut self, _cx: &ViewContext) -> bool {
+        if !self.marked.is_empty() {
+            self.marked.clear();
+            return true;
+        }
+        std::mem::take(&mut self.filter) != Filter::default()
+    }
+
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        self.selected(cx).map(|alarm| actions::line(cx, alarm)).into_iter().collect()
+    }
+
+    fn filter(&self) -> String {
+        self.filter.typed()
+    }
+
+    fn set_filter(&mut self, _cx: &ViewContext, text: &str) {
+        self.filter.type_words(text);
+    }
+
+    fn filter_hint(&self) -> &'static str {
+        filter::FORMS
+    }
+
+    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+        let rows = self.rows(cx);
+        let seen = |row: &list::Row| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
+        Rows::of(rows.iter().map(seen), self.place(&rows))
+    }
+
+    fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
+        self.selected(cx).map(|alarm| alarm.raised_at)
     }
 }
 

@@ -104,7 +104,7 @@ impl TabView for Bus {
             line: LineId(0),
             page: Page::Line,
             scroll: Scroll::default(),
-            plan: plan::Plan::default(),
+            plan: plan::Plan::new(plan::Blocks { line: LineId(0) }),
             frames: frames::Ring::default(),
             test: test::Bench::default(),
             minutes: Answered::default(),
@@ -112,8 +112,19 @@ impl TabView for Bus {
         }
     }
 
+    fn list(&self, cx: &ViewContext) -> Option<&dyn ListPage> {
+        (self.page(cx) == Page::Plan).then_some(&self.plan as &dyn ListPage)
+    }
+
+    fn list_mut(&mut self, cx: &ViewContext) -> Option<&mut dyn ListPage> {
+        if self.page(cx) == Page::Plan { Some(&mut self.plan) } else { None }
+    }
+
     fn back(&mut self, cx: &ViewContext) -> bool {
         self.frames.dismiss();
+        if self.list_mut(cx).is_some_and(|list| list.back(cx)) {
+            return true;
+        }
         if self.page(cx) == Page::Registers {
             if !self.registers.back(cx) {
                 self.page = Page::Line;
@@ -125,7 +136,7 @@ impl TabView for Bus {
 
     fn fingerprint(&self, cx: &ViewContext) -> Rows {
         match (self.page(cx), LineView::new(cx, self.line)) {
-            (Page::Plan, Some(at)) => self.plan.drawn_rows(&at),
+            (Page::Plan, Some(_)) => self.plan.fingerprint(cx),
             (Page::Frames, Some(_)) => self.frames.drawn_rows(),
             (Page::Line | Page::Plan | Page::Frames | Page::Test | Page::Registers, _) => Rows::default(),
         }
@@ -193,7 +204,7 @@ impl TabView for Bus {
                     frames::recent(cx, &at, &mut page.part(0, used + 1, width, left));
                 }
             }
-            Page::Plan => self.plan.view(cx, &at, &mut page),
+            Page::Plan => self.plan.view(cx, &mut page),
             Page::Frames => self.frames.view(cx, &at, &mut page),
             Page::Test => self.test.view(cx, &at, &mut page),
             Page::Registers => {
@@ -230,7 +241,7 @@ impl Bus {
     /// So many lines on, around the end.
     fn choose_line(&mut self, cx: &ViewContext, by: isize) {
         self.line = lines::next(cx, self.line, by);
-        (self.scroll, self.plan) = (Scroll::default(), plan::Plan::default());
+        (self.scroll, self.plan) = (Scroll::default(), plan::Plan::new(plan::Blocks { line: self.line }));
         self.frames.forget();
         self.test.first = None;
         self.minutes = Answered::default();
@@ -242,7 +253,7 @@ impl Bus {
         match (self.page(cx), motion) {
             (Page::Line, Motion::Rows(by)) if 1 < cx.def().lines.len() => self.choose_line(cx, by),
             (Page::Line, _) => self.scroll.on(motion, line::rows(cx, &at, cx.area.width).len(), room - 1),
-            (Page::Plan, _) => self.plan.scroll(&at, motion, room),
+            (Page::Plan, _) => self.plan.step(cx, motion),
             (Page::Frames, _) => self.frames.scroll(cx, &at, motion, room),
             (Page::Test, _) => self.test.scroll(cx, &at, motion),
             // It scrolls by its own keys.

@@ -22,7 +22,14 @@ mod tests;
 
 pub use device::signal_mark;
 
-use self::{compare::Compare, procedures::Procedures, program::Cell, runs::Runs, table::Table};
+use self::{
+    compare::Compare,
+    procedures::Procedures,
+    program::Cell,
+    runs::{ControlRuns, Runs},
+    sets::{Sets, SetsOf},
+    table::Table,
+};
 use crate::ui::tabs::prelude::*;
 use crate::{history::Series, plant::parameter_set, ui::layout::Size};
 
@@ -56,19 +63,14 @@ pub enum Page {
     Guide(usize, Box<Page>),
 }
 
-/// What the text is for that is being typed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Asked {
-    Filter,
-    SetName,
-}
-
 /// State of this tab.
 #[derive(Debug)]
 pub struct Controllers {
     page: Page,
     /// The device that is shown or selected.
     device: DeviceId,
+    /// Only devices with these words are listed.
+    found: Words,
     table: Table,
     cell: Cell,
     /// The devices as faceplates or as a table; `None` as there is room.
@@ -76,9 +78,7 @@ pub struct Controllers {
     runs: Runs,
     procedures: Procedures,
     lamps: lamps::Live,
-    /// The selected row of the sets.
-    set: usize,
-    asked_for: Asked,
+    sets: Sets,
     /// The small trend, of which tag, and the query for it.
     trend: Answered<Vec<Series>>,
     /// The tags that it was asked for last.
@@ -88,15 +88,11 @@ pub struct Controllers {
 
 impl TabView for Controllers {
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        let device = cx.def().devices.get(self.device.index());
-        let tag = device.and_then(|device| match self.page {
-            Page::Device => self.table.tag(cx, device.id).map(|tag| tag.id),
-            Page::List => device.faceplate.as_ref().map(|faceplate| faceplate.pv),
-            Page::Program => device.program.as_ref().and_then(|program| self.cell.tag(program)),
-            Page::Lamps | Page::Sets | Page::Compare(..) | Page::Runs | Page::Guide(..) => None,
-            Page::Procedures | Page::Overlay(_) => None,
-        });
-        tag.into_iter().map(|tag| value::line(cx, tag)).collect()
+        if let Some(list) = self.list(cx) {
+            return list.copied(cx);
+        }
+        let cell = self.device(cx).filter(|_| self.page == Page::Program).and_then(|device| self.cell_tag(device));
+        cell.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
 
     fn new(snapshot: &Snapshot) -> Controllers {
@@ -105,13 +101,12 @@ impl TabView for Controllers {
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
+        if self.list_mut(cx).is_some_and(|list| list.back(cx)) {
+            return true;
+        }
         let page = std::mem::replace(&mut self.page, Page::List);
         let alone = cx.def().devices.len() <= 1;
         self.page = match page {
-            Page::Device if !self.table.filter.is_empty() => {
-                (self.table.filter, self.table.selected) = (Words::default(), 0);
-                Page::Device
-            }
             Page::Device if !alone => {
                 self.trend = Answered::default();
                 self.table = Table { defaults: self.table.defaults, ..Table::default() };
@@ -134,13 +129,25 @@ impl TabView for Controllers {
         true
     }
 
-    fn fingerprint(&self, cx: &ViewContext) -> Rows {
-        match (&self.page, cx.def().devices.get(self.device.index())) {
-            (Page::Sets, Some(device)) => {
-                Rows::of(sets::sources(cx, device).iter().map(|source| source.words(cx)), self.set)
-            }
-            (Page::List | Page::Device | Page::Program | Page::Sets | Page::Compare(_), _)
-            | (Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay(_) | Page::Guide(..), _) => Rows::default(),
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
+        match self.page {
+            Page::Sets => Some(&self.sets),
+            Page::Runs => self.runs.shown(),
+            Page::Procedures => Some(&self.procedures),
+            Page::List | Page::Device => Some(self),
+            Page::Lamps | Page::Program | Page::Compare(_) => None,
+            Page::Overlay(_) | Page::Guide(..) => None,
+        }
+    }
+
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
+        match self.page {
+            Page::Sets => Some(&mut self.sets),
+            Page::Runs => self.runs.shown_mut(),
+            Page::Procedures => Some(&mut self.procedures),
+            Page::List | Page::Device => Some(self),
+            Page::Lamps | Page::Program | Page::Compare(_) => None,
+            Page::Overlay(_) | Page::Guide(..) => None,
         }
     }
 
@@ -149,16 +156,20 @@ impl TabView for Controllers {
             self.page = Page::Device;
         }
         let device = cx.def().devices.get(self.device.index());
+        let number = (Tab::Controllers, &mut self.asked);
         match (&self.page, device) {
-            (Page::Runs | Page::Overlay(_), Some(device)) => return self.runs.ask(cx, device, &mut self.asked),
+            (Page::Runs | Page::Overlay(_), _) => return self.runs.ask(cx, number),
             (Page::Lamps, Some(device)) => return self.lamps.ask(cx, device, &mut self.asked),
-            (Page::Procedures, _) => return self.procedures.ask(cx, &mut self.asked),
+            (Page::Procedures, _) => return self.procedures.ask(cx, number).into_iter().collect(),
             _ => {}
         }
         let faceplate = device.and_then(|device| device.faceplate.as_ref());
         let tags = match &self.page {
             Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
-            Page::List if self.is_wall(cx) => wall::tags(cx, self.device.index()),
+            Page::List if self.is_wall(cx) => {
+                let listed = self.listed(cx);
+                wall::tags(cx, &listed, self.place(&listed))
+            }
             Page::List | Page::Program | Page::Sets | Page::Compare(_) => Vec::new(),
             Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay(_) | Page::Guide(..) => Vec::new(),
         };
@@ -176,40 +187,26 @@ impl TabView for Controllers {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        let (runs, procedures, lamps) = (&self.runs, &self.procedures, &self.lamps);
-        self.trend.query.awaits(number) || runs.awaits(number) || procedures.awaits(number) || lamps.awaits(number)
+        let queries = [&self.trend.query, &self.procedures.answered.query];
+        queries.iter().any(|query| query.awaits(number)) || self.runs.awaits(number) || self.lamps.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         self.trend.on_answer(cx, number, &answer);
         self.runs.on_answer(cx, number, &answer);
-        self.procedures.on_answer(cx, number, &answer);
+        self.procedures.answered.on_answer(cx, number, &answer);
         self.lamps.on_answer(cx, number, &answer);
         Vec::new()
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let text = text.trim();
-        match self.asked_for {
-            Asked::Filter => {
-                let filter = Words::parse(text);
-                let mut table = Table { selected: 0, filter, ..self.table.clone() };
-                if table.rows(cx, self.device).is_empty() {
-                    return Err(t!("no parameter has \"{text}\" in its name or meaning", text));
-                }
-                table.selected = table.best(cx, self.device);
-                self.table = table;
-                Ok(Vec::new())
-            }
-            Asked::SetName => {
-                parameter_set::check_name(text)?;
-                let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
-                let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
-                let Some(there) = there else { return Ok(vec![UiAction::Command(kind)]) };
-                let words = sets::replace_text(cx, there);
-                Ok(open(Modal::Confirm(Confirm::command(t!("save set {text}", text), words, kind))))
-            }
-        }
+        parameter_set::check_name(text)?;
+        let there = cx.snapshot.sets.iter().find(|stored| stored.name == text);
+        let kind = CommandKind::SaveSet { device: self.device, name: text.into(), replace: there.is_some() };
+        let Some(there) = there else { return Ok(vec![UiAction::Command(kind)]) };
+        let words = sets::replace_text(cx, there);
+        Ok(open(Modal::Confirm(Confirm::command(t!("save set {text}", text), words, kind))))
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
@@ -222,10 +219,14 @@ impl TabView for Controllers {
             return;
         };
         match (&self.page, &device.program) {
-            (Page::List, _) if self.is_wall(cx) => {
-                wall::view(cx, &mut canvas, self.device.index(), &self.trend);
+            (Page::List, _) => {
+                let (listed, found) = (self.listed(cx), self.found.to_string());
+                let place = self.place(&listed);
+                if self.is_wall(cx) {
+                    return wall::view(cx, &mut canvas, (&listed, place), &found, &self.trend);
+                }
+                list::view(cx, &mut canvas, (&listed, place), &found);
             }
-            (Page::List, _) => list::view(cx, &mut canvas, self.device.index()),
             (Page::Lamps, _) => lamps::view(cx, &mut canvas, device, &self.lamps),
             (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
             (Page::Device | Page::Program, _) => {
@@ -233,8 +234,8 @@ impl TabView for Controllers {
                 device::view(cx, &mut canvas, device, &self.table, trend)
             }
             (Page::Procedures, _) => self.procedures.view(cx, &mut canvas),
-            (Page::Runs | Page::Overlay(_), _) => self.runs.view(cx, &mut canvas, device),
-            (Page::Sets, _) => sets::view(cx, &mut canvas, device, self.set),
+            (Page::Runs | Page::Overlay(_), _) => self.runs.list.view(cx, &mut canvas),
+            (Page::Sets, _) => self.sets.view(cx, &mut canvas),
             (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
             (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
         }
@@ -243,23 +244,34 @@ impl TabView for Controllers {
 
 impl Controllers {
     fn on_page(page: Page, device: DeviceId, table: Table) -> Controllers {
-        let (cell, asked_for, trend) = (Cell::default(), Asked::Filter, Answered::default());
-        let (runs, procedures, curves) = (Runs::default(), Procedures::default(), Vec::new());
+        let (cell, trend) = (Cell::default(), Answered::default());
+        let runs = Runs::new(ControlRuns { device });
         Controllers {
             page,
             device,
+            found: Words::default(),
             table,
             cell,
             wall: None,
             runs,
-            procedures,
+            procedures: Procedures::default(),
             lamps: lamps::Live::default(),
-            set: 0,
-            asked_for,
+            sets: Sets::new(SetsOf { device }),
             trend,
-            curves,
+            curves: Vec::new(),
             asked: 0,
         }
+    }
+
+    /// The devices that the filter lets through.
+    fn listed<'a>(&self, cx: &ViewContext<'a>) -> Vec<&'a DeviceDef> {
+        let words = |device: &DeviceDef| format!("{} {} {}", device.name, device.model, device.title);
+        cx.def().devices.iter().filter(|device| self.found.fit(&words(device))).collect()
+    }
+
+    /// The place of the selected device among these.
+    fn place(&self, listed: &[&DeviceDef]) -> usize {
+        listed.iter().position(|device| device.id == self.device).unwrap_or(0)
     }
 
     /// Are the devices shown as faceplates? So they are on a wide screen, unless the operator wants the table.
@@ -283,7 +295,13 @@ impl Controllers {
     /// Shows a device.
     pub fn show(&mut self, device: DeviceId) {
         let table = Table { defaults: self.table.defaults, ..Table::default() };
-        *self = Controllers { asked: self.asked, wall: self.wall, ..Controllers::on_page(Page::Device, device, table) };
+        let found = std::mem::take(&mut self.found);
+        *self = Controllers {
+            asked: self.asked,
+            wall: self.wall,
+            found,
+            ..Controllers::on_page(Page::Device, device, table)
+        };
     }
 
     /// Shows a procedure.
@@ -297,5 +315,44 @@ impl Controllers {
         let device = cx.def().tag(tag).device;
         self.show(device);
         self.table.selected = self.table.rows(cx, device).iter().position(|row| row.id == tag).unwrap_or(0);
+    }
+}
+
+/// The list of devices, and that of the parameters of one.
+impl ListPage for Controllers {
+    fn step(&mut self, cx: &ViewContext, motion: Motion) {
+        Controllers::step(self, cx, motion);
+    }
+
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        let filtered = !ListPage::filter(self).is_empty();
+        if filtered {
+            self.set_filter(cx, "");
+        }
+        filtered
+    }
+
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        let tag = match self.page {
+            Page::Device => self.table.tag(cx, self.device).map(|tag| tag.id),
+            _ => self.device(cx).and_then(|device| device.faceplate.as_ref()).map(|faceplate| faceplate.pv),
+        };
+        tag.into_iter().map(|tag| value::line(cx, tag)).collect()
+    }
+
+    fn filter(&self) -> String {
+        if self.page == Page::Device { &self.table.filter } else { &self.found }.to_string()
+    }
+
+    fn set_filter(&mut self, cx: &ViewContext, text: &str) {
+        let words = Words::parse(text);
+        if self.page == Page::Device {
+            (self.table.filter, self.table.selected) = (words, 0);
+            self.table.selected = if self.table.filter.is_empty() { 0 } else { self.table.best(cx, self.device) };
+            return;
+        }
+        self.found = words;
+        let listed = self.listed(cx);
+        self.device = listed.get(self.place(&listed)).map_or(self.device, |device| device.id);
     }
 }

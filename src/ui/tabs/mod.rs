@@ -5,6 +5,7 @@ pub(crate) mod bus;
 pub(crate) mod controllers;
 pub(super) mod draw;
 mod line_switch;
+mod listing;
 mod overlay;
 mod periodic_query;
 mod prelude;
@@ -24,6 +25,8 @@ use ratatui::{
     Frame,
     layout::{Position, Rect},
 };
+
+pub use listing::ListPage;
 
 use super::{
     Effect, UiAction, ViewContext,
@@ -78,20 +81,30 @@ pub trait TabView: Keyed {
     /// Draws it.
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect);
 
+    /// The list that is shown, if the page is one.
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
+        None
+    }
+
+    /// The same, to change it.
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
+        None
+    }
+
     /// The list whose rows keys act on, each row with what an operator should have seen of it; nothing where rows stand
     /// where they are in the plant file.
-    fn fingerprint(&self, _cx: &ViewContext) -> Rows {
-        Rows::default()
+    fn fingerprint(&self, cx: &ViewContext) -> Rows {
+        self.list(cx).map_or(Rows::default(), |list| list.fingerprint(cx))
     }
 
     /// What is selected, a line each, to be copied; its parts are separated by tabs, as for a spreadsheet.
-    fn copied(&self, _cx: &ViewContext) -> Vec<String> {
-        Vec::new()
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        self.list(cx).map_or(Vec::new(), |list| list.copied(cx))
     }
 
     /// The past moment that is selected, for a replay to begin at.
-    fn moment(&self, _cx: &ViewContext) -> Option<Timestamp> {
-        None
+    fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
+        self.list(cx).and_then(|list| list.moment(cx))
     }
 
     /// The mouse is pressed at this place of the screen: selects what stands there; `false` where arrow keys do that.
@@ -181,12 +194,18 @@ pub trait Keyed {
 impl<T: KeyTable> Keyed for T {
     fn press(&mut self, cx: &ViewContext, event: KeyEvent) -> Option<Vec<UiAction>> {
         self.before_key();
-        self.keys(cx).press(self, cx, event, T::after_key)
+        all_keys(self, cx).press(self, cx, event, T::after_key)
     }
 
     fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
-        self.keys(cx).hints(self, cx, self.reads_only(cx))
+        all_keys(self, cx).hints(self, cx, self.reads_only(cx))
     }
+}
+
+/// The keys of a page, among those of every list where it is one.
+fn all_keys<T: KeyTable>(page: &T, cx: &ViewContext) -> Keys<T> {
+    let own = page.keys(cx);
+    if page.list(cx).is_some() { listing::all_keys(own) } else { own }
 }
 
 /// The table of tabs, in the order of their number keys from 0: name, field, state, title, help.

@@ -6,9 +6,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::{
-        batch::Batch,
-        control_run::{ControlRun, RunCause, RunDef},
-        def::BatchDef,
+        control_run::{ControlRun, RunCause},
         number::to_usize,
     },
     ui::widgets::chart::{self, Chart, Curve, mark, trace::Trace},
@@ -16,8 +14,8 @@ use crate::{
 
 /// Curves over each other at most: a pen has one of this many marks.
 pub const CURVES_MAX: usize = 8;
-/// Batches that are shown where none is marked: the selected one and those before it.
-pub const UNMARKED: usize = 3;
+/// Rows that are shown where none is marked: the selected one and those before it.
+const UNMARKED: usize = 3;
 /// How often the curve of what still runs is read again, and when an answer counts as lost (real time).
 const EVERY_S: f64 = 10.0;
 const TIMEOUT_S: f64 = 20.0;
@@ -26,7 +24,7 @@ const STORED_S: f64 = 3.0;
 
 /// A stretch of time whose curve lies over the others.
 #[derive(Debug)]
-struct Laid {
+pub struct Laid {
     /// What it is called in the legend.
     label: String,
     from: Timestamp,
@@ -39,15 +37,13 @@ struct Laid {
 }
 
 impl Laid {
-    fn new(label: String, from: Timestamp, to: Option<Timestamp>) -> Laid {
+    /// The time of a batch, or a period.
+    pub fn new(label: String, from: Timestamp, to: Option<Timestamp>) -> Laid {
         Laid { label, from, to, figures: None, is_whole: false }
     }
 
-    fn of_batch(batch: &Batch) -> Laid {
-        Laid::new(batch.label(), batch.from, batch.to)
-    }
-
-    fn of_run((run, figures): (&ControlRun, [String; 5])) -> Laid {
+    /// A control run with its figures.
+    pub fn of_run(run: &ControlRun, figures: [String; 5]) -> Laid {
         let to = (!run.is_running()).then_some(run.until);
         // What a procedure has measured has its name.
         let label = match run.cause {
@@ -64,16 +60,28 @@ impl Laid {
 
 /// What lies over each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub enum Kind {
+    /// Batches of one rule.
     Batches,
+    /// Control runs of one controller.
     Runs,
+    /// Periods.
     Periods,
+}
+
+impl Kind {
+    fn tab(self) -> Tab {
+        match self {
+            Kind::Batches => Tab::Reports,
+            Kind::Runs => Tab::Controllers,
+            Kind::Periods => Tab::Trends,
+        }
+    }
 }
 
 /// State of the page.
 #[derive(Debug)]
 pub struct Overlay {
-    tab: Tab,
     kind: Kind,
     /// Each with the curve of the tag.
     curves: Vec<(Laid, Answered<Vec<Series>>)>,
@@ -82,31 +90,16 @@ pub struct Overlay {
 }
 
 impl Overlay {
-    /// Of batches of one rule; `None` where it names no tag that has a curve.
-    pub fn of_batches(rule: &BatchDef, batches: impl IntoIterator<Item = Batch>) -> Option<Overlay> {
-        let tags = rule.tags.iter().chain(&rule.energy).chain(&rule.phase).copied().collect();
-        let laid = batches.into_iter().map(|batch| Laid::of_batch(&batch));
-        Overlay::new((Tab::Reports, Kind::Batches), laid, (tags, 0))
-    }
-
-    /// Of control runs with their figures; `None` where they have no tag that has a curve.
-    pub fn of_runs<'a>(rule: &RunDef, runs: impl Iterator<Item = (&'a ControlRun, [String; 5])>) -> Option<Overlay> {
-        Overlay::new((Tab::Controllers, Kind::Runs), runs.map(Laid::of_run), (rule.tags.clone(), 0))
-    }
-
     /// Of periods, named by letters; `None` where there is no tag that has a curve.
     pub fn of_periods(spans: Vec<(Timestamp, Timestamp)>, tags: (Vec<TagId>, usize)) -> Option<Overlay> {
         let laid = |(letter, (from, to)): (char, _)| Laid::new(letter.to_string(), from, Some(to));
-        Overlay::new((Tab::Trends, Kind::Periods), ('A'..).zip(spans).map(laid), tags)
+        Overlay::new(Kind::Periods, ('A'..).zip(spans).map(laid), tags)
     }
 
-    fn new(
-        (tab, kind): (Tab, Kind),
-        laid: impl Iterator<Item = Laid>,
-        (tags, tag): (Vec<TagId>, usize),
-    ) -> Option<Overlay> {
-        let curves = laid.take(CURVES_MAX).map(|laid| (laid, Answered::default())).collect();
-        (!tags.is_empty()).then_some(Overlay { tab, kind, curves, tags, tag })
+    /// Of some of a kind, with the curves of one of these tags; `None` where there is none.
+    pub fn new(kind: Kind, laid: impl IntoIterator<Item = Laid>, (tags, tag): (Vec<TagId>, usize)) -> Option<Overlay> {
+        let curves = laid.into_iter().take(CURVES_MAX).map(|laid| (laid, Answered::default())).collect();
+        (!tags.is_empty()).then_some(Overlay { kind, curves, tags, tag })
     }
 
     /// Does one of them still run, so that its end must be looked for?
@@ -114,18 +107,8 @@ impl Overlay {
         self.curves.iter().any(|(laid, _)| laid.to.is_none())
     }
 
-    /// The batches as they are listed now.
-    pub fn follow_batches<'a>(&mut self, batches: impl Iterator<Item = &'a Batch>) {
-        self.follow(batches.map(Laid::of_batch));
-    }
-
-    /// The control runs as they are listed now, with their figures.
-    pub fn follow_runs<'a>(&mut self, runs: impl Iterator<Item = (&'a ControlRun, [String; 5])>) {
-        self.follow(runs.map(Laid::of_run));
-    }
-
     /// What runs gets its figures of now, and what has ended meanwhile its end.
-    fn follow(&mut self, listed: impl Iterator<Item = Laid>) {
+    pub fn follow(&mut self, listed: impl Iterator<Item = Laid>) {
         for now in listed {
             let mut running = self.curves.iter_mut().filter(|(laid, _)| laid.to.is_none());
             let Some((laid, curve)) = running.find(|(laid, _)| laid.label == now.label) else { continue };
@@ -163,21 +146,24 @@ impl Overlay {
             let share = to.duration_since(laid.from).as_secs_f64() / span.as_secs_f64();
             let buckets = to_usize(columns as f64 * share).max(2);
             let query = Query::Series { tags: vec![tag], from: laid.from, to, buckets };
-            let asked = curve.ask(cx, (self.tab, number), every, real(cx, TIMEOUT_S), query)?;
+            let asked = curve.ask(cx, (self.kind.tab(), number), every, real(cx, TIMEOUT_S), query)?;
             laid.is_whole = laid.to.is_some_and(|to| cx.present().duration_since(to) > real(cx, STORED_S));
             Some(asked)
         };
         self.curves.iter_mut().filter_map(ask).collect()
     }
 
+    /// Is the answer to query `number` still waited for?
     pub fn awaits(&self, number: u32) -> bool {
         self.curves.iter().any(|(_, curve)| curve.query.awaits(number))
     }
 
+    /// Takes the answer to one of its queries.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         self.curves.iter_mut().for_each(|(_, curve)| curve.on_answer(cx, number, answer));
     }
 
+    /// Draws it.
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let (theme, tag) = (cx.theme, self.tags[self.tag]);
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
@@ -264,4 +250,85 @@ fn moved_to(begin: Timestamp, laid: &Laid, curve: &Answered<Vec<Series>>) -> Tra
         trace.set_past(Series { from, ..series.clone() }, Timestamp::MAX);
     }
     trace
+}
+
+/// A listing whose rows can lie over each other.
+pub trait Laying: Listing {
+    /// A row over others.
+    fn laid(row: &Self::Row) -> Laid;
+
+    /// What they are, and the tags that have curves of a row.
+    fn curves(&self, cx: &ViewContext, row: &Self::Row) -> Option<(Kind, Vec<TagId>)>;
+
+    /// Can two rows lie over each other?
+    fn are_alike(_a: &Self::Row, _b: &Self::Row) -> bool {
+        true
+    }
+}
+
+/// A list whose marked rows lie over each other on request.
+#[derive(Debug)]
+pub struct Overlaid<L: Laying> {
+    /// The list.
+    pub list: List<L>,
+    /// Some of it over each other, in place of the list.
+    pub overlay: Option<Overlay>,
+}
+
+impl<L: Laying> Overlaid<L> {
+    /// The list alone.
+    pub fn new(of: L) -> Overlaid<L> {
+        Overlaid { list: List::new(of), overlay: None }
+    }
+
+    /// The list, while it is shown.
+    pub fn shown(&self) -> Option<&dyn ListPage> {
+        self.overlay.is_none().then_some(&self.list as &dyn ListPage)
+    }
+
+    /// The same, to change it.
+    pub fn shown_mut(&mut self) -> Option<&mut dyn ListPage> {
+        if self.overlay.is_none() { Some(&mut self.list) } else { None }
+    }
+
+    /// Shows the marked rows that are like the selected one over each other; where none is marked, it and those before it.
+    pub fn lay_over(&mut self, cx: &ViewContext) {
+        let Some(selected) = self.list.selected(cx) else { return };
+        let Some((kind, tags)) = self.list.of.curves(cx, &selected) else { return };
+        let all = self.list.all(cx);
+        let alike = || all.iter().filter(|row| L::are_alike(row, &selected));
+        let marked: Vec<Laid> = alike().filter(|row| self.list.is_marked(row)).map(|row| L::laid(row)).collect();
+        let earlier = alike().skip_while(|row| L::id(row) != L::id(&selected)).take(UNMARKED).map(|row| L::laid(row));
+        let laid = if marked.is_empty() { earlier.collect() } else { marked };
+        self.overlay = Overlay::new(kind, laid, (tags, 0));
+    }
+
+    /// The curves of another tag.
+    pub fn next_tag(&mut self, by: isize) {
+        self.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by));
+    }
+
+    /// Asks the history when it is time to.
+    pub fn ask(&mut self, cx: &ViewContext, (tab, number): (Tab, &mut u32)) -> Vec<UiAction> {
+        let curves = self.overlay.as_mut().map_or(Vec::new(), |overlay| overlay.ask(cx, number));
+        let is_listed = self.overlay.as_ref().is_none_or(Overlay::is_running);
+        let list = if is_listed { self.list.ask(cx, (tab, number)) } else { None };
+        curves.into_iter().chain(list).collect()
+    }
+
+    /// Is the answer to query `number` still waited for?
+    pub fn awaits(&self, number: u32) -> bool {
+        self.list.answered.query.awaits(number) || self.overlay.as_ref().is_some_and(|overlay| overlay.awaits(number))
+    }
+
+    /// Takes the answer to one of its queries.
+    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        let is_list = self.list.answered.query.awaits(number);
+        self.list.answered.on_answer(cx, number, answer);
+        if let Some(overlay) = &mut self.overlay {
+            overlay.on_answer(cx, number, answer);
+            let listed = if is_list { self.list.all(cx) } else { Vec::new() };
+            overlay.follow(listed.iter().map(|row| L::laid(row)));
+        }
+    }
 }

@@ -194,6 +194,13 @@ pub trait FromAnswer: Sized {
     fn from_answer(answer: &Answer) -> Option<Self>;
 }
 
+/// Nothing is asked for.
+impl FromAnswer for () {
+    fn from_answer(_: &Answer) -> Option<()> {
+        None
+    }
+}
+
 macro_rules! from_answer {
     ($($kind:ident: $value:ty;)+) => {$(
         impl FromAnswer for $value {

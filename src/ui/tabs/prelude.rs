@@ -1,6 +1,6 @@
 //! What almost every tab works with: what it is given, what it answers, how it draws, and the keys and lists of all tabs.
 
-pub(super) use std::time::Duration;
+pub(super) use std::{borrow::Cow, time::Duration};
 
 pub(super) use crossterm::event::{KeyCode, KeyEvent};
 pub(super) use jiff::{SignedDuration, Timestamp};
@@ -13,6 +13,7 @@ pub(super) use ratatui::{
 pub(super) use super::{
     KeyTable, Keyed, Tab, TabView,
     draw::{self, around, open, row_style},
+    listing::{self, Column, Heading, List, ListPage, Listing, left, rest, right},
     periodic_query::{Answered, FromAnswer, PeriodicQuery, real},
     reports::period,
 };

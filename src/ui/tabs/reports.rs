@@ -13,7 +13,12 @@ mod tests;
 
 use std::path::PathBuf;
 
-use self::{batches::Batches, export::Export, made::Made, rows::Rows};
+use self::{
+    batches::{BatchReports, Batches},
+    export::Export,
+    made::Made,
+    rows::Rows,
+};
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -54,7 +59,7 @@ const KEYS: &[Key] = &[
     }),
     Key::change(char('r'), "automatic", "the reports that the station makes by itself", |reports, _| {
         (reports.made.shown, reports.export) = (true, Export::Not);
-        reports.made.list.query.want();
+        reports.made.list.answered.query.want();
     }),
     Key::change(char('t'), "tag", "chart of the next tag (110 columns or more)", |reports, _| reports.next_tag(1)),
     Key::change(char('T'), "", "chart of the previous tag", |reports, _| reports.next_tag(-1)),
@@ -73,8 +78,8 @@ const KEYS: &[Key] = &[
 
 /// The key of a plant that makes batches.
 const BATCHES: &[Key] = &[Key::change(char('b'), "batches", "the list of batches", |reports, _| {
-    (reports.batches.shown, reports.export) = (true, Export::Not);
-    reports.batches.rows.query.want();
+    (reports.batches_shown, reports.export) = (true, Export::Not);
+    reports.batches.list.answered.query.want();
 })
 .when(|_, cx| Offer::only_if(!cx.def().batches.is_empty()))];
 const SCROLL: [Key; 6] = motions!("", Reports::scroll);
@@ -96,7 +101,9 @@ pub struct Reports {
     /// The row whose tag has the chart, and its curve.
     charted: usize,
     curve: Answered<Vec<Series>>,
+    /// The batches, while they are shown in place of a report.
     batches: Batches,
+    batches_shown: bool,
     made: Made,
     rows: Rows,
     dialect: CsvDialect,
@@ -122,7 +129,8 @@ impl TabView for Reports {
             report: Answered::default(),
             charted: 0,
             curve: Answered::default(),
-            batches: Batches::default(),
+            batches: Batches::new(BatchReports),
+            batches_shown: false,
             made: Made::default(),
             rows: Rows::default(),
             dialect: snapshot.def.report.csv,
@@ -148,14 +156,9 @@ impl TabView for Reports {
     }
 
     fn awaits(&self, number: u32) -> bool {
-        let overlay = self.batches.overlay.as_ref().is_some_and(|overlay| overlay.awaits(number));
-        let text = self.made.open.as_ref().is_some_and(|open| open.report.query.awaits(number));
-        overlay
-            || text
-            || self.made.list.query.awaits(number)
-            || self.curve.query.awaits(number)
-            || self.report.query.awaits(number)
-            || self.batches.rows.query.awaits(number)
+        let text = self.made.open.as_ref().map(|open| &open.report.query);
+        let queries = [&self.made.list.answered.query, &self.curve.query, &self.report.query];
+        queries.into_iter().chain(text).any(|query| query.awaits(number)) || self.batches.awaits(number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
@@ -163,7 +166,7 @@ impl TabView for Reports {
         self.set_preview(cx);
         self.curve.on_answer(cx, number, &answer);
         self.batches.on_answer(cx, number, &answer);
-        self.made.list.on_answer(cx, number, &answer);
+        self.made.list.answered.on_answer(cx, number, &answer);
         self.made.open.iter_mut().for_each(|open| open.report.on_answer(cx, number, &answer));
         self.ask(cx)
     }
@@ -201,28 +204,41 @@ impl TabView for Reports {
         if self.rows.shown {
             return view::draw_rows(self, cx, frame, area);
         }
-        match self.batches.shown {
+        match self.batches_shown {
             true => self.batches.view(cx, frame, area, view::export_words(self, cx, &self.batches_path(cx))),
             false => view::draw(self, cx, frame, area),
         }
     }
 
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
+        match (self.made.shown, self.batches_shown && !self.rows.shown) {
+            (true, _) => self.made.list(),
+            (false, true) => self.batches.shown(),
+            (false, false) => None,
+        }
+    }
+
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
+        match (self.made.shown, self.batches_shown && !self.rows.shown) {
+            (true, _) => self.made.list_mut(),
+            (false, true) => self.batches.shown_mut(),
+            (false, false) => None,
+        }
+    }
+
     fn back(&mut self, cx: &ViewContext) -> bool {
+        if self.list_mut(cx).is_some_and(|list| list.back(cx)) {
+            return true;
+        }
         if self.made.shown {
             self.made.shown = self.made.open.take().is_some();
             return true;
         }
-        match self.batches.shown {
-            true if self.batches.overlay.take().is_some() => true,
-            true => self.batches.rows.query.cancel(cx) || std::mem::take(&mut self.batches.shown),
-            false => {
-                std::mem::take(&mut self.rows.shown) || self.preview.take().is_some() || self.report.query.cancel(cx)
-            }
+        if self.batches_shown {
+            self.batches_shown = self.batches.overlay.take().is_some();
+            return true;
         }
-    }
-
-    fn copied(&self, _cx: &ViewContext) -> Vec<String> {
-        if self.made.shown { self.made.copied() } else { Vec::new() }
+        std::mem::take(&mut self.rows.shown) || self.preview.take().is_some() || self.report.query.cancel(cx)
     }
 }
 
@@ -232,7 +248,7 @@ impl KeyTable for Reports {
             self.made.keys()
         } else if self.rows.shown {
             rows::KEYS
-        } else if self.batches.shown {
+        } else if self.batches_shown {
             self.batches.keys()
         } else {
             &[KEYS, BATCHES, counters::KEYS, &SCROLL]
@@ -290,7 +306,7 @@ impl Reports {
 
     /// The tag that has the chart, and the part of the period that is over, where there is room for it.
     fn chart(&self, cx: &ViewContext) -> Option<(Pen, View)> {
-        let free = !self.batches.shown && !self.made.shown && !self.rows.shown && self.preview.is_none();
+        let free = !self.batches_shown && !self.made.shown && !self.rows.shown && self.preview.is_none();
         let room = view::chart_columns(cx).filter(|_| free)?;
         let rows = &self.report.value.as_ref()?.tags;
         let tag = cx.def().tag_named(&rows.get(self.charted)?.tag)?;
@@ -321,8 +337,8 @@ impl Reports {
         if self.made.shown {
             return self.made.ask(cx, &mut self.number);
         }
-        if self.batches.shown {
-            return self.batches.ask(cx, &mut self.number);
+        if self.batches_shown {
+            return self.batches.ask(cx, (Tab::Reports, &mut self.number));
         }
         let Some(period) = self.period.clone() else { return Vec::new() };
         let number = (Tab::Reports, &mut self.number);

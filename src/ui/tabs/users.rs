@@ -1,7 +1,8 @@
 //! Tab 7, for a Supervisor: its users, the terminals that are attached, and the audit list.
 
 mod audit;
-mod view;
+
+use std::sync::Arc;
 
 use audit::Audit;
 
@@ -10,14 +11,13 @@ use crate::{
     access::UserRow,
     ui::{
         modal::{UserForm, user_form::Purpose},
-        session_lock,
+        rights, session_lock,
     },
 };
 
 /// A row of the tables here.
 type Key = crate::ui::keys::Key<Users>;
 
-const MOVE: [Key; 6] = motions!("select", Users::select);
 /// Keys of the list of users.
 const LIST: &[Key] = &[
     Key::new(char('n'), "new", "add a user", Users::add)
@@ -46,8 +46,7 @@ fn has_users(_: &Users, cx: &ViewContext) -> Offer {
 /// State of this tab.
 #[derive(Debug, Default)]
 pub struct Users {
-    /// The selected user; the selection stays when the list moves.
-    selected: Selected<std::sync::Arc<str>>,
+    list: List<UserList>,
     /// The audit list while it is shown.
     audit: Option<Audit>,
     /// Queries asked so far.
@@ -55,29 +54,30 @@ pub struct Users {
 }
 
 impl TabView for Users {
-    fn back(&mut self, _cx: &ViewContext) -> bool {
-        self.audit.take().is_some()
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        self.list_mut(cx).is_some_and(|list| list.back(cx)) || self.audit.take().is_some()
     }
 
-    fn fingerprint(&self, cx: &ViewContext) -> Rows {
-        match &self.audit {
-            Some(audit) => audit.drawn_rows(),
-            None => Rows::of(cx.session.users.iter().map(|row| (&row.user, state(cx, row))), self.place(cx)),
-        }
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
+        Some(self.audit.as_ref().map_or(&self.list as &dyn ListPage, |audit| audit))
+    }
+
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
+        Some(self.audit.as_mut().map_or(&mut self.list as &mut dyn ListPage, |audit| audit))
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(audit) = &mut self.audit else { return Vec::new() };
-        audit.ask(cx, &mut self.asked).into_iter().collect()
+        audit.ask(cx, (Tab::Users, &mut self.asked)).into_iter().collect()
     }
 
     fn awaits(&self, number: u32) -> bool {
-        self.audit.as_ref().is_some_and(|audit| audit.rows.query.awaits(number))
+        self.audit.as_ref().is_some_and(|audit| audit.answered.query.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
         if let Some(audit) = &mut self.audit {
-            audit.on_answer(cx, number, &answer);
+            audit.answered.on_answer(cx, number, &answer);
         }
         Vec::new()
     }
@@ -89,9 +89,14 @@ impl TabView for Users {
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
+        let mut canvas = Canvas::new(frame.buffer_mut(), area);
         match &self.audit {
-            Some(audit) => audit.view(cx, frame, area),
-            None => view::draw(cx, self.place(cx), frame, area),
+            Some(audit) => audit.view(cx, &mut canvas),
+            None => {
+                let (width, height, users) = (canvas.width(), canvas.height(), self.list.of.height(cx));
+                self.list.view(cx, &mut canvas.part(0, 0, width, users));
+                sessions(cx, &mut canvas.part(0, users, width, height.saturating_sub(users)));
+            }
         }
     }
 
@@ -106,26 +111,17 @@ impl TabView for Users {
 }
 
 impl KeyTable for Users {
-    fn keys(&self, cx: &ViewContext) -> Keys<Users> {
-        match (&self.audit, cx.session.users.as_slice()) {
-            (Some(_), _) => Keys::of(audit::KEYS),
-            (None, []) => Keys::of(&[LIST]),
-            (None, _) => Keys::of(&[&MOVE, LIST]),
-        }
+    fn keys(&self, _cx: &ViewContext) -> Keys<Users> {
+        Keys::of(if self.audit.is_some() { &[audit::KEYS] } else { &[LIST] })
     }
 
     #[cfg(test)]
     fn chords() -> keys::PageChords {
-        vec![("users", Keys::of(&[&MOVE, LIST]).chords()), ("audit", Keys::of(audit::KEYS).chords())]
+        vec![("users", Keys::of(&[LIST]).chords()), ("audit", Keys::of(&[audit::KEYS]).chords())]
     }
 }
 
 impl Users {
-    fn select(&mut self, cx: &ViewContext, motion: Motion) {
-        let room = usize::from(cx.area.height.saturating_sub(1));
-        self.selected.on(motion, cx.session.users.iter().map(|row| row.user.clone()), room);
-    }
-
     fn add(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if !cx.session.users.is_empty() {
             return self.form(cx, |_| UserForm::new(Purpose::Add));
@@ -147,18 +143,60 @@ impl Users {
 
     /// Opens a form about the selected user.
     fn form(&self, cx: &ViewContext, form: impl FnOnce(&UserRow) -> UserForm) -> Vec<UiAction> {
-        let row = cx.session.users.get(self.place(cx));
-        open(row.map(|row| Modal::UserForm(Box::new(form(row)))))
+        open(self.list.selected(cx).map(|row| Modal::UserForm(Box::new(form(&row)))))
     }
 
     /// Lets the audit list act, while it is shown.
     fn in_audit<T: Default>(&mut self, act: impl FnOnce(&mut Audit) -> T) -> T {
         self.audit.as_mut().map(act).unwrap_or_default()
     }
+}
 
-    /// The place of the selected user.
-    fn place(&self, cx: &ViewContext) -> usize {
-        self.selected.place(cx.session.users.iter().map(|row| row.user.clone()))
+/// The users of the station.
+#[derive(Debug, Default)]
+struct UserList;
+
+impl Listing for UserList {
+    type Answer = ();
+    type Row = UserRow;
+    type Id = Arc<str>;
+
+    fn heading<'a>(&self, _cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
+        Heading::new(t!("Users"), t!("No users: a demonstration needs no login."))
+    }
+
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, UserRow>> {
+        cx.session.users.iter().map(Cow::Borrowed).collect()
+    }
+
+    fn id(row: &UserRow) -> Arc<str> {
+        row.user.clone()
+    }
+
+    fn columns(&self, _cx: &ViewContext, room: u16) -> Vec<Column<UserRow>> {
+        let name = (room / 4).clamp(14, 34);
+        vec![
+            left(name - 1, t!("user"), |_, row| row.user.to_string()),
+            left(12, t!("role"), |_, row| rights::title(row.role).to_owned()),
+            left(26, t!("state"), state),
+            left(16, t!("last login"), |cx, row| {
+                row.last_login.map_or(t!("never").to_owned(), |at| draw::local(cx, at, "%Y-%m-%d %H:%M"))
+            }),
+        ]
+    }
+
+    fn style(&self, cx: &ViewContext, row: &UserRow) -> Style {
+        if row.disabled { cx.theme.dim() } else { cx.theme.normal() }
+    }
+
+    fn state(&self, cx: &ViewContext, row: &UserRow) -> String {
+        state(cx, row)
+    }
+
+    /// The terminals have the lower third at the most.
+    fn height(&self, cx: &ViewContext) -> u16 {
+        let (height, terminals) = (cx.area.height, to_u16(cx.session.sessions.len()) + 2);
+        height.saturating_sub(terminals.min(height / 3).max(3.min(height)))
     }
 }
 
@@ -172,5 +210,28 @@ fn state(cx: &ViewContext, row: &UserRow) -> String {
         }
         (false, None, true) => t!("must change password").to_owned(),
         (false, None, false) => t!("active").to_owned(),
+    }
+}
+
+fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
+    let theme = cx.theme;
+    let all = &cx.session.sessions;
+    let width = canvas.width();
+    canvas.run(0, 0, width, '─', theme.dim());
+    canvas.text(1, 0, &t!(" terminals attached {count} ", count = all.len()), theme.dim());
+    let rows = usize::from(canvas.height().saturating_sub(1));
+    let shown = draw::shown(cx, canvas, all.len(), rows);
+    for (y, row) in all.iter().take(shown).enumerate() {
+        let user = row.user.as_deref().unwrap_or("–");
+        let locked = if row.locked { t!("  LOCKED") } else { "" };
+        let text = t!(
+            "{terminal}  {pad}since {clock}  {from}{locked}",
+            terminal = format!("{:>4}", row.terminal),
+            pad = pad(&fit(user, 15), 16),
+            clock = clock(row.since, &cx.def().time_zone),
+            from = said(&row.from),
+            locked
+        );
+        canvas.text(0, to_u16(y) + 1, &fit(&text, width), theme.normal());
     }
 }

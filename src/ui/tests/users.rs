@@ -2,6 +2,7 @@
 
 mod changes;
 mod login;
+mod lists;
 mod lock;
 
 use std::{sync::Arc, time::Duration};

@@ -3,14 +3,8 @@
 use super::*;
 
 impl Alarms {
-    pub(super) fn ask_text(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
-        let prompt = match self.page {
-            Page::Journal => Prompt::new(t!("search the journal"), journal::FORMS, &self.journal.typed()),
-            Page::Active | Page::Suppressed | Page::System | Page::Metrics | Page::Handover => {
-                Prompt::new(t!("show only alarms with"), filter::FORMS, &self.filter.typed())
-            }
-        };
-        open(Modal::Prompt(prompt))
+    pub(super) fn ask_search(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
+        open(Modal::Prompt(Prompt::new(t!("search the journal"), journal::FORMS, &self.journal.filter())))
     }
 
     /// What the alarm watches that the keys of the page are about.

@@ -1,6 +1,6 @@
 //! The journal: alarm events and actions of operators in one list, searched by words and by time.
 
-use super::{filter, span};
+use super::{filter, span, view};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -24,27 +24,137 @@ const EVERY_S: f64 = 5.0;
 /// What may be typed, for the entry window.
 pub const FORMS: &str = "words of tag, message, user; a time or a day:  TIC-1 anna   06:00-14:00   2026-11-20";
 
-/// State of the page.
+/// The page.
+pub type Journal = List<Events>;
+
+/// What is listed.
 #[derive(Debug, Default)]
-pub struct Journal {
+pub struct Events {
     pub alarms: Answered<Vec<AlarmRecord>>,
     pub actions: Answered<Vec<ActionRecord>>,
-    scroll: Scroll,
-    /// Words that must all be found in a row.
-    words: Words,
     /// Alarms of this area, and actions on the devices that have them.
     area: Option<String>,
     /// The chosen period; `None` is the last 24 hours.
     period: Option<Period>,
     /// Also the events of which nothing was annunciated.
     quiet: bool,
+    /// Rows of each kind that were asked for.
+    limit: Option<usize>,
+}
+
+/// An alarm event or an action in words.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    at: Timestamp,
+    text: String,
+    /// What is searched beside the text: what is cut off is found too.
+    whole: String,
+    is_action: bool,
+    /// Nothing of it was annunciated.
+    is_quiet: bool,
+}
+
+impl Listing for Events {
+    type Answer = ();
+    type Row = Entry;
+    type Id = (Timestamp, String);
+
+    const MARKS: bool = true;
+    const SORTS: bool = false;
+    const ACTS: bool = false;
+
+    fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
+        let period = self.period.as_ref().map_or(t!("last 24 hours").to_owned(), |period| period::words(cx, period));
+        let mut what = vec![period];
+        what.extend(self.area.as_ref().map(|area| t!("area {area}", area)));
+        let (alarms, actions) = (self.alarms.value.as_ref(), self.actions.value.as_ref());
+        if [alarms.map_or(0, Vec::len), actions.map_or(0, Vec::len)]
+            .iter()
+            .any(|count| self.limit.is_some_and(|most| most <= *count))
+        {
+            what.push(t!("the oldest omitted").to_owned());
+        }
+        if let times @ 1.. = cx.snapshot.history.epoch {
+            let often = if times == 1 { t!("once").to_owned() } else { t!("{times} times", times) };
+            what.push(t!("clock set {often} (epoch {times})", often, times));
+        }
+        if let hidden @ 1.. = self.hidden(cx) {
+            what.push(t!("{hidden} not annunciated hidden, d shows them", hidden));
+        }
+        let is_answered = alarms.is_some() || actions.is_some();
+        let trouble = self.alarms.trouble.as_ref().or(self.actions.trouble.as_ref());
+        let empty = if self.area.is_none() { t!("No entries.") } else { t!("No matching entries.") };
+        Heading::new(t!("Journal"), empty).words(what.join(", "), cx.theme.normal()).asked(trouble, !is_answered)
+    }
+
+    /// Alarms and operator actions in one list, newest first.
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, Entry>> {
+        let mut rows = self.entries(cx);
+        rows.retain(|row| self.quiet || !row.is_quiet);
+        rows.into_iter().map(Cow::Owned).collect()
+    }
+
+    fn id(row: &Entry) -> (Timestamp, String) {
+        (row.at, row.text.clone())
+    }
+
+    fn holds(row: &Entry, (at, text): &(Timestamp, String)) -> bool {
+        row.at == *at && row.text == *text
+    }
+
+    fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<Entry>> {
+        vec![
+            left(9, "", |cx, row: &Entry| moment(row.at, cx.now, &cx.def().time_zone)).dim(),
+            rest(0, "", |_, row, room| fit_words(&row.text, room.saturating_sub(1))),
+        ]
+    }
+
+    fn searched(&self, row: &Entry) -> Option<String> {
+        Some(row.whole.clone())
+    }
+
+    fn style(&self, cx: &ViewContext, row: &Entry) -> Style {
+        if row.is_action { cx.theme.strong() } else { cx.theme.normal() }
+    }
+
+    fn height(&self, cx: &ViewContext) -> u16 {
+        view::body(cx)
+    }
+
+    fn moment(&self, row: &Entry) -> Option<Timestamp> {
+        Some(row.at)
+    }
+}
+
+impl Events {
+    fn entries(&self, cx: &ViewContext) -> Vec<Entry> {
+        let area = self.area.as_ref().map(|area| InArea::new(cx.def(), area));
+        let alarms = self.alarms.value.iter().flatten();
+        let alarms = alarms.filter(|row| area.as_ref().is_none_or(|area| area.has_alarm(row))).map(|row| {
+            let text = alarm_text(cx, row);
+            let whole = format!("{text} {} {}", row.subject, translate(&row.message));
+            Entry { at: row.at, text, whole, is_action: false, is_quiet: row.event.is_quiet() }
+        });
+        let actions = self.actions.value.iter().flatten();
+        let actions = actions.filter(|row| area.as_ref().is_none_or(|area| area.has_action(row))).map(|row| {
+            let text = action_text(cx, row);
+            Entry { at: row.at, whole: text.clone(), text, is_action: true, is_quiet: false }
+        });
+        let mut rows: Vec<Entry> = alarms.chain(actions).collect();
+        rows.sort_by_key(|row| std::cmp::Reverse(row.at));
+        rows
+    }
+
+    /// How many events are hidden because nothing of them was annunciated.
+    fn hidden(&self, cx: &ViewContext) -> usize {
+        if self.quiet { 0 } else { self.entries(cx).iter().filter(|row| row.is_quiet).count() }
+    }
 }
 
 impl Journal {
     /// Searches for these words in the last 24 hours.
-    pub fn search_for(&mut self, words: &str) {
-        self.words = Words::parse(words);
-        self.show(None);
+    pub fn search_for(&mut self, cx: &ViewContext, words: &str) {
+        self.show(cx, words, None);
     }
 
     /// What was typed: words, and what looks like a time is the period.
@@ -55,145 +165,48 @@ impl Journal {
             true => None,
             false => Some(period::typed(cx.def(), &times.join(" "), cx.now)?),
         };
-        self.words = Words::parse(&words.join(" "));
-        self.show(period);
+        self.show(cx, &words.join(" "), period);
         Ok(())
-    }
-
-    /// What is searched for.
-    pub fn typed(&self) -> String {
-        self.words.to_string()
     }
 
     /// So many shifts later; `0` is everything of the last 24 hours.
     pub fn shift(&mut self, cx: &ViewContext, by: isize) {
+        let words = if by == 0 { String::new() } else { self.filter() };
         if by == 0 {
-            (self.words, self.area) = (Words::default(), None);
+            self.of.area = None;
         }
-        self.show(period::step(cx, self.period.as_ref(), by));
+        self.show(cx, &words, period::step(cx, self.of.period.as_ref(), by));
     }
 
     /// Shows the next area, and all of them after the last.
     pub fn next_area(&mut self, cx: &ViewContext) {
-        (self.area, self.scroll) = (filter::area_after(cx.def(), self.area.as_ref()), Scroll::default());
+        self.of.area = filter::area_after(cx.def(), self.of.area.as_ref());
     }
 
     /// Shows the events of which nothing was annunciated, or hides them.
     pub fn toggle_quiet(&mut self) {
-        (self.quiet, self.scroll) = (!self.quiet, Scroll::default());
-    }
-
-    /// Scrolls.
-    pub fn step(&mut self, cx: &ViewContext, motion: Motion, room: usize) {
-        self.scroll.on(motion, self.rows(cx).len(), room);
-    }
-
-    /// The instant of the first row on the screen: rows are not selected.
-    pub fn moment(&self, cx: &ViewContext) -> Option<Timestamp> {
-        let (rows, room) = (self.rows(cx), usize::from(cx.area.height.saturating_sub(2)));
-        rows.get(self.scroll.first(rows.len(), room)).map(|(at, ..)| *at)
+        self.of.quiet = !self.of.quiet;
     }
 
     /// Other rows are wanted; those of before must not stand under their heading.
-    fn show(&mut self, period: Option<Period>) {
-        let (words, area) = (std::mem::take(&mut self.words), self.area.take());
-        *self = Journal { words, area, period, quiet: self.quiet, ..Journal::default() };
-    }
-
-    fn limit(&self) -> usize {
-        if self.words.is_empty() { ROWS } else { SEARCHED_ROWS }
+    fn show(&mut self, cx: &ViewContext, words: &str, period: Option<Period>) {
+        let (area, quiet) = (self.of.area.take(), self.of.quiet);
+        *self = List::new(Events { area, period, quiet, ..Events::default() });
+        self.set_filter(cx, words);
     }
 
     /// Asks the history if it is time.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
+    pub fn ask_both(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
+        let limit = if self.is_filtered() { SEARCHED_ROWS } else { ROWS };
+        self.of.limit = Some(limit);
+        let Events { alarms, actions, period, .. } = &mut self.of;
         let to = cx.now + SignedDuration::from_secs(1);
         let end = |period: &Period| if cx.is_past() { period.to.min(to) } else { period.to };
-        let (from, to) = self.period.as_ref().map_or((to - SPAN, to), |period| (period.from, end(period)));
-        let limit = self.limit();
-        let (alarms, actions) = (Query::Journal { from, to, limit }, Query::Actions { from, to, limit });
-        let alarms = span::ask(cx, &mut self.alarms, number, EVERY_S, self.period.as_ref(), alarms);
-        let actions = span::ask(cx, &mut self.actions, number, EVERY_S, self.period.as_ref(), actions);
-        alarms.into_iter().chain(actions).collect()
-    }
-
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
-        let theme = cx.theme;
-        let x = canvas.text(1, 0, t!("Journal  "), theme.strong());
-        let rows = self.rows(cx);
-        let (alarms, actions) = self.records();
-        let all = alarms.iter().filter(|row| self.quiet || !row.event.is_quiet()).count() + actions.len();
-        let period = self.period.as_ref().map_or(t!("last 24 hours").to_owned(), |period| period::words(cx, period));
-        let mut what = vec![period];
-        what.extend(self.area.as_ref().map(|area| t!("area {area}", area)));
-        if !self.words.is_empty() {
-            what.push(t!("\"{typed}\": {count} of {all}, / changes it", typed = self.typed(), count = rows.len(), all));
-        }
-        if alarms.len() >= self.limit() || actions.len() >= self.limit() {
-            what.push(t!("the oldest omitted").to_owned());
-        }
-        if let times @ 1.. = cx.snapshot.history.epoch {
-            let often = if times == 1 { t!("once").to_owned() } else { t!("{times} times", times) };
-            what.push(t!("clock set {often} (epoch {times})", often, times));
-        }
-        if let hidden @ 1.. = self.hidden(cx) {
-            what.push(t!("{hidden} not annunciated hidden, d shows them", hidden));
-        }
-        let x = canvas.text(x, 0, &what.join(", "), theme.normal());
-        if let Some(trouble) = self.alarms.trouble.as_ref().or(self.actions.trouble.as_ref()) {
-            canvas.text(x + 2, 0, trouble, theme.trouble());
-        }
-        if rows.is_empty() {
-            let answered = self.alarms.value.is_some() || self.actions.value.is_some();
-            let words = match (answered, self.words.is_empty() && self.area.is_none()) {
-                (false, _) => t!("collecting data"),
-                (true, true) => t!("No entries."),
-                (true, false) => t!("No matching entries."),
-            };
-            canvas.text(6, 2, words, theme.normal());
-            return;
-        }
-        let (width, room) = (canvas.width(), usize::from(canvas.height().saturating_sub(1)));
-        let first = self.scroll.first(rows.len(), room);
-        for (y, _, (at, text, style)) in on_screen(&rows, first, room) {
-            let x = canvas.text(1, y + 1, &pad(&moment(*at, cx.now, &cx.def().time_zone), 10), theme.dim());
-            canvas.text(x, y + 1, &fit_words(text, width.saturating_sub(x + 1)), *style);
-        }
-    }
-
-    /// How many events are hidden because nothing of them was annunciated.
-    fn hidden(&self, cx: &ViewContext) -> usize {
-        if self.quiet { 0 } else { self.alarm_rows(cx).filter(|(row, _)| row.event.is_quiet()).count() }
-    }
-
-    fn records(&self) -> (&[AlarmRecord], &[ActionRecord]) {
-        (self.alarms.value.as_deref().unwrap_or_default(), self.actions.value.as_deref().unwrap_or_default())
-    }
-
-    /// The alarm events that are searched for, with their words.
-    fn alarm_rows<'a>(&'a self, cx: &'a ViewContext) -> impl Iterator<Item = (&'a AlarmRecord, String)> {
-        let area = self.area.as_ref().map(|area| InArea::new(cx.def(), area));
-        let alarms = self.records().0.iter();
-        let alarms = alarms.filter(move |row| area.as_ref().is_none_or(|area| area.has_alarm(row)));
-        alarms.filter_map(|row| {
-            let text = alarm_text(cx, row);
-            // What is cut off is found too.
-            let whole = format!("{text} {} {}", row.subject, translate(&row.message));
-            self.words.fit(&whole).then_some((row, text))
-        })
-    }
-
-    /// Alarms and operator actions in one list, newest first.
-    fn rows(&self, cx: &ViewContext) -> Vec<(Timestamp, String, Style)> {
-        let (_, actions) = self.records();
-        let area = self.area.as_ref().map(|area| InArea::new(cx.def(), area));
-        let actions = actions.iter().filter(|row| area.as_ref().is_none_or(|area| area.has_action(row)));
-        let alarms = self.alarm_rows(cx).filter(|(row, _)| self.quiet || !row.event.is_quiet());
-        let alarms = alarms.map(|(row, text)| (row.at, text, cx.theme.normal()));
-        let actions = actions.map(|row| (row.at, action_text(cx, row), cx.theme.strong()));
-        let mut rows: Vec<_> = alarms.chain(actions.filter(|(_, text, _)| self.words.fit(text))).collect();
-        rows.sort_by_key(|row| std::cmp::Reverse(row.0));
-        rows
+        let (from, to) = period.as_ref().map_or((to - SPAN, to), |period| (period.from, end(period)));
+        let queries = (Query::Journal { from, to, limit }, Query::Actions { from, to, limit });
+        let of_alarms = span::ask(cx, alarms, number, EVERY_S, period.as_ref(), queries.0);
+        let of_actions = span::ask(cx, actions, number, EVERY_S, period.as_ref(), queries.1);
+        of_alarms.into_iter().chain(of_actions).collect()
     }
 }
 

@@ -39,7 +39,7 @@ const ACTIONS: [Key; 11] = [
         actions::shelve(cx, &alarms.meant(cx))
     })
     .needs(Role::Technician),
-    Key::new(char('/'), "filter", "show only alarms with these words; Esc: show all", Alarms::ask_text),
+    Key::new(char('/'), "filter", "show only alarms with these words; Esc: show all", listing::ask_filter),
     Key::new(char('p'), "page", "acknowledge all on this page of the list (asks first)", |alarms, cx| {
         actions::acknowledge_all(cx, alarms.seen(cx).into_iter(), false)
     })
@@ -94,7 +94,7 @@ const GO: [Key; 5] = [
 ];
 
 const BACK: [Key; 1] = [Key::new(char('u'), "return", "unshelve, or return to service", |alarms, cx| {
-    alarms.suppressed(cx).map_or_else(Vec::new, |alarm| actions::put_back(cx, alarm))
+    alarms.suppressed(cx).map_or_else(Vec::new, |alarm| actions::put_back(cx, &alarm))
 })
 .when(|alarms, cx| {
     let state = alarms.suppressed(cx).map(|alarm| alarm.state);
@@ -103,7 +103,12 @@ const BACK: [Key; 1] = [Key::new(char('u'), "return", "unshelve, or return to se
 .needs(Role::Technician)];
 
 const SEARCH: [Key; 2] = [
-    Key::new(char('/'), "search", "search by words of tag, message, user; and by time: 06:00-14:00", Alarms::ask_text),
+    Key::new(
+        char('/'),
+        "search",
+        "search by words of tag, message, user; and by time: 06:00-14:00",
+        Alarms::ask_search,
+    ),
     Key::change(char('j'), "list", "back to the list", Alarms::turn_to_journal),
 ];
 

@@ -6,21 +6,20 @@ impl Alarms {
     /// The alarms whose rows are on the screen.
     pub(super) fn seen<'a>(&self, cx: &ViewContext<'a>) -> Vec<&'a ActiveAlarm> {
         let rows = self.rows(cx);
-        let room = self.page_rows(cx);
+        let room = view::room(cx, cx.area.width, cx.area.height);
         let first = first(self.place(&rows), rows.len(), room);
         rows.into_iter().skip(first).take(room).map(|row| row.alarm).collect()
     }
 
     pub(super) fn step(&mut self, cx: &ViewContext, motion: Motion) {
-        let room = self.page_rows(cx);
-        let ids: Vec<AlarmId> = match self.page {
-            Page::Active | Page::System => self.rows(cx).iter().map(|row| row.alarm.id).collect(),
-            Page::Suppressed => cx.snapshot.suppressed.iter().map(|alarm| alarm.id).collect(),
-            Page::Journal => return self.journal.step(cx, motion, room),
-            Page::Metrics => return self.metrics.step(cx, motion, room),
-            Page::Handover => return self.handover.step(cx, motion, room),
-        };
-        self.selected.on(motion, ids, room);
+        let room = usize::from(cx.area.height.saturating_sub(3)).max(1);
+        match self.page {
+            Page::Metrics => self.metrics.step(cx, motion, room),
+            Page::Handover => self.handover.step(cx, motion, room),
+            Page::Active | Page::Suppressed | Page::System | Page::Journal => {
+                self.list_mut(cx).into_iter().for_each(|list| list.step(cx, motion));
+            }
+        }
     }
 
     /// Folds the first-out group that the selected alarm belongs to, or shows what is folded.
@@ -52,7 +51,7 @@ impl Alarms {
             Some(place) => drop(self.marked.remove(place)),
             None => self.marked.push(id),
         }
-        self.step(cx, Motion::Rows(1));
+        ListPage::step(self, cx, Motion::Rows(1));
     }
 
     /// The marked alarms, in the order of the list.

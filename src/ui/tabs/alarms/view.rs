@@ -5,10 +5,7 @@ use ratatui::style::Modifier;
 use super::{Alarms, Page, columns::Columns, guidance, handover::suppressed_words, list::Row, on_page, side};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{
-        def::AlarmId,
-        snapshot::{ActiveAlarm, SuppressedAlarm},
-    },
+    plant::{def::AlarmId, snapshot::ActiveAlarm},
     ui::{chrome::history_text, layout::Size, preferences::Bell},
 };
 
@@ -46,10 +43,9 @@ fn trouble_rows(cx: &ViewContext, width: u16, height: u16) -> Vec<(String, Style
 }
 
 /// Rows of a list on a tab of this size.
-pub(super) fn room(tab: &Alarms, cx: &ViewContext, width: u16, height: u16) -> usize {
+pub(super) fn room(cx: &ViewContext, width: u16, height: u16) -> usize {
     let height = height.saturating_sub(to_u16(trouble_rows(cx, width, height).len()));
-    let below = if tab.page == Page::Suppressed { guide(height).min(6) } else { below(cx, height) };
-    usize::from(height.saturating_sub(HEAD + below)).max(1)
+    usize::from(height.saturating_sub(HEAD + below(cx, height))).max(1)
 }
 
 /// Rows of the guidance on a tab of this height.
@@ -235,29 +231,19 @@ fn filter_line(
 }
 
 fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
-    let theme = cx.theme;
-    let (width, height) = (canvas.width(), canvas.height());
-    let all: &[SuppressedAlarm] = &cx.snapshot.suppressed;
-    canvas.text(1, 0, t!("Evaluated and journaled, but not annunciated. u: unsuppress."), theme.dim());
-    if all.is_empty() {
-        canvas.text(6, 2, t!("No suppressed alarms."), theme.normal());
-        return;
-    }
-    let place =
-        tab.suppressed(cx).and_then(|suppressed| all.iter().position(|other| other.id == suppressed.id)).unwrap_or(0);
-    let guide = guide(height + 1).min(6);
-    let room = usize::from(height.saturating_sub(1 + guide)).max(1);
-    let first = first(place, all.len(), room);
-    for (y, n, suppressed) in on_screen(all, first, room) {
-        let style = if suppressed.active { theme.strong() } else { theme.normal() };
-        let style = if n == place { theme.focus() } else { style };
-        let text = format!("{} {}", theme.state_mark(suppressed.state), suppressed_words(cx, suppressed));
-        canvas.text(1, y + 1, &fit_words(&text, width.saturating_sub(2)), style);
-    }
-    if all.len() > first + room {
-        let end = width.saturating_sub(1);
-        canvas.text_right(end, 0, &t!("{count} more below", count = all.len() - first - room), theme.strong());
-    }
-    let used = 1 + to_u16(all.len().min(room));
-    guidance_below(cx, canvas, (used, guide), all[place].id, None, suppressed_words(cx, &all[place]));
+    tab.suppressed.view(cx, canvas);
+    let Some(alarm) = tab.suppressed.selected(cx) else { return };
+    let (used, least) = (tab.suppressed.used(cx), guide_of_suppressed(cx));
+    guidance_below(cx, canvas, (used, least), alarm.id, None, suppressed_words(cx, &alarm));
+}
+
+/// Rows below the views.
+pub(super) fn body(cx: &ViewContext) -> u16 {
+    let above = trouble_rows(cx, cx.area.width, cx.area.height).len();
+    cx.area.height.saturating_sub(1 + to_u16(above))
+}
+
+/// Rows of the guidance below the suppressed alarms, at least.
+pub(super) fn guide_of_suppressed(cx: &ViewContext) -> u16 {
+    guide(body(cx) + 1).min(6)
 }

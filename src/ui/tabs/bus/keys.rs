@@ -44,12 +44,8 @@ const LINE: &[Key] = &[
     .when(sends),
 ];
 const PLAN: &[Key] = &[
-    Key::new(code(KeyCode::Enter), "tags", "the tags of the block", |bus, cx| {
-        bus.on_line(cx, |bus, at| bus.plan.open(at).into_iter().collect())
-    }),
-    Key::new(char('w'), "why", "explain the values of the block", |bus, cx| {
-        bus.on_line(cx, |bus, at| bus.plan.why(cx, at))
-    }),
+    Key::new(code(KeyCode::Enter), "tags", "the tags of the block", |bus, cx| bus.plan.open(cx).into_iter().collect()),
+    Key::new(char('w'), "why", "explain the values of the block", |bus, cx| bus.plan.why(cx)),
 ];
 const FRAMES: &[Key] = &[
     Key::new(char(' '), "pause", "pause or resume", |bus, cx| {

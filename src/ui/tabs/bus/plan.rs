@@ -3,7 +3,6 @@
 use super::{
     LineView, Window,
     line::{grouped, ms, short_ms},
-    rows::{self, plain},
     window::{Shown, TextWindow},
 };
 use crate::ui::tabs::prelude::*;
@@ -16,124 +15,135 @@ use crate::{
     },
 };
 
-/// Rows below the table that describe the selected block.
-const DETAIL: u16 = 7;
+/// The page.
+pub type Plan = List<Blocks>;
 
-/// Which block is selected.
-#[derive(Debug, Default)]
-pub struct Plan {
-    selected: usize,
+/// The blocks of the read plan of a line.
+#[derive(Debug)]
+pub struct Blocks {
+    /// The line.
+    pub line: LineId,
+}
+
+impl Blocks {
+    fn report<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a LineReport> {
+        LineView::new(cx, self.line)?.report
+    }
+}
+
+impl Listing for Blocks {
+    type Answer = ();
+    type Row = PollReport;
+    type Id = (DeviceId, Table, u16);
+
+    fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
+        let heading = Heading::new(
+            "",
+            match cx.def().listens_on(self.line) {
+                true => t!("this line only listens: another master polls it"),
+                false => t!("nothing is polled on this line yet"),
+            },
+        );
+        let Some(report) = self.report(cx).filter(|report| !report.polls.is_empty()) else { return heading };
+        let (summary, over) = summary(report);
+        heading.words(summary, row_style(cx, false, over))
+    }
+
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, PollReport>> {
+        self.report(cx).into_iter().flat_map(|report| &report.polls).map(Cow::Borrowed).collect()
+    }
+
+    fn id(poll: &PollReport) -> (DeviceId, Table, u16) {
+        (poll.device, poll.table, poll.address)
+    }
+
+    fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<PollReport>> {
+        fn span(span: Option<Duration>) -> String {
+            span.map_or("–".to_owned(), short_ms)
+        }
+        vec![
+            Column::words("", |_, poll| if ill(poll) { "!" } else { " " }.to_owned()),
+            Column::words(t!("device"), |cx, poll: &PollReport| cx.def().device(poll.device).name.clone()),
+            Column::words(t!("function"), |_, poll: &PollReport| {
+                let code = poll.table.read_fc();
+                format!("{code} / 0x{code:02X}")
+            })
+            .rank(1),
+            Column::words(t!("registers"), |_, poll: &PollReport| {
+                names::span(poll.table.read_fc(), poll.address, poll.count)
+            })
+            .by(|a, b| (a.table, a.address).cmp(&(b.table, b.address))),
+            Column::words(t!("wire"), |_, poll: &PollReport| format!("0x{:04X}", poll.address))
+                .rank(2)
+                .by(|a, b| a.address.cmp(&b.address)),
+            Column::number(t!("n"), |_, poll: &PollReport| poll.count.to_string()).rank(3),
+            Column::number(t!("tags"), |_, poll: &PollReport| poll.tags.len().to_string()).rank(8),
+            Column::number(t!("every"), |_, poll| pace(poll)).rank(2),
+            Column::number(t!("ms"), |_, poll: &PollReport| short_ms(poll.cost)).rank(4).by(|a, b| a.cost.cmp(&b.cost)),
+            Column::number(t!("next"), |cx, poll: &PollReport| {
+                poll.next.map_or("–".to_owned(), |next| format!("{:.1}", elapsed(cx.now, next).as_secs_f64()))
+            })
+            .rank(6)
+            .by(|a, b| a.next.cmp(&b.next)),
+            Column::number(t!("ok"), |_, poll: &PollReport| grouped(poll.stats.ok))
+                .rank(1)
+                .by(|a, b| a.stats.ok.cmp(&b.stats.ok)),
+            Column::number(t!("failed"), |_, poll: &PollReport| grouped(failed(poll)))
+                .rank(1)
+                .by(|a, b| failed(a).cmp(&failed(b))),
+            Column::number(t!("reply"), |_, poll: &PollReport| span(poll.stats.response_time.last()))
+                .rank(3)
+                .by(|a, b| a.stats.response_time.last().cmp(&b.stats.response_time.last())),
+            Column::number(t!("late"), |_, poll: &PollReport| span(poll.stats.jitter.max()))
+                .rank(7)
+                .by(|a, b| a.stats.jitter.max().cmp(&b.stats.jitter.max())),
+            Column::number(t!("missed"), |_, poll: &PollReport| grouped(poll.stats.missed))
+                .rank(9)
+                .by(|a, b| a.stats.missed.cmp(&b.stats.missed)),
+        ]
+    }
+
+    fn style(&self, cx: &ViewContext, poll: &PollReport) -> Style {
+        row_style(cx, false, ill(poll))
+    }
+
+    fn details(&self, cx: &ViewContext, poll: &PollReport, _: Option<&()>) -> Vec<(String, Style)> {
+        let lines = self.report(cx).map_or(Vec::new(), |report| detail(cx, report, poll));
+        let styled = |line: String| {
+            let style = row_style(cx, false, line.starts_with('!'));
+            (line, style)
+        };
+        lines.into_iter().map(styled).collect()
+    }
+
+    /// The pages and the line stand above.
+    fn height(&self, cx: &ViewContext) -> u16 {
+        cx.area.height.saturating_sub(1)
+    }
 }
 
 impl Plan {
-    /// Moves the selection.
-    pub fn scroll(&mut self, at: &LineView, motion: Motion, room: usize) {
-        self.selected = motion.to(self.selected, at.report.map_or(0, |report| report.polls.len()), room);
-    }
-
-    /// The list that keys act on.
-    pub fn drawn_rows(&self, at: &LineView) -> Rows {
-        let polls = at.report.map_or(&[][..], |report| &report.polls);
-        Rows::of(polls.iter().map(|poll| &poll.tags), self.selected)
-    }
-
     /// Device, table and first address of the selected block.
-    pub fn place(&self, at: &LineView) -> Option<(DeviceId, Table, u16)> {
-        at.report?.polls.get(self.selected).map(|poll| (poll.device, poll.table, poll.address))
+    pub fn block(&self, cx: &ViewContext) -> Option<(DeviceId, Table, u16)> {
+        self.selected(cx).map(|poll| Blocks::id(&poll))
     }
 
     /// The tags of the selected block.
-    pub fn open(&self, at: &LineView) -> Option<UiAction> {
-        let poll = at.report?.polls.get(self.selected)?;
-        let shown = Shown::Block { line: at.id, device: poll.device, table: poll.table, address: poll.address };
+    pub fn open(&self, cx: &ViewContext) -> Option<UiAction> {
+        let (device, table, address) = self.block(cx)?;
+        let shown = Shown::Block { line: self.of.line, device, table, address };
         Some(Window::Text(TextWindow::new(shown)).open())
     }
 
     /// Why the values of the selected block are what they are, beginning with one that is not good.
-    pub fn why(&self, cx: &ViewContext, at: &LineView) -> Vec<UiAction> {
-        let poll = at.report.and_then(|report| report.polls.get(self.selected));
-        Why::open(Why::of_all(cx, poll.map(|poll| poll.tags.to_vec()).unwrap_or_default()))
-    }
-
-    /// Draws it.
-    pub fn view(&self, cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
-        let theme = cx.theme;
-        let Some(report) = at.report.filter(|report| !report.polls.is_empty()) else {
-            let words = match at.settings.listens {
-                true => t!("this line only listens: another master polls it"),
-                false => t!("nothing is polled on this line yet"),
-            };
-            canvas.text(1, 0, words, theme.normal());
-            return;
-        };
-        let (width, height) = (canvas.width(), canvas.height());
-        let (summary, over) = summary(report);
-        let style = if over { theme.trouble() } else { theme.normal() };
-        canvas.text(1, 0, &fit_words(&summary, width.saturating_sub(14)), style);
-        let lines: Vec<_> = report.polls.iter().map(|poll| cells(cx, poll)).collect();
-        let (heading, lines) = rows::table(&COLUMNS, &lines, width.saturating_sub(2));
-        canvas.text(1, 1, &heading, theme.dim());
-        let room = usize::from(height.saturating_sub(2 + DETAIL)).max(1);
-        let selected = self.selected.min(lines.len() - 1);
-        let first = list::first(selected, lines.len(), room);
-        for (y, n) in (first..lines.len()).take(room).enumerate() {
-            canvas.text(1, 2 + to_u16(y), &lines[n], row_style(cx, n == selected, ill(&report.polls[n])));
-        }
-        let below = lines.len().saturating_sub(first + room);
-        if 0 < below {
-            canvas.text_right(width.saturating_sub(1), 0, &t!(" {below} more ▼", below), theme.strong());
-        }
-        let bottom = (2 + to_u16(lines.len().min(room))).min(height.saturating_sub(DETAIL - 1));
-        let details = detail(cx, report, &report.polls[selected]);
-        let style = |line: &str| if line.starts_with('!') { theme.trouble() } else { theme.normal() };
-        let rows = details.iter().flat_map(|line| {
-            let parts = wrap(line, width.saturating_sub(2));
-            parts.into_iter().map(move |part| plain(part, style(line)))
-        });
-        let mut below = canvas.part(0, bottom + 1, width, height.saturating_sub(bottom + 1));
-        rows::draw(cx, &mut below, &rows.collect::<Vec<_>>(), 0);
+    pub fn why(&self, cx: &ViewContext) -> Vec<UiAction> {
+        let tags = self.selected(cx).map(|poll| poll.tags.to_vec());
+        Why::open(Why::of_all(cx, tags.unwrap_or_default()))
     }
 }
 
-const COLUMNS: [rows::Column; 15] = [
-    rows::words("", 0),
-    rows::words("device", 0),
-    rows::words("function", 1),
-    rows::words("registers", 0),
-    rows::words("wire", 2),
-    rows::number("n", 3),
-    rows::number("tags", 8),
-    rows::number("every", 2),
-    rows::number("ms", 4),
-    rows::number("next", 6),
-    rows::number("ok", 1),
-    rows::number("failed", 1),
-    rows::number("reply", 3),
-    rows::number("late", 7),
-    rows::number("missed", 9),
-];
-
-fn cells(cx: &ViewContext, poll: &PollReport) -> [String; 15] {
-    let (code, stats) = (poll.table.read_fc(), &poll.stats);
-    let span = |span: Option<Duration>| span.map_or("–".to_owned(), short_ms);
-    let next = poll.next.map_or("–".to_owned(), |next| format!("{:.1}", elapsed(cx.now, next).as_secs_f64()));
-    [
-        if ill(poll) { "!" } else { " " }.to_owned(),
-        cx.def().device(poll.device).name.clone(),
-        format!("{code} / 0x{code:02X}"),
-        names::span(code, poll.address, poll.count),
-        format!("0x{:04X}", poll.address),
-        poll.count.to_string(),
-        poll.tags.len().to_string(),
-        pace(poll),
-        short_ms(poll.cost),
-        next,
-        grouped(stats.ok),
-        grouped(stats.requests - stats.ok),
-        span(stats.response_time.last()),
-        span(stats.jitter.max()),
-        grouped(stats.missed),
-    ]
+fn failed(poll: &PollReport) -> u64 {
+    poll.stats.requests - poll.stats.ok
 }
 
 /// `1 s`, `1 s ×1.3` where it is stretched, `left out`.

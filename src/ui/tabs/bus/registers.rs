@@ -7,7 +7,7 @@ impl Bus {
     /// Turns to a page; the registers are those of the device that was chosen.
     pub(super) fn show(&mut self, cx: &ViewContext, page: Page) {
         let Some(at) = LineView::new(cx, self.line).filter(|_| !cx.is_past()) else { return };
-        let block = (self.page == Page::Plan).then(|| self.plan.place(&at)).flatten();
+        let block = (self.page == Page::Plan).then(|| self.plan.block(cx)).flatten();
         let first = || cx.def().devices.iter().find(|device| device.line == at.id).map(|device| device.id);
         let device = block.map(|(device, ..)| device);
         let device = device.or_else(|| first().filter(|_| self.registers.line() != at.id));

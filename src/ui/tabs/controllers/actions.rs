@@ -1,13 +1,13 @@
 //! What keys do with a device on its pages, and the windows that ask before it.
 
 use super::{
-    Asked, Controllers, Page,
+    Controllers, Page,
     compare::Compare,
     guide,
     keys::{run, tune},
     lamps, procedures,
-    runs::Runs,
-    sets::{self, Source},
+    runs::{ControlRuns, Runs},
+    sets::{self, Sets, SetsOf, Source},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -151,12 +151,6 @@ impl Controllers {
             None => Vec::new(),
         }
     }
-
-    pub(super) fn ask_filter(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
-        self.asked_for = Asked::Filter;
-        let (title, hint) = (t!("find a parameter"), t!("words in name or meaning; empty shows all"));
-        open(Modal::Prompt(Prompt::new(title, hint, &self.table.filter.to_string())))
-    }
 }
 
 /// The pages of a device.
@@ -172,13 +166,13 @@ impl Controllers {
     }
 
     pub(super) fn show_sets(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.set = 0;
+        self.sets = Sets::new(SetsOf { device: self.device });
         let past = t!("parameter sets are shown in the present only");
         self.turn_to(cx, Page::Sets, cx.is_past().then_some(past))
     }
 
     pub(super) fn show_runs(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.runs = Runs::default();
+        self.runs = Runs::new(ControlRuns { device: self.device });
         let has_runs = cx.snapshot.has_runs(self.device);
         self.turn_to(cx, Page::Runs, (!has_runs).then_some(t!("this device has no SV and PV")))
     }
@@ -202,8 +196,8 @@ impl Controllers {
 
     /// The selected set against the device.
     pub(super) fn compare(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.on_device(cx, |tab, device| {
-            let Some(source) = sets::sources(cx, device).into_iter().nth(tab.set) else { return Vec::new() };
+        self.on_device(cx, |tab, _| {
+            let Some(source) = tab.sets.selected(cx).map(|row| row.source.clone()) else { return Vec::new() };
             if let Some(notice) = sets::problems(cx, &source) {
                 return open(Modal::Notice(notice));
             }
@@ -230,8 +224,7 @@ impl Controllers {
     }
 
     pub(super) fn ask_set_name(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.on_device(cx, |tab, device| {
-            tab.asked_for = Asked::SetName;
+        self.on_device(cx, |_, device| {
             let title = t!("save the settings of {name} as a set", name = device.name);
             open(Modal::Prompt(Prompt::new(title, sets::save_hint(cx, device.id), "")))
         })

@@ -92,7 +92,7 @@ const DEVICE: &[Key] = &[
     ACTIONS,
     WHY,
     REFRESH,
-    Key::new(char('/'), "find", "show only parameters with some words in name or meaning", Controllers::ask_filter),
+    Key::new(char('/'), "find", "show only parameters with some words in name or meaning", listing::ask_filter),
     Key::change(char('d'), "defaults", "mark differences from the factory default", |tab, _| {
         tab.table.defaults = !tab.table.defaults;
     })
@@ -184,10 +184,6 @@ const COMPARE: &[Key] = &[
 ];
 const RUNS: &[Key] = &[
     Key::change(char('o'), "overlay", "the curves of the marked runs over each other", Controllers::swap_overlay),
-    Key::change(char(' '), "mark", "mark the run for the overlay", |tab, _| tab.runs.mark()),
-    Key::new(char('t'), "trend", "the curves of its time", |tab, cx| {
-        tab.runs.trend(cx, tab.device).into_iter().collect()
-    }),
     GUIDE,
     BACK,
 ];
@@ -250,10 +246,10 @@ fn table(page: &Page) -> Keys<Controllers> {
         Page::Device => &[DEVICE_FIRST, &SELECT, DEVICE],
         Page::Lamps => &[LAMPS],
         Page::Program => &[PROGRAM_FIRST, &SELECT, PROGRAM],
-        Page::Sets => &[&SELECT, SETS],
+        Page::Sets => &[SETS],
         Page::Compare(_) => &[&SCROLL, COMPARE],
-        Page::Runs => &[&SELECT, RUNS],
-        Page::Procedures => &[&SELECT, PROCEDURES],
+        Page::Runs => &[RUNS],
+        Page::Procedures => &[PROCEDURES],
         Page::Overlay(_) => &[OVERLAY],
         Page::Guide(..) => &[READ],
     })

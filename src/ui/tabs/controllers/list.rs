@@ -37,11 +37,11 @@ impl Columns {
     }
 }
 
-/// Draws the list with this row selected.
-pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize) {
-    let (theme, devices) = (cx.theme, &cx.def().devices);
+/// Draws the list of these devices with this one selected.
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, (devices, selected): (&[&DeviceDef], usize), found: &str) {
+    let theme = cx.theme;
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
-    canvas.text(1, 0, &fit_words(&summary(cx), end), theme.normal());
+    canvas.text(1, 0, &fit_words(&summary(cx, found), end), theme.normal());
     let columns = Columns::new(cx, canvas.width());
     put(canvas, 1, heading(&columns, theme.dim()));
     let room = usize::from(bottom.saturating_sub(3)).max(1);
@@ -68,8 +68,8 @@ pub fn foot(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
     canvas.text(x, bottom, &fit_words(&words, end.saturating_sub(x)), style);
 }
 
-/// `31 devices   2 not responding   1 with alarms`.
-pub fn summary(cx: &ViewContext) -> String {
+/// `31 devices   2 not responding   1 with alarms`, behind the words of the filter.
+pub fn summary(cx: &ViewContext, found: &str) -> String {
     let devices = &cx.def().devices;
     let down = devices.iter().filter(|device| {
         let status = cx.snapshot.device(device.id);
@@ -85,7 +85,7 @@ pub fn summary(cx: &ViewContext) -> String {
             words.push_str(&format!("   {count} {what}"));
         }
     }
-    words
+    if found.is_empty() { words } else { t!("only \"{filter}\", Esc shows all", filter = found) + "   " + &words }
 }
 
 /// The cells of a row from the left: text, width, style. What does not fit as a whole is left out, the last first.

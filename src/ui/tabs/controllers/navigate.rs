@@ -5,27 +5,27 @@ use super::*;
 impl Controllers {
     pub(super) fn step(&mut self, cx: &ViewContext, motion: Motion) {
         let Some(device) = self.device(cx) else { return };
-        let wall = (self.page == Page::List && self.is_wall(cx))
-            .then(|| wall::Grid::new(cx.size, cx.area, cx.def().devices.len()));
+        let listed = self.listed(cx);
+        let wall =
+            (self.page == Page::List && self.is_wall(cx)).then(|| wall::Grid::new(cx.size, cx.area, listed.len()));
         let room = wall.map_or(usize::from(cx.area.height.saturating_sub(4)).max(1), |grid| grid.rows * grid.columns);
         let to = |at: usize, count: usize| motion.to(at, count, room);
         match &mut self.page {
             Page::List => {
-                let (at, count) = (usize::from(self.device.0), cx.def().devices.len());
-                self.device = DeviceId(to_u16(match (motion, wall) {
+                let (at, count) = (self.place(&listed), listed.len());
+                let place = match (motion, wall) {
                     (Motion::Rows(by), Some(grid)) => grid.step(at, by, count),
                     (Motion::Rows(_) | Motion::Pages(_) | Motion::First | Motion::Last, _) => to(at, count),
-                }));
+                };
+                self.device = listed.get(place).map_or(self.device, |device| device.id);
             }
             Page::Device => self.table.selected = to(self.table.selected, self.table.rows(cx, device.id).len()),
             Page::Program => {
                 let steps = device.program.as_ref().map_or(0, |program| program.steps.len());
                 self.cell.row = to(self.cell.row, steps);
             }
-            Page::Sets => self.set = to(self.set, sets::sources(cx, device).len()),
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
-            Page::Runs => self.runs.select(cx, motion),
-            Page::Procedures => self.procedures.move_by(cx, motion),
+            Page::Sets | Page::Runs | Page::Procedures => {}
             Page::Lamps | Page::Overlay(_) | Page::Guide(..) => {}
         }
     }
@@ -40,7 +40,7 @@ impl Controllers {
         if before == Page::Procedures {
             self.runs.overlay = self.procedures.overlay(cx);
         } else {
-            self.runs.lay_over(cx, self.device);
+            self.runs.lay_over(cx);
         }
         self.page = if self.runs.overlay.is_some() { Page::Overlay(Box::new(before)) } else { before };
     }
@@ -52,7 +52,8 @@ impl Controllers {
 
     /// Selects the faceplate so many to the right.
     pub(super) fn neighbour(&mut self, cx: &ViewContext, by: isize) {
-        let last = cx.def().devices.len().saturating_sub(1);
-        self.device = DeviceId(to_u16(self.device.index().saturating_add_signed(by).min(last)));
+        let listed = self.listed(cx);
+        let place = self.place(&listed).saturating_add_signed(by).min(listed.len().saturating_sub(1));
+        self.device = listed.get(place).map_or(self.device, |device| device.id);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{runs::figures, sets::some_lines};
 use crate::ui::tabs::{
-    overlay::{CURVES_MAX, Overlay},
+    overlay::{Kind, Laid, Overlay},
     prelude::*,
 };
 use crate::{
@@ -18,33 +18,118 @@ use crate::{
 const ROWS: usize = 200;
 /// The list reaches back so far.
 const SPAN: SignedDuration = SignedDuration::from_hours(24 * 90);
-/// How often the runs are refreshed, and when an answer counts as lost (real time).
-const EVERY_S: f64 = 10.0;
-const TIMEOUT_S: f64 = 20.0;
 /// Columns and lines that a window of 24 rows has room for.
 const ROOM: u16 = 68;
 const LINES_MAX: usize = 6;
 
-/// State of the page.
+/// The page.
+pub type Procedures = List<PlantProcedures>;
+
+/// The procedures of the plant.
 #[derive(Debug, Default)]
-pub struct Procedures {
-    runs: Answered<Vec<ControlRun>>,
-    selected: usize,
+pub struct PlantProcedures;
+
+/// A procedure, and the latest run that it has measured under its own name.
+#[derive(Debug, Clone)]
+pub struct Procedure {
+    id: ProcedureId,
+    run: Option<ControlRun>,
 }
 
+impl Procedure {
+    fn figure<const N: usize>(_cx: &ViewContext, procedure: &Procedure) -> String {
+        procedure.run.as_ref().map_or(String::new(), |run| std::mem::take(&mut figures(run)[N]))
+    }
+
+    fn reference<const N: usize>(cx: &ViewContext, procedure: &Procedure) -> String {
+        let decimals = procedure.run.as_ref().map_or(1, |run| run.decimals);
+        let reference = cx.def().procedure(procedure.id).reference.as_ref();
+        reference.map_or(String::new(), |known| std::mem::take(&mut procedures::reference(known, decimals)[N]))
+    }
+}
+
+impl Listing for PlantProcedures {
+    type Answer = Vec<ControlRun>;
+    type Row = Procedure;
+    type Id = ProcedureId;
+
+    fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a Vec<ControlRun>>) -> Heading<'a> {
+        let (words, style) = match cx.snapshot.procedure_at_work() {
+            Some((id, run)) => (
+                t!("{name} is running, started by {by}", name = cx.def().procedure(id).name, by = run.by),
+                cx.theme.strong(),
+            ),
+            None => (t!("one at a time, carried out by the station").to_owned(), cx.theme.normal()),
+        };
+        Heading::new(t!("Procedures"), t!("this plant has no procedures")).words(words, style)
+    }
+
+    fn query(&self, cx: &ViewContext) -> Option<Query> {
+        let to = cx.now + SignedDuration::from_secs(1);
+        Some(Query::ControlRuns { controller: None, from: to - SPAN, to, limit: ROWS })
+    }
+
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, runs: Option<&'a Vec<ControlRun>>) -> Vec<Cow<'a, Procedure>> {
+        let all = cx.def().procedures.iter().enumerate();
+        let row = |(n, def)| Procedure { id: ProcedureId(to_u16(n)), run: run_of(cx, def, runs) };
+        all.map(row).map(Cow::Owned).collect()
+    }
+
+    fn id(procedure: &Procedure) -> ProcedureId {
+        procedure.id
+    }
+
+    fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<Procedure>> {
+        vec![
+            left(13, t!("procedure"), |cx, procedure| cx.def().procedure(procedure.id).name.to_string()),
+            left(17, t!("state"), |cx, procedure| procedures::state(cx.snapshot, procedure.id)),
+            right(7, t!("at SV"), Procedure::figure::<0>),
+            right(7, t!("ref."), Procedure::reference::<0>),
+            right(7, t!("steady"), Procedure::figure::<1>),
+            right(7, t!("ref."), Procedure::reference::<1>),
+            right(5, t!("over"), Procedure::figure::<2>),
+            right(5, t!("ref."), Procedure::reference::<2>),
+        ]
+    }
+
+    fn style(&self, cx: &ViewContext, procedure: &Procedure) -> Style {
+        let run = cx.snapshot.procedures.get(procedure.id.index()).and_then(Option::as_deref);
+        row_style(cx, false, run.is_some_and(ProcedureRun::is_fault))
+    }
+
+    fn details(&self, cx: &ViewContext, procedure: &Procedure, _: Option<&Vec<ControlRun>>) -> Vec<(String, Style)> {
+        let def = cx.def().procedure(procedure.id);
+        let mut texts = vec![(def.about.clone(), false)];
+        texts.extend(procedures::progress(cx.snapshot, procedure.id));
+        if let Some(run) = &procedure.run {
+            let figures = control_runs::figures(run).join(", ");
+            let begin = moment(run.from, cx.now, &cx.def().time_zone);
+            texts.push((format!("{}, {begin}: {figures}", run.label()), false));
+            texts.push((run.settings.to_string(), false));
+        }
+        if let Some(reference) = &def.reference {
+            texts.push((t!("reference: {source}", source = reference.source), false));
+        }
+        texts.into_iter().map(|(text, is_trouble)| (text, row_style(cx, false, is_trouble))).collect()
+    }
+}
+
+/// The latest run that a procedure has measured under its own name.
+fn run_of(cx: &ViewContext, def: &ProcedureDef, runs: Option<&Vec<ControlRun>>) -> Option<ControlRun> {
+    let (controller, label) = def.measured().find(|(_, label)| **label == def.name)?;
+    let is_own = |run: &&ControlRun| run.cause == RunCause::Procedure && run.detail == *label;
+    // That at work is newer than what the history has answered.
+    let live = cx.snapshot.control_run(controller).filter(is_own);
+    let name = cx.def().device(controller).name.as_str();
+    let mut stored = runs.into_iter().flatten().filter(is_own);
+    live.cloned().or_else(|| stored.find(|run| &*run.controller == name).cloned())
+}
+
+/// What is done with the selected one.
 impl Procedures {
-    /// Selects a procedure.
-    pub fn select(&mut self, id: ProcedureId) {
-        self.selected = id.index();
-    }
-
-    pub fn move_by(&mut self, cx: &ViewContext, motion: Motion) {
-        self.selected = motion.to(self.selected, cx.def().procedures.len(), room(cx, cx.area.height));
-    }
-
     /// The selected one.
     pub fn id(&self, cx: &ViewContext) -> Option<ProcedureId> {
-        (self.selected < cx.def().procedures.len()).then(|| ProcedureId(to_u16(self.selected)))
+        self.selected(cx).map(|procedure| procedure.id)
     }
 
     /// What an abort would end: the one at work, else the selected one where it was interrupted or is not in its safe state.
@@ -86,127 +171,20 @@ impl Procedures {
         self.to_abort(cx).map(|id| UiAction::Command(CommandKind::AbortProcedure(id))).into_iter().collect()
     }
 
-    /// The latest run that a procedure has measured under its own name.
-    fn run_of(&self, cx: &ViewContext, def: &ProcedureDef) -> Option<ControlRun> {
-        let (controller, label) = def.measured().find(|(_, label)| **label == def.name)?;
-        let is_own = |run: &&ControlRun| run.cause == RunCause::Procedure && run.detail == *label;
-        // That at work is newer than what the history has answered.
-        let live = cx.snapshot.control_run(controller).filter(is_own);
-        let name = cx.def().device(controller).name.as_str();
-        let mut stored = self.runs.value.iter().flatten().filter(is_own);
-        live.cloned().or_else(|| stored.find(|run| &*run.controller == name).cloned())
-    }
-
     /// The latest runs of all procedures that measure the same controller as the selected one, over each other.
     pub fn overlay(&self, cx: &ViewContext) -> Option<Overlay> {
         let selected = cx.def().procedure(self.id(cx)?);
         let (controller, _) = selected.measured().next()?;
         let rule = cx.def().runs.iter().find(|rule| rule.controller == controller)?;
-        let same = cx.def().procedures.iter().filter(|def| def.measured().any(|(of, _)| of == controller));
-        let measured: Vec<ControlRun> = same.filter_map(|def| self.run_of(cx, def)).take(CURVES_MAX).collect();
-        let with_figures = measured.into_iter().map(|run| {
-            let figures = figures(&run);
-            (run, figures)
-        });
-        let laid: Vec<_> = with_figures.collect();
-        if laid.is_empty() {
-            None
-        } else {
-            Overlay::of_runs(rule, laid.iter().map(|(run, figures)| (run, figures.clone())))
-        }
-    }
-
-    /// Asks the history when it is time to.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
-        let to = cx.now + SignedDuration::from_secs(1);
-        let query = Query::ControlRuns { controller: None, from: to - SPAN, to, limit: ROWS };
-        let number = (Tab::Controllers, number);
-        self.runs.ask(cx, number, real(cx, EVERY_S), real(cx, TIMEOUT_S), query).into_iter().collect()
-    }
-
-    pub fn awaits(&self, number: u32) -> bool {
-        self.runs.query.awaits(number)
-    }
-
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.runs.on_answer(cx, number, answer);
-    }
-
-    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
-        let (theme, all) = (cx.theme, &cx.def().procedures);
-        let (end, height) = (canvas.width().saturating_sub(1), canvas.height());
-        let x = canvas.text(1, 0, t!("Procedures"), theme.strong()) + 2;
-        let words = match (&self.runs.trouble, cx.snapshot.procedure_at_work()) {
-            (Some(trouble), _) => (trouble.clone(), theme.trouble()),
-            (None, Some((id, run))) => (
-                t!("{name} is running, started by {by}", name = cx.def().procedure(id).name, by = run.by),
-                theme.strong(),
-            ),
-            (None, None) => (t!("one at a time, carried out by the station").to_owned(), theme.normal()),
-        };
-        canvas.text(x, 0, &fit(&words.0, end.saturating_sub(x)), words.1);
-        let (reference, over) = (t!("ref."), t!("over"));
-        let names =
-            ["", t!("procedure"), t!("state"), t!("at SV"), reference, t!("steady"), reference, over, reference];
-        canvas.text(1, 1, &fit(&draw::columns(WIDTHS, names), end), theme.dim());
-        let room = room(cx, height);
-        for (y, n, def) in on_screen(all, first(self.selected, all.len(), room), room) {
-            let (text, is_trouble) = self.row(cx, n, def);
-            canvas.text(1, y + 2, &pad(&fit(&text, end), end), row_style(cx, n == self.selected, is_trouble));
-        }
-        let below = to_u16(room.min(all.len())) + 3..height;
-        for (y, (text, is_trouble)) in below.zip(self.details(cx, end.saturating_sub(1))) {
-            canvas.text(1, y, &text, if is_trouble { theme.trouble() } else { theme.normal() });
-        }
-    }
-
-    fn row(&self, cx: &ViewContext, place: usize, def: &ProcedureDef) -> (String, bool) {
-        let id = ProcedureId(to_u16(place));
-        let mark = if place == self.selected { cx.theme.pick("▸", ">") } else { "" };
-        let run = cx.snapshot.procedures.get(place).and_then(Option::as_deref);
-        let state = procedures::state(cx.snapshot, id);
-        let measured = self.run_of(cx, def);
-        let [at_sv, steady, over, ..] = measured.as_ref().map(figures).unwrap_or_default();
-        let decimals = measured.as_ref().map_or(1, |run| run.decimals);
-        let reference = def.reference.as_ref().map(|reference| procedures::reference(reference, decimals));
-        let [at_sv_ref, steady_ref, over_ref] = reference.unwrap_or_default();
-        let cells = [mark, &def.name, &state, &at_sv, &at_sv_ref, &steady, &steady_ref, &over, &over_ref];
-        (draw::columns(WIDTHS, cells), run.is_some_and(ProcedureRun::is_fault))
-    }
-
-    /// The selected one in words.
-    fn details(&self, cx: &ViewContext, room: u16) -> Vec<(String, bool)> {
-        let Some(id) = self.id(cx) else { return Vec::new() };
-        let def = cx.def().procedure(id);
-        let mut texts = vec![(def.about.clone(), false)];
-        texts.extend(procedures::progress(cx.snapshot, id));
-        if let Some(run) = self.run_of(cx, def) {
-            let figures = control_runs::figures(&run).join(", ");
-            texts.push((
-                format!("{}, {}: {figures}", run.label(), moment(run.from, cx.now, &cx.def().time_zone)),
-                false,
-            ));
-            texts.push((run.settings.to_string(), false));
-        }
-        if let Some(reference) = &def.reference {
-            texts.push((t!("reference: {source}", source = reference.source), false));
-        }
-        let lines =
-            |(text, is_trouble): (String, bool)| wrap(&text, room).into_iter().map(move |line| (line, is_trouble));
-        texts.into_iter().flat_map(lines).collect()
+        let is_same = |row: &Procedure| cx.def().procedure(row.id).measured().any(|(of, _)| of == controller);
+        let rows = self.all(cx);
+        let same = rows.iter().filter(|row| is_same(row)).filter_map(|row| row.run.as_ref());
+        let laid: Vec<Laid> = same.map(|run| Laid::of_run(run, figures(run))).collect();
+        (!laid.is_empty()).then(|| Overlay::new(Kind::Runs, laid, (rule.tags.clone(), 0))).flatten()
     }
 }
 
 /// Why the page is not shown.
 pub fn why_none(cx: &ViewContext) -> &'static str {
     if cx.is_past() { t!("procedures are shown in the present only") } else { t!("this plant has no procedures") }
-}
-
-/// Mark, name, state; first at SV, steady and overshoot, each beside the reference.
-const WIDTHS: [i16; 9] = [1, 11, 17, -7, -7, -7, -7, -5, -5];
-
-/// Rows of the list on a tab of this height: the rest is about the selected one.
-fn room(cx: &ViewContext, height: u16) -> usize {
-    let count = cx.def().procedures.len();
-    count.min(usize::from(height).saturating_sub(3 + 6)).max(3)
 }

@@ -6,7 +6,7 @@ use crate::plant::parameter_set::{self, Compared, ParameterSet, StoredSet};
 use crate::ui::tabs::prelude::*;
 
 /// Where the values to compare with come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Source {
     /// A set of the station.
     Set(String),
@@ -65,66 +65,112 @@ pub fn problems(cx: &ViewContext, source: &Source) -> Option<Notice> {
     Some(Notice::new(t!("set {name}", name), words))
 }
 
-/// Draws the list of sources.
-pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected: usize) {
-    let theme = cx.theme;
-    let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
-    let x = canvas.text(1, 0, &device.name, theme.focus());
-    let settings = cx.def().tags_of(device.id).filter(|tag| tag.in_sets).count();
-    let words = t!("parameter sets of {model}, {settings} settings", model = device.model, settings);
-    canvas.text(x + 2, 0, &fit_words(&words, end.saturating_sub(x + 2)), theme.normal());
-    let all = sources(cx, device);
-    let names = ["", t!("set or controller"), t!("from"), t!("saved"), t!("by"), t!("values"), t!("differ")];
-    canvas.text(1, 2, &draw::columns(COLUMNS, names), theme.dim());
-    if all.is_empty() {
-        let words = match settings {
+/// The page.
+pub type Sets = List<SetsOf>;
+
+/// What a device can be compared with.
+#[derive(Debug)]
+pub struct SetsOf {
+    pub device: DeviceId,
+}
+
+/// A source, of which device the list is, and what can be compared: a set, or what is wrong with its file.
+#[derive(Debug, Clone)]
+pub struct SourceRow {
+    pub source: Source,
+    of: DeviceId,
+    set: Result<Arc<ParameterSet>, String>,
+}
+
+impl SourceRow {
+    fn new(cx: &ViewContext, of: DeviceId, source: Source) -> SourceRow {
+        let broken = |name: &String| cx.snapshot.sets.iter().find(|stored| stored.name == *name)?.set.as_ref().err();
+        let why = match &source {
+            Source::Set(name) => broken(name).and_then(|problems| problems.first()).cloned(),
+            Source::Device(_) => None,
+        };
+        SourceRow { set: source.set(cx).ok_or_else(|| why.unwrap_or_default()), source, of }
+    }
+
+    /// A word of a set that is kept; nothing of a device as it is now.
+    fn kept(&self, word: impl FnOnce(&ParameterSet) -> String) -> String {
+        match (&self.source, &self.set) {
+            (Source::Set(_), Ok(set)) => word(set),
+            (Source::Set(_), Err(_)) | (Source::Device(_), _) => String::new(),
+        }
+    }
+
+    fn name(&self, cx: &ViewContext) -> String {
+        match &self.source {
+            Source::Set(name) => name.clone(),
+            Source::Device(other) => t!("{name} as it is now", name = cx.def().device(*other).name),
+        }
+    }
+
+    fn differ(&self, cx: &ViewContext) -> String {
+        let Ok(set) = &self.set else { return String::new() };
+        let rows = parameter_set::compare(cx.def(), self.of, set, &trusted(cx));
+        match rows.iter().filter(|row| row.set.is_some() && !row.same).count() {
+            0 => t!("same").to_owned(),
+            differ => differ.to_string(),
+        }
+    }
+}
+
+impl Listing for SetsOf {
+    type Answer = ();
+    type Row = SourceRow;
+    type Id = Source;
+
+    fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
+        let settings = cx.def().tags_of(self.device).filter(|tag| tag.in_sets).count();
+        let empty = match settings {
             0 => t!("this device has no settings for a set"),
             _ => t!("no sets yet: n saves the current settings"),
         };
-        canvas.text(1, 4, words, theme.normal());
+        let Some(device) = cx.def().devices.get(self.device.index()) else { return Heading::new("", empty) };
+        let words = t!("parameter sets of {model}, {settings} settings", model = device.model, settings);
+        Heading::new(&device.name, empty).words(words, cx.theme.normal())
     }
-    let room = usize::from(bottom.saturating_sub(4)).max(1);
-    for (y, n, source) in on_screen(&all, first(selected, all.len(), room), room) {
-        let (text, trouble) = row(cx, device, source, n == selected);
-        canvas.text(1, y + 3, &fit(&text, end), row_style(cx, n == selected, trouble));
+
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, SourceRow>> {
+        let Some(device) = cx.def().devices.get(self.device.index()) else { return Vec::new() };
+        sources(cx, device).into_iter().map(|source| Cow::Owned(SourceRow::new(cx, self.device, source))).collect()
     }
-    let words = t!("Sets are files of the station, in the folder sets beside its history; u refreshes the list.");
-    canvas.text(1, bottom, &fit_words(words, end), theme.dim());
+
+    fn id(row: &SourceRow) -> Source {
+        row.source.clone()
+    }
+
+    fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<SourceRow>> {
+        vec![
+            left(26, t!("set or controller"), |cx, row| row.name(cx)),
+            left(10, t!("from"), |_, row| row.set.as_ref().map_or(String::new(), |set| set.device.to_string())),
+            left(10, t!("saved"), |cx, row: &SourceRow| row.kept(|set| moment(set.saved, cx.now, &cx.def().time_zone)))
+                .by(|a, b| saved_at(a).cmp(&saved_at(b))),
+            left(10, t!("by"), |_, row| row.kept(|set| set.by.to_string())),
+            right(6, t!("values"), |_, row| row.set.as_ref().map_or(String::new(), |set| set.values.len().to_string())),
+            right(8, t!("differ"), |cx, row| row.differ(cx)),
+        ]
+    }
+
+    fn words(&self, cx: &ViewContext, row: &SourceRow) -> Option<String> {
+        let why = row.set.as_ref().err()?;
+        Some(format!("{} {} {why}", pad(&row.name(cx), 26), cx.theme.pick("✗", "x")))
+    }
+
+    fn style(&self, cx: &ViewContext, row: &SourceRow) -> Style {
+        row_style(cx, false, row.set.is_err())
+    }
+
+    fn foot(&self, cx: &ViewContext) -> Option<(String, Style)> {
+        let words = t!("Sets are files of the station, in the folder sets beside its history; u refreshes the list.");
+        Some((words.to_owned(), cx.theme.dim()))
+    }
 }
 
-/// Mark, name, from, saved, by, values, how many differ.
-const COLUMNS: [i16; 7] = [2, 24, 10, 10, 10, -6, -8];
-
-fn row(cx: &ViewContext, device: &DeviceDef, source: &Source, selected: bool) -> (String, bool) {
-    let mark = if selected { cx.theme.pick("▸", ">") } else { "" };
-    let counts = |set: &ParameterSet| {
-        let rows = parameter_set::compare(cx.def(), device.id, set, &trusted(cx));
-        let differ = rows.iter().filter(|row| row.set.is_some() && !row.same).count();
-        (set.values.len().to_string(), if differ == 0 { t!("same").to_owned() } else { differ.to_string() })
-    };
-    match source {
-        Source::Set(name) => {
-            match cx.snapshot.sets.iter().find(|stored| stored.name == *name).map(|stored| &stored.set) {
-                Some(Ok(set)) => {
-                    let saved = moment(set.saved, cx.now, &cx.def().time_zone);
-                    let (values, differ) = counts(set);
-                    (draw::columns(COLUMNS, [mark, name, &set.device, &saved, &set.by, &values, &differ]), false)
-                }
-                Some(Err(problems)) => {
-                    let why = problems.first().map_or("", String::as_str);
-                    (format!("{} {} {} {why}", pad(mark, 2), pad(name, 24), cx.theme.pick("✗", "x")), true)
-                }
-                None => (String::new(), false),
-            }
-        }
-        Source::Device(other) => {
-            let Some(set) = source.set(cx) else { return (String::new(), false) };
-            let (values, differ) = counts(&set);
-            let name = &cx.def().device(*other).name;
-            let cells = [mark, &t!("{name} as it is now", name), name, "", "", &values, &differ];
-            (draw::columns(COLUMNS, cells), false)
-        }
-    }
+fn saved_at(row: &SourceRow) -> Option<Timestamp> {
+    row.set.as_ref().ok().map(|set| set.saved)
 }
 
 /// What a set would hold that was taken now, for the prompt for its name.

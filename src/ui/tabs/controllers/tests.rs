@@ -1,5 +1,6 @@
 //! The controllers tab as an operator sees it and works with it.
 
+mod lists;
 mod procedures;
 mod runs;
 mod lamps;
@@ -346,18 +347,6 @@ fn a_find_selects_the_exact_name_before_names_and_meanings() {
 }
 
 #[test]
-fn a_filter_finds_by_name_and_meaning_and_escape_takes_it_away() {
-    let mut model = model(&many(1), Theme::FULL);
-    type_keys(&mut model, "4/highest⏎");
-    let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("SV-H") && !shown.contains("integral") && shown.contains("only \"highest\""), "{shown}");
-    type_keys(&mut model, "⎋");
-    assert!(screen(&mut model, 80, 24).contains("integral"));
-    type_keys(&mut model, "/xyz⏎");
-    assert!(screen(&mut model, 80, 24).contains("no parameter has \"xyz\""));
-}
-
-#[test]
 fn thirty_one_devices_can_all_be_reached() {
     let mut model = model(&many(31), Theme::FULL);
     let code = |code| Msg::Key(crossterm::event::KeyEvent::new(code, crossterm::event::KeyModifiers::NONE));
@@ -376,15 +365,22 @@ fn a_key_for_a_set_acts_only_on_the_set_that_was_drawn() {
     let mut fixture = with_sets();
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "4⏎s↓");
-    // A colleague saves a set that comes before the selected one.
-    fixture.sets.insert(0, set(&fixture, "autumn", &[("SV", 90.0)]));
     screen(&mut model, 80, 24);
+    // A colleague saves a set that comes before the selected one, which stays selected.
+    fixture.sets.insert(0, set(&fixture, "autumn", &[("SV", 90.0)]));
+    update(&mut model, Msg::Snapshot(fixture.snapshot()));
+    type_keys(&mut model, "⏎");
+    assert!(screen(&mut model, 80, 24).contains("set winter → TIC-1"));
+    // A colleague deletes it.
+    type_keys(&mut model, "⎋");
+    screen(&mut model, 80, 24);
+    fixture.sets.retain(|stored| stored.name != "winter");
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     type_keys(&mut model, "⏎");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("The list has changed, press again") && shown.contains("parameter sets of"), "{shown}");
-    type_keys(&mut model, "↓⏎");
-    assert!(screen(&mut model, 80, 24).contains("set winter → TIC-1"));
+    type_keys(&mut model, "⏎");
+    assert!(screen(&mut model, 80, 24).contains("set autumn → TIC-1"));
 }
 
 #[test]

@@ -67,26 +67,30 @@ impl Grid {
 }
 
 /// The tags whose curves it shows with this device selected.
-pub fn tags(cx: &ViewContext, selected: usize) -> Vec<TagId> {
-    let devices = &cx.def().devices;
+pub fn tags(cx: &ViewContext, devices: &[&DeviceDef], selected: usize) -> Vec<TagId> {
     let (first, count) = Grid::new(cx.size, cx.area, devices.len()).seen(selected, devices.len());
     let seen = devices.iter().skip(first).take(count);
     seen.filter_map(|device| Some(device.faceplate.as_ref()?.pv)).collect()
 }
 
-/// Draws it with this device selected.
-pub fn view(cx: &ViewContext, canvas: &mut Canvas, selected: usize, curves: &Answered<Vec<Series>>) {
+/// Draws these devices with this one selected.
+pub fn view(
+    cx: &ViewContext,
+    canvas: &mut Canvas,
+    (devices, selected): (&[&DeviceDef], usize),
+    found: &str,
+    curves: &Answered<Vec<Series>>,
+) {
     let series = curves.value.as_deref().unwrap_or_default();
-    let devices = &cx.def().devices;
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     let area = canvas.area();
     let grid = Grid::new(cx.size, area, devices.len());
-    let x = canvas.text(1, 0, &fit_words(&list::summary(cx), end), cx.theme.normal());
+    let x = canvas.text(1, 0, &fit_words(&list::summary(cx, found), end), cx.theme.normal());
     if let Some(trouble) = &curves.trouble {
         let words = t!("no curves: {trouble}", trouble);
         canvas.text(x + 2, 0, &fit_words(&words, end.saturating_sub(x + 14)), cx.theme.trouble());
     }
-    let rows: Vec<&[DeviceDef]> = devices.chunks(grid.columns).collect();
+    let rows: Vec<&[&DeviceDef]> = devices.chunks(grid.columns).collect();
     let first = grid.seen(selected, devices.len()).0 / grid.columns;
     for (y, row, devices) in on_screen(&rows, first, grid.rows) {
         for (column, device) in devices.iter().enumerate() {

@@ -9,15 +9,12 @@ use crate::{
 };
 
 /// Keys of the list.
-pub const LIST: &[&[Key]] = &[
-    &motions!("select", |reports: &mut Reports, cx: &ViewContext, motion| reports.made.select(cx, motion)),
-    &[
-        Key::change(code(KeyCode::Enter), "text", "the selected report as text", |reports, cx| {
-            reports.made.open = reports.made.selected().map(|report| opened(cx, report));
-        }),
-        Key::change(char('r'), "shifts", "the reports of shifts", |reports, _| reports.made.shown = false),
-    ],
-];
+pub const LIST: &[&[Key]] = &[&[
+    Key::change(code(KeyCode::Enter), "text", "the selected report as text", |reports, cx| {
+        reports.made.open = reports.made.list.selected(cx).map(|report| opened(cx, &report));
+    }),
+    Key::change(char('r'), "shifts", "the reports of shifts", |reports, _| reports.made.shown = false),
+]];
 /// Keys of the text.
 pub const TEXT: &[&[Key]] = &[
     &motions!("", |reports: &mut Reports, cx: &ViewContext, motion| reports.made.scroll(cx, motion)),
@@ -26,9 +23,6 @@ pub const TEXT: &[&[Key]] = &[
 
 /// Rows of the list.
 const ROWS: usize = 500;
-/// How often the list is refreshed, and when an answer counts as lost (real time).
-const EVERY_S: f64 = 10.0;
-const TIMEOUT_S: f64 = 20.0;
 /// A report over weeks may take its time.
 const REPORT_TIMEOUT_S: f64 = 60.0;
 /// Columns of a text report.
@@ -39,8 +33,7 @@ const WIDTH: u16 = 80;
 pub struct Made {
     /// It is shown in place of a report.
     pub shown: bool,
-    pub list: Answered<MadeReports>,
-    selected: Selected<ReportKey>,
+    pub list: List<AutomaticReports>,
     /// The report that is shown as text, in place of the list.
     pub open: Option<Opened>,
 }
@@ -67,21 +60,14 @@ impl Made {
         if self.open.is_some() { TEXT } else { LIST }
     }
 
-    fn rows(&self) -> &[ReportRecord] {
-        self.list.value.as_ref().map_or(&[], |made| &made.reports)
+    /// The list, while it is shown.
+    pub fn list(&self) -> Option<&dyn ListPage> {
+        self.open.is_none().then_some(&self.list as &dyn ListPage)
     }
 
-    fn place(&self) -> usize {
-        self.selected.place(self.rows().iter().map(ReportRecord::key))
-    }
-
-    fn selected(&self) -> Option<&ReportRecord> {
-        self.rows().get(self.place())
-    }
-
-    fn select(&mut self, cx: &ViewContext, motion: Motion) {
-        let keys: Vec<_> = self.rows().iter().map(ReportRecord::key).collect();
-        self.selected.on(motion, keys, room(cx.area.height));
+    /// The same, to change it.
+    pub fn list_mut(&mut self) -> Option<&mut dyn ListPage> {
+        if self.open.is_none() { Some(&mut self.list) } else { None }
     }
 
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
@@ -98,19 +84,9 @@ impl Made {
                 let query = Query::Report { period: period.clone() };
                 report.ask(cx, number, SignedDuration::MAX, real(cx, REPORT_TIMEOUT_S), query)
             }
-            None => {
-                let query = Query::Reports { limit: ROWS };
-                self.list.ask(cx, number, real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
-            }
+            None => self.list.ask(cx, number),
         };
         query.into_iter().collect()
-    }
-
-    /// The line that fetches the selected file, to be copied.
-    pub fn copied(&self) -> Vec<String> {
-        let made = self.list.value.as_ref();
-        let line = |report| made.and_then(|made| fetch(made, report));
-        self.selected().and_then(line).into_iter().collect()
     }
 
     /// Draws it.
@@ -118,76 +94,73 @@ impl Made {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         match &self.open {
             Some(open) => draw_text(open, cx, &mut canvas),
-            None => self.draw_list(cx, &mut canvas),
+            None => self.list.view(cx, &mut canvas),
         }
     }
+}
 
-    fn draw_list(&self, cx: &ViewContext, canvas: &mut Canvas) {
-        let (theme, columns) = (cx.theme, canvas.width());
-        let x = canvas.text(1, 0, t!("Automatic reports  "), theme.strong());
-        if let Some(trouble) = &self.list.trouble {
-            canvas.text(x, 0, &fit(trouble, columns.saturating_sub(x + 1)), theme.trouble());
-        }
-        let (place, room) = (self.place(), room(canvas.height()));
-        let Some(selected) = self.selected() else {
-            let waiting = self.list.query.shown_waiting(cx);
-            let none = if cx.def().report.automatic.is_empty() {
-                t!("The plant file asks for none: see `sightglass help reports`.")
-            } else {
-                t!("No report was made yet.")
-            };
-            let words =
-                if self.list.value.is_some() { none } else { waiting.as_deref().unwrap_or(t!("collecting data")) };
-            wrap(words, columns.saturating_sub(3)).iter().zip(2..).for_each(|(line, y)| {
-                canvas.text(2, y, line, theme.dim());
-            });
-            return;
+/// The reports that the station has made by itself.
+#[derive(Debug, Default)]
+pub struct AutomaticReports;
+
+impl Listing for AutomaticReports {
+    type Answer = MadeReports;
+    type Row = ReportRecord;
+    type Id = ReportKey;
+
+    const MARKS: bool = true;
+
+    fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a MadeReports>) -> Heading<'a> {
+        let empty = match cx.def().report.automatic.is_empty() {
+            true => t!("The plant file asks for none: see `sightglass help reports`."),
+            false => t!("No report was made yet."),
         };
-        let names = [t!("period"), t!("format"), t!("state"), t!("since"), t!("file")];
-        canvas.text(1, 1, &fit(&draw::columns(WIDTHS, names), columns), theme.dim());
-        for (y, n, report) in on_screen(self.rows(), first(place, self.rows().len(), room), room) {
-            let style = match (n == place, has_failed(report)) {
-                (true, _) => theme.focus(),
-                (false, true) => theme.trouble(),
-                (false, false) => theme.normal(),
-            };
-            canvas.text(0, y + 2, &pad(&format!(" {}", row(cx, report)), columns), style);
-        }
-        let y = to_u16(room.min(self.rows().len())) + 3;
-        let made = self.list.value.as_ref();
-        let fetch = made.and_then(|made| fetch(made, selected)).map(|line| t!("y copies: {line}", line));
-        let sha = (!selected.sha256.is_empty()).then(|| format!("SHA-256 {}", selected.sha256));
-        let why = selected.error.as_ref().map(|why| t!("{why}, {n} times", why, n = selected.attempts.max(1)));
-        let details = [(why, theme.trouble()), (fetch, theme.normal()), (sha, theme.dim())];
-        let lines = details.into_iter().flat_map(|(text, style)| {
-            let lines = wrap(&text.unwrap_or_default(), columns.saturating_sub(2));
-            lines.into_iter().filter(|line| !line.is_empty()).map(move |line| (line, style))
-        });
-        for ((line, style), y) in lines.zip(y..canvas.height()) {
-            canvas.text(1, y, &line, style);
-        }
+        Heading::new(t!("Automatic reports"), empty)
     }
-}
 
-/// Rows of the list on a tab of this height: the rest is about the selected one.
-fn room(height: u16) -> usize {
-    usize::from(height).saturating_sub(7).max(3)
-}
+    fn query(&self, _cx: &ViewContext) -> Option<Query> {
+        Some(Query::Reports { limit: ROWS })
+    }
 
-const WIDTHS: [i16; 5] = [24, 8, 21, 13, 0];
+    fn rows<'a>(&'a self, _cx: &ViewContext<'a>, made: Option<&'a MadeReports>) -> Vec<Cow<'a, ReportRecord>> {
+        made.into_iter().flat_map(|made| &made.reports).map(Cow::Borrowed).collect()
+    }
 
-fn row(cx: &ViewContext, report: &ReportRecord) -> String {
-    let since = moment(report.at, cx.now, &cx.def().time_zone);
-    let name = report.file.rsplit('/').next().unwrap_or_default();
-    draw::columns(WIDTHS, [&report.name, &report.format, state(report), &since, name])
+    fn id(report: &ReportRecord) -> ReportKey {
+        report.key()
+    }
+
+    fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<ReportRecord>> {
+        vec![
+            left(24, t!("period"), |_, report: &ReportRecord| report.name.to_string()).by(|a, b| a.from.cmp(&b.from)),
+            left(8, t!("format"), |_, report| report.format.to_string()),
+            left(21, t!("state"), |_, report| state(report).to_owned()),
+            left(13, t!("since"), |cx, report: &ReportRecord| moment(report.at, cx.now, &cx.def().time_zone))
+                .by(|a, b| a.at.cmp(&b.at)),
+            rest(0, t!("file"), |_, report, _| report.file.rsplit('/').next().unwrap_or_default().to_owned()),
+        ]
+    }
+
+    fn style(&self, cx: &ViewContext, report: &ReportRecord) -> Style {
+        row_style(cx, false, matches!(report.event, ReportEvent::NotMade | ReportEvent::DeliveryFailed))
+    }
+
+    fn details(&self, cx: &ViewContext, report: &ReportRecord, made: Option<&MadeReports>) -> Vec<(String, Style)> {
+        let why = report.error.as_ref().map(|why| t!("{why}, {n} times", why, n = report.attempts.max(1)));
+        let fetch = made.and_then(|made| fetch(made, report)).map(|line| t!("y copies: {line}", line));
+        let sha = (!report.sha256.is_empty()).then(|| format!("SHA-256 {}", report.sha256));
+        let texts = [(why, cx.theme.trouble()), (fetch, cx.theme.normal()), (sha, cx.theme.dim())];
+        texts.into_iter().filter_map(|(text, style)| Some((text?, style))).collect()
+    }
+
+    /// The line that fetches the file.
+    fn copied(&self, report: &ReportRecord, made: Option<&MadeReports>) -> Option<String> {
+        Some(made.and_then(|made| fetch(made, report)).unwrap_or_default())
+    }
 }
 
 fn state(report: &ReportRecord) -> &'static str {
     if is_given_up(report) { t!("NOT DELIVERED") } else { translate(report.event.word()) }
-}
-
-fn has_failed(report: &ReportRecord) -> bool {
-    matches!(report.event, ReportEvent::NotMade | ReportEvent::DeliveryFailed)
 }
 
 /// The command that fetches a file from this machine.

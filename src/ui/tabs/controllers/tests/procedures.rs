@@ -153,7 +153,7 @@ fn the_palette_leads_to_a_procedure() {
     let mut model = model(&with_procedures(), Theme::FULL);
     type_keys(&mut model, ":PD⏎");
     let shown = screen(&mut model, 80, 24);
-    assert!(shown.contains("▸ PD") && shown.contains("PD control"), "{shown}");
+    assert!(shown.contains("▸PD") && shown.contains("PD control"), "{shown}");
     // A plant without any has no key for them.
     let mut model = super::model(&many(2), Theme::FULL);
     type_keys(&mut model, "4");

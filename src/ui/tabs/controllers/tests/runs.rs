@@ -83,6 +83,8 @@ fn marked_runs_lie_over_each_other_and_all_stand_in_a_table() {
         type_keys(&mut model, "⎋");
         assert!(screen(&mut model, width, height).contains("■  16"), "the table with its marks");
         type_keys(&mut model, "⎋");
+        assert!(!screen(&mut model, width, height).contains('■'), "Esc takes the marks off first");
+        type_keys(&mut model, "⎋");
         assert!(screen(&mut model, width, height).contains("‹ TIC-1 ›"));
     }
 }

@@ -1,0 +1,187 @@
+//! A column of a list: its heading, how wide it is, its text in each row, and the order that it gives.
+
+use std::cmp::Ordering;
+
+use crate::ui::tabs::prelude::*;
+
+/// A column.
+pub struct Column<R: ?Sized> {
+    /// Its heading.
+    pub head: &'static str,
+    width: Width,
+    /// Filled from the left.
+    is_right: bool,
+    /// Where there is no room those of the highest rank are left out first; never one of rank 0.
+    rank: u8,
+    text: Text<R>,
+    order: Option<fn(&R, &R) -> Ordering>,
+    /// It is read after the others.
+    pub is_dim: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Width {
+    Fixed(u16),
+    /// That of the widest of its texts.
+    Widest,
+    /// What the others leave, at least so much.
+    Rest(u16),
+}
+
+enum Text<R: ?Sized> {
+    Plain(fn(&ViewContext, &R) -> String),
+    /// Of so many cells.
+    Fitting(fn(&ViewContext, &R, u16) -> String),
+}
+
+/// A column that is filled from the right.
+pub fn left<R: ?Sized>(width: u16, head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
+    Column::new(Width::Fixed(width), head, Text::Plain(text))
+}
+
+/// A column of figures, filled from the left.
+pub fn right<R: ?Sized>(width: u16, head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
+    Column { is_right: true, ..left(width, head, text) }
+}
+
+/// The last column, which has what the others leave, at least so much; its text is given the room.
+pub fn rest<R: ?Sized>(least: u16, head: &'static str, text: fn(&ViewContext, &R, u16) -> String) -> Column<R> {
+    Column::new(Width::Rest(least), head, Text::Fitting(text))
+}
+
+impl<R: ?Sized> Column<R> {
+    fn new(width: Width, head: &'static str, text: Text<R>) -> Column<R> {
+        Column { head, width, is_right: false, rank: 0, text, order: None, is_dim: false }
+    }
+    /// A column of words that is as wide as the widest of its texts.
+    pub fn words(head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
+        Column::new(Width::Widest, head, Text::Plain(text))
+    }
+    /// The same of figures, filled from the left.
+    pub fn number(head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
+        Column { is_right: true, ..Column::words(head, text) }
+    }
+    /// The same, left out where there is no room: those of the highest rank first.
+    pub fn rank(self, rank: u8) -> Column<R> {
+        Column { rank, ..self }
+    }
+    /// The same where its texts do not give the order.
+    pub fn by(self, order: fn(&R, &R) -> Ordering) -> Column<R> {
+        Column { order: Some(order), ..self }
+    }
+
+    /// The same, dim.
+    pub fn dim(self) -> Column<R> {
+        Column { is_dim: true, ..self }
+    }
+
+    /// Its text in so many cells.
+    pub fn text(&self, cx: &ViewContext, row: &R, room: u16) -> String {
+        match self.text {
+            Text::Plain(text) => text(cx, row),
+            Text::Fitting(text) => text(cx, row, room),
+        }
+    }
+
+    /// The order of two rows by this column.
+    pub fn compare(&self, cx: &ViewContext, a: &R, b: &R) -> Ordering {
+        match self.order {
+            Some(order) => order(a, b),
+            None => natural(&self.text(cx, a, u16::MAX), &self.text(cx, b, u16::MAX)),
+        }
+    }
+}
+
+/// The columns that there is room for, each with its width; of some it is that of their widest text.
+pub fn placed<R: ?Sized>(
+    columns: Vec<Column<R>>,
+    room: u16,
+    widest: impl Fn(&Column<R>) -> u16,
+) -> Vec<(Column<R>, u16)> {
+    let least = |column: Column<R>| {
+        let width = match column.width {
+            Width::Fixed(width) | Width::Rest(width) => width,
+            Width::Widest => widest(&column).max(width(column.head)),
+        };
+        (column, width)
+    };
+    let mut columns: Vec<(Column<R>, u16)> = columns.into_iter().map(least).collect();
+    let taken =
+        |columns: &[(Column<R>, u16)]| columns.iter().map(|(_, width)| width + 1).sum::<u16>().saturating_sub(1);
+    while room < taken(&columns) {
+        let Some(last @ 1..) = columns.iter().map(|(column, _)| column.rank).max() else { break };
+        columns.retain(|(column, _)| column.rank < last);
+    }
+    let all = taken(&columns);
+    let of_rest = columns.iter_mut().filter(|(column, _)| matches!(column.width, Width::Rest(_)));
+    of_rest
+        .for_each(|(_, width)| *width = (*width + room.saturating_sub(all)).saturating_sub(all.saturating_sub(room)));
+    columns
+}
+
+/// These columns in a row, with a blank between them.
+pub fn join<R: ?Sized>(columns: &[(Column<R>, u16)], text: impl Fn(&Column<R>, u16) -> String) -> String {
+    let cell = |(column, width): &(Column<R>, u16)| {
+        let text = text(column, *width);
+        if column.is_right { pad_left(&text, *width) } else { pad(&text, *width) }
+    };
+    columns.iter().map(cell).collect::<Vec<_>>().join(" ")
+}
+
+/// Numbers by their size, `9:05` before `10:01`, other texts by their letters; what is no figure comes last.
+fn natural(a: &str, b: &str) -> Ordering {
+    let number = |text: &str| text.trim_start_matches(['>', '<', '≥', '≤', ' ']).parse::<f64>().ok();
+    match (number(a), number(b)) {
+        (Some(a), Some(b)) => a.total_cmp(&b),
+        _ => parts(a).cmp(&parts(b)),
+    }
+}
+
+/// Runs of digits and of letters; digits stand before letters, and an unknown or empty text behind both.
+fn parts(text: &str) -> (bool, Vec<(bool, u64, String)>) {
+    let text = text.to_lowercase();
+    let mut parts = Vec::new();
+    let mut rest = text.as_str();
+    while let Some(first) = rest.chars().next() {
+        let is_number = first.is_ascii_digit();
+        let end = rest.find(|letter: char| letter.is_ascii_digit() != is_number).unwrap_or(rest.len());
+        let (part, behind) = rest.split_at(end);
+        parts.push((!is_number, part.parse().unwrap_or(0), part.to_owned()));
+        rest = behind;
+    }
+    (!text.contains(char::is_alphanumeric), parts)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_ordered_as_they_are_read() {
+        let check = |sorted: &[&str]| {
+            let mut texts: Vec<&str> = sorted.iter().rev().copied().collect();
+            texts.sort_by(|a, b| natural(a, b));
+            assert_eq!(texts, sorted);
+        };
+        check(&["-2.5", "-1", "0.5", ">1.2", "10"]);
+        check(&["9:05", "10:01", "10:15", "never"]);
+        check(&["anna", "Berta", "carl"]);
+        check(&["hot-water-9", "hot-water-10"]);
+        check(&["1.5", "–"]);
+    }
+
+    #[test]
+    fn columns_of_the_highest_rank_give_way_first() {
+        let columns = || {
+            let text: fn(&ViewContext, &u8) -> String = |_, _| String::new();
+            let last = rest(4, "d", |_, _, _| String::new());
+            vec![left(10, "a", text), right(8, "b", text).rank(1), Column::words("c", text).rank(2), last]
+        };
+        let shown = |room| {
+            placed(columns(), room, |_| 3).into_iter().map(|(column, width)| (column.head, width)).collect::<Vec<_>>()
+        };
+        assert_eq!(shown(40), [("a", 10), ("b", 8), ("c", 3), ("d", 16)]);
+        assert_eq!(shown(25), [("a", 10), ("b", 8), ("d", 5)]);
+        assert_eq!(shown(13), [("a", 10), ("d", 2)], "the others always stand");
+    }
+}
