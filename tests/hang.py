@@ -58,7 +58,7 @@ class Station(crash.Station):
                                         env=self.environment, cwd=self.folder, stdout=self.output, stderr=self.output)
 
     def status(self):
-        code, text = self.call("status", timeout=5)
+        code, text = self.call("status", timeout=20)
         return text
 
     def until(self, words, seconds):
@@ -73,9 +73,17 @@ class Station(crash.Station):
             time.sleep(0.5)
 
     def write(self, note, recorded):
-        code, text = self.call("write", "TIC-1.SV", 50 + len(note), "--note", note, timeout=10)
+        self.is_read("TIC-1.SV-L")  # the limit of what is written
+        code, text = self.call("write", "TIC-1.SV", 50 + len(note), "--note", note, timeout=20)
         if code != 0 or ("not recorded" in text) == recorded:
             raise crash.Wrong(f"polls: a write, code {code}: {text.strip()}")
+
+    def is_read(self, tag):
+        end = time.monotonic() + 30
+        while not re.search(rf"^tag +{re.escape(tag)} .* good ", self.status(), re.M):
+            if end < time.monotonic():
+                raise crash.Wrong(f"polls: {tag} is not read within 30 s")
+            time.sleep(0.2)
 
     def polls(self):
         """A value is good and young."""
@@ -122,7 +130,7 @@ def state(station):
     station.polls()
     station.release()
     station.until("history  good", 30)
-    station.until("!users file", 10)
+    station.until("RTN        station users file unusable", 10)
     station.write("at last", True)
     log = station.notes_of_log()
     for note in ("before", "meanwhile", "after it", "at last"):
@@ -154,11 +162,11 @@ def folders(station):
     code, said = station.call("history", "backup", station.plant, station.folder / "elsewhere", timeout=60)
     if code != 0:
         raise crash.Wrong(f"jobs: {said}")
-    station.until("reports does not respond", 180)
+    station.until("UNACK      station automatic report fault", 180)
     station.polls()
     station.write("meanwhile", True)
     station.release()
-    station.until("!reports does not respond", 90)
+    station.until("RTN        station automatic report fault", 90)
     if not list(reports.glob("*.csv")):
         raise crash.Wrong("returns: there is no report")
     code, said = station.call("history", "backup", station.plant, backups / "two", timeout=60)
@@ -173,6 +181,7 @@ def folders(station):
     station.start(logs / "station.log")
     station.is_reached(60)
     station.until("history  good", 20)
+    station.is_read("TIC-1.PV")
     station.polls()
     station.release()
     station.write("at last", True)

@@ -18,7 +18,7 @@ use tokio::{
 };
 
 use crate::{
-    access::{AccessControl, Peer, io::own_user},
+    access::{Peer, io::own_user},
     bus::io::{clock::Clock, transport::Connector, worker::Worker},
     history::io::{
         JobRequest, QueryRequest,
@@ -210,16 +210,11 @@ fn assemble(
         lifecycle: lifecycle_sender,
     };
     let open = guarded.is_none();
-    let (access, users, late) = match guarded {
-        Some(Guarded { access, path, late }) => (access, Some(path), late),
-        None => (AccessControl::new(def.clone(), Some(own_user().into())), None, None),
-    };
+    let (access, users, late) = begin::access_of(guarded, &def);
     let server = SessionServer::new(access.in_run(run), clock, outputs, users);
     let (to_sessions, reloads) = mpsc::channel(1);
-    if let Some(late) = late {
-        let to = (to_sessions.clone(), to_plant.clone());
-        tasks.push(tokio::spawn(begin::take_late_users(late, to, stopped.clone())));
-    }
+    let to = (to_sessions.clone(), to_plant.clone());
+    tasks.extend(late.map(|late| tokio::spawn(begin::take_late_users(late, to, stopped.clone()))));
     tasks.push(tokio::spawn(server.run(attach_requests, requests, reloads, stopped)));
     let senders = Senders { events, audit, store, queries, history_file, plant: to_plant, sessions: to_sessions };
     let mut station = Station {

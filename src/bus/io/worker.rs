@@ -157,6 +157,7 @@ mod tests {
     fn a_worker_that_gets_no_thread_leaves_who_asks_for_it_alone() {
         let runtime = Builder::new_current_thread().build().expect("a runtime");
         let own = Builder::new_current_thread().build().expect("a runtime");
-        runtime.block_on(async { drop(Unstarted(Some(own))) });
+        let left = catch_unwind(AssertUnwindSafe(|| runtime.block_on(async { drop(Unstarted(Some(own))) })));
+        assert!(left.is_ok(), "a runtime that is dropped inside another one panics");
     }
 }

@@ -42,7 +42,7 @@ const READ_MAX: Duration = Duration::from_secs(30);
 /// How often users that were not read in time are looked for.
 const LATE_EVERY: Duration = Duration::from_secs(1);
 
-type LateUsers = Receiver<Result<Users, String>>;
+pub(super) type LateUsers = Receiver<Result<Users, String>>;
 
 /// Access control with users.
 pub(super) struct Guarded {
@@ -88,6 +88,17 @@ fn guard(def: Arc<PlantDef>, path: PathBuf, max: Duration) -> Guarded {
         }
     };
     Guarded { access, path, late }
+}
+
+/// Access control, the file of its users, and where these still come from; of a station without login, no file.
+pub(super) fn access_of(
+    guarded: Option<Guarded>,
+    def: &Arc<PlantDef>,
+) -> (AccessControl, Option<PathBuf>, Option<LateUsers>) {
+    match guarded {
+        Some(Guarded { access, path, late }) => (access, Some(path), late),
+        None => (AccessControl::new(def.clone(), Some(own_user().into())), None, None),
+    }
 }
 
 /// How long each file of a station may take: nothing where their disk does not even respond.

@@ -370,7 +370,7 @@ fn files_in_use_by_another_process_are_left_alone() {
 }
 
 #[tokio::test]
-async fn a_station_that_did_not_wait_for_its_log_writes_it_all_the_same() {
+async fn a_log_that_was_not_waited_for_is_written_all_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let history = folder.path().join("h.duckdb");
     for (number, max) in [Duration::MAX, Duration::ZERO].into_iter().enumerate() {
