@@ -204,6 +204,11 @@ impl Check {
         }
     }
 
+    /// Is the last entry that the station noted among the lines so far? What comes behind it may never have been confirmed.
+    pub fn has_all_noted(&self) -> bool {
+        self.head.is_none_or(|head| head.number <= self.last.number)
+    }
+
     fn parse_entry(&mut self, bytes: &[u8]) -> Result<(Entry, ChainHash), String> {
         let text = std::str::from_utf8(bytes).map_err(|_| "this is not text".to_owned())?;
         let (body, hash) =

@@ -89,11 +89,20 @@ fn checksum(text: &str) -> String {
 
 /// Does a file end within a line? Nothing of that line was ever confirmed, unless more is missing.
 pub fn is_cut(bytes: &[u8]) -> bool {
-    bytes.last().is_some_and(|byte| *byte != b'\n')
+    bytes.last().is_some_and(|byte| *byte != b'\n') || written(bytes).len() < bytes.len()
+}
+
+/// Without the last lines that a loss of power has left with zeros, where a block of the disk was not written yet. Zeros with whole
+/// lines behind them are damage.
+fn written(bytes: &[u8]) -> &[u8] {
+    let Some(zeros) = bytes.windows(2).position(|pair| pair == [0, 0]) else { return bytes };
+    let is_whole = bytes[zeros..].split_inclusive(|byte| *byte == b'\n').any(|line| event_of(line).is_some());
+    if is_whole { bytes } else { &bytes[..zeros] }
 }
 
 /// Reads a file. `Err` names what is damaged. The beginning of a line at the end is left out, see [`is_cut`].
 pub fn parse(bytes: &[u8]) -> Result<LatestEvents, String> {
+    let bytes = written(bytes);
     let end = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |place| place + 1);
     let mut events = LatestEvents::default();
     let mut lines = bytes[..end].split_inclusive(|byte| *byte == b'\n');
@@ -169,6 +178,19 @@ mod tests {
             bytes[place] ^= 1 << bit;
             prop_assert!(parse(&bytes).is_err());
         }
+    }
+
+    #[test]
+    fn zeros_of_a_lost_block_are_no_damage_behind_the_last_whole_line() {
+        let at = Timestamp::UNIX_EPOCH;
+        let event = |text: &str| line(&AlarmRecord::new(at, "TIC-1.PV", text, Priority::High, AlarmEvent::Raised));
+        let (whole, last) = (format!("{HEADER}{}", event("high")), event("low"));
+        let mut lost = last.clone().into_bytes();
+        lost[20..60].fill(0);
+        let torn = [whole.as_bytes(), &lost].concat();
+        assert_eq!((parse(&torn).unwrap().len(), is_cut(&torn)), (1, true));
+        let within = [whole.as_bytes(), &lost, last.as_bytes()].concat();
+        assert!(parse(&within).is_err_and(|why| why.contains("line 3")));
     }
 
     #[test]

@@ -33,7 +33,7 @@ pub fn bits(number: f64) -> Option<u16> {
     // Below the first whole power there are as many steps as the fraction says; a step too many carries into the exponent.
     let above = to_u16(exponent - EXPONENT_MIN);
     let sign = if number.is_sign_negative() { 1 << 15 } else { 0 };
-    Some(sign | (above << FRACTION) + steps)
+    Some(sign | ((above << FRACTION) + steps))
 }
 
 /// The nearest number that it holds; infinite where there is none.

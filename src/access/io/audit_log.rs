@@ -84,13 +84,15 @@ fn read_head(audit_log: &Path) -> io::Result<Option<ChainHash>> {
     Ok(super::read_line_of(&head_of(audit_log))?.and_then(|text| audit_log::head(&text)))
 }
 
-/// How far the whole lines reach, in bytes, and whether something stands behind them.
+/// How far the whole lines reach, in bytes, and whether something stands behind them: the beginning of a line, or what a loss of
+/// power left of the last entries, zeros where a block of the disk was not written yet.
 struct Scanned {
     bytes: u64,
     torn: bool,
 }
 
 fn scan(file: File, check: &mut Check, mut each: impl FnMut(audit_log::Entry, ChainHash)) -> io::Result<Scanned> {
+    let length = file.metadata()?.len();
     let mut reader = BufReader::new(file);
     let mut bytes = 0;
     let mut line = Vec::new();
@@ -99,6 +101,10 @@ fn scan(file: File, check: &mut Check, mut each: impl FnMut(audit_log::Entry, Ch
         let read = (&mut reader).take(audit_log::LINE_MAX as u64).read_until(b'\n', &mut line)?;
         if line.last() != Some(&b'\n') && read < audit_log::LINE_MAX {
             return Ok(Scanned { bytes, torn: read > 0 });
+        }
+        let is_last = length.saturating_sub(bytes) <= audit_log::LINE_MAX as u64;
+        if line.contains(&0) && is_last && check.has_all_noted() {
+            return Ok(Scanned { bytes, torn: true });
         }
         bytes += read as u64;
         let whole = line.strip_suffix(b"\n").unwrap_or(&line);

@@ -64,7 +64,7 @@ fn a_number_has_one_form_only() {
     }
     // An `f64` is it to the last digit, but would be written with fewer.
     let binary = exact("156777777344796.28125");
-    assert_eq!((binary.near(), binary.rest()), (156_777_777_344_796.281_25, Some(0.0)));
+    assert_eq!((binary.near(), binary.rest()), (156_777_777_344_796.28, Some(0.0)));
     assert_eq!((binary.to_string().as_str(), binary.as_f64()), ("156777777344796.28125", None));
 }
 

@@ -20,6 +20,7 @@ use crate::{
 };
 
 mod seals;
+mod torn;
 
 fn record(what: &str) -> ActionRecord {
     ActionRecord {
@@ -96,23 +97,6 @@ fn several_runs_make_one_chain_in_a_private_file() {
     for file in [path.clone(), path.with_extension("head")] {
         assert_eq!(fs::metadata(file).unwrap().permissions().mode() & 0o777, 0o600);
     }
-}
-
-#[test]
-fn a_torn_last_line_is_set_aside_and_reported() {
-    let folder = tempfile::tempdir().unwrap();
-    let (history, path) = (folder.path().join("tank.duckdb"), folder.path().join("tank.audit.jsonl"));
-    life(&history, &["start", "write"]);
-    let mut file = OpenOptions::new().append(true).open(&path).unwrap();
-    file.write_all(b"{\"n\":3,\"utc\":\"20").unwrap();
-    assert!(verify(&path, &[]).unwrap().torn);
-    let (rows, status, opened) = life(&history, &["start"]);
-    assert!(opened.wrong[0].contains("torn"), "{opened:?}");
-    assert_eq!((rows.len(), status.log), (2, None), "one for the torn line, one for the start");
-    assert_eq!(verify(&path, &[]).unwrap().entries, 4);
-    let beside = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
-    let beside = beside.filter(|path| path.to_string_lossy().contains("torn")).collect::<Vec<_>>();
-    assert_eq!(fs::read_to_string(&beside[0]).unwrap(), "{\"n\":3,\"utc\":\"20");
 }
 
 #[test]

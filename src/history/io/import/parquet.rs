@@ -55,7 +55,7 @@ pub fn read(file: &File, def: &PlantDef, times: [Timestamp; 2]) -> Result<Rows, 
             };
             let cells: Vec<_> = next.columns().iter().map(|column| column.as_string::<i32>()).collect();
             let row = |row: usize| {
-                cells.iter().map(|cells| cells.is_valid(row).then(|| cells.value(row)).unwrap_or("")).collect()
+                cells.iter().map(|cells| if cells.is_valid(row) { cells.value(row) } else { "" }).collect()
             };
             batch = (0..next.len()).rev().map(row).collect();
         }

@@ -107,7 +107,7 @@ fn a_doubled_hour_is_counted_where_its_samples_are_deleted() {
         let [(kwh, lasted), run] = within(&after);
         let [(all_kwh, all_lasted), all_of_run] = within(&before);
         assert_eq!((lasted, run), (all_lasted, all_of_run));
-        // What lies in that time cannot be told apart: the batch has what is known of it, never more, and says so.
+        // What lies in that time cannot be separated: the batch has what is known of it, never more, and says so.
         let share = after.batches[0].energy.map_or(0.0, |(_, share)| share);
         assert!(kwh <= all_kwh && share < 0.5, "{begin} to {end}: {kwh} of {all_kwh} kWh, known {share}");
     }
