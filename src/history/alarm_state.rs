@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn zeros_of_a_lost_block_are_no_damage_behind_the_last_whole_line() {
+    fn zeros_behind_the_last_whole_line_are_no_damage() {
         let at = Timestamp::UNIX_EPOCH;
         let event = |text: &str| line(&AlarmRecord::new(at, "TIC-1.PV", text, Priority::High, AlarmEvent::Raised));
         let (whole, last) = (format!("{HEADER}{}", event("high")), event("low"));
