@@ -41,7 +41,7 @@ impl Columns {
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, (devices, selected): (&[&DeviceDef], usize), found: &str) {
     let theme = cx.theme;
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
-    canvas.text(1, 0, &fit_words(&summary(cx, found), end), theme.normal());
+    canvas.text(1, 0, &fit_words(&summary(cx, devices.len(), found), end), theme.normal());
     let columns = Columns::new(cx, canvas.width());
     put(canvas, 1, heading(&columns, theme.dim()));
     let room = usize::from(bottom.saturating_sub(3)).max(1);
@@ -68,8 +68,8 @@ pub fn foot(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
     canvas.text(x, bottom, &fit_words(&words, end.saturating_sub(x)), style);
 }
 
-/// `31 devices   2 not responding   1 with alarms`, behind the words of the filter.
-pub fn summary(cx: &ViewContext, found: &str) -> String {
+/// `31 devices   2 not responding   1 with alarms`, behind the words of the filter; where it leaves none, that.
+pub fn summary(cx: &ViewContext, shown: usize, found: &str) -> String {
     let devices = &cx.def().devices;
     let down = devices.iter().filter(|device| {
         let status = cx.snapshot.device(device.id);
@@ -84,6 +84,9 @@ pub fn summary(cx: &ViewContext, found: &str) -> String {
         if count > 0 {
             words.push_str(&format!("   {count} {what}"));
         }
+    }
+    if shown == 0 && !found.is_empty() {
+        words = t!("No matching entries.").to_owned();
     }
     if found.is_empty() { words } else { t!("only \"{filter}\", Esc shows all", filter = found) + "   " + &words }
 }

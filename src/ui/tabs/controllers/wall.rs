@@ -85,7 +85,7 @@ pub fn view(
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     let area = canvas.area();
     let grid = Grid::new(cx.size, area, devices.len());
-    let x = canvas.text(1, 0, &fit_words(&list::summary(cx, found), end), cx.theme.normal());
+    let x = canvas.text(1, 0, &fit_words(&list::summary(cx, devices.len(), found), end), cx.theme.normal());
     if let Some(trouble) = &curves.trouble {
         let words = t!("no curves: {trouble}", trouble);
         canvas.text(x + 2, 0, &fit_words(&words, end.saturating_sub(x + 14)), cx.theme.trouble());

@@ -26,5 +26,7 @@ fn devices_are_found_by_their_names_as_table_and_as_faceplates() {
         assert!(screen(&mut model, width, 50).contains("‹ TIC-31 ›"));
         type_keys(&mut model, "⎋⎋");
         assert!(screen(&mut model, width, 50).contains("TIC-30"), "Esc shows all");
+        type_keys(&mut model, "/xyz");
+        assert!(screen(&mut model, width, 50).contains("No matching entries."));
     }
 }
