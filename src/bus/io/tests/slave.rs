@@ -24,9 +24,9 @@ use crate::{
     },
     plant::{
         PlantDef,
-        command::BusRequest,
+        command::{BusRequest, WriteId, WriteJob},
         def::{DeviceDef, DeviceId, Framing, Limits, LineId, Rs485, Serial, TagId, Transport},
-        event::{Event, Fault},
+        event::{Event, Fault, WriteResult},
         fixture,
         line_finding::DeviceFinding,
         tag::{DataType, Point, Poll, Table, TagDef},
@@ -323,6 +323,18 @@ impl Line {
                 return event;
             }
         }
+    }
+
+    /// Writes a raw number to the first tag, and gives the result.
+    pub async fn write(&mut self, def: &PlantDef, raw: f64, verify: bool) -> WriteResult {
+        let (id, tag) = (WriteId(7), TagId(0));
+        let job = WriteJob { id, tag, raw: raw.into(), unlock: None, verify, urgent: false };
+        self.requests.send(BusRequest::Write(job)).await.expect("the line runs");
+        let wrote = |event: &Event| match event {
+            Event::Wrote { id: WriteId(7), result, .. } => Some(result.clone()),
+            _ => None,
+        };
+        self.until(def, wrote).await
     }
 
     /// Goes on to the first event of which `pick` makes something.

@@ -16,21 +16,7 @@ async fn write(action: SlaveAction, read_back: SlaveAction) -> (WriteResult, usi
         if message[2..6] == [0, 10, 0, 1] { read_back.clone() } else { SlaveAction::Answer }
     });
     line.read(&def).await;
-    let request = BusRequest::Write(WriteJob {
-        id: WriteId(7),
-        tag: TagId(0),
-        raw: 10.0.into(),
-        unlock: None,
-        verify: true,
-        urgent: false,
-    });
-    line.requests.send(request).await.expect("the line runs");
-    let result = line
-        .until(&def, |event| match event {
-            Event::Wrote { id: WriteId(7), result, .. } => Some(result.clone()),
-            _ => None,
-        })
-        .await;
+    let result = line.write(&def, 10.0, true).await;
     for _ in 0..20 {
         line.next(&def).await;
     }
@@ -92,15 +78,7 @@ async fn a_broadcast_is_sent_once_and_never_called_verified() {
                 if mode == Mode::Tcp { SlaveAction::Answer } else { SlaveAction::Silent }
             });
             line.read(&def).await;
-            let job =
-                WriteJob { id: WriteId(1), tag: TagId(0), raw: 1.0.into(), unlock: None, verify: false, urgent: false };
-            line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
-            let result = line
-                .until(&def, |event| match event {
-                    Event::Wrote { result, .. } => Some(result.clone()),
-                    _ => None,
-                })
-                .await;
+            let result = line.write(&def, 1.0, false).await;
             assert_eq!((result, heard.load(Ordering::Relaxed)), (expect.clone(), 1), "{mode:?}, function {function}");
             line.read(&def).await;
         }
@@ -275,15 +253,7 @@ async fn a_part_of_a_register_is_written_with_the_rest_as_read() {
             }
         });
         line.read(&def).await;
-        let job =
-            WriteJob { id: WriteId(1), tag: TagId(0), raw: 5.0.into(), unlock: None, verify: true, urgent: false };
-        line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
-        let result = line
-            .until(&def, |event| match event {
-                Event::Wrote { result, .. } => Some(result.clone()),
-                _ => None,
-            })
-            .await;
+        let result = line.write(&def, 5.0, true).await;
         assert_eq!((result, heard.lock().expect("one at a time").clone()), (expect, sent));
     }
 }

@@ -14,14 +14,17 @@ use duckdb::{
 use jiff::Timestamp;
 
 use crate::{
-    history::import::{self, Header, Record, Rows},
+    history::{
+        HistoryError,
+        import::{self, Header, Record, Rows},
+    },
     plant::def::PlantDef,
 };
 
 /// Its first and its last bytes.
 const MARK: &[u8] = b"PAR1";
 /// Of the engine: of a row group only what is read of it is in memory.
-const MEMORY: &str = "256MB";
+const MEMORY: &str = "128MB";
 
 /// Does it begin as such a file? It stands at its beginning then as before.
 pub fn is_one(file: &mut File) -> std::io::Result<bool> {
@@ -33,9 +36,13 @@ pub fn is_one(file: &mut File) -> std::io::Result<bool> {
 
 /// Its rows, with times from the first of these up to the second.
 pub fn read(file: &File, def: &PlantDef, times: [Timestamp; 2]) -> Result<Rows, Vec<String>> {
-    let wrong = |error: duckdb::Error| vec![format!("cannot be read as Parquet: {error}")];
     // The file that was opened, whatever has its name by now.
     let path = format!("/dev/fd/{}", file.as_raw_fd());
+    let plain = |error: &duckdb::Error| {
+        let words = HistoryError::Engine(error.to_string()).words();
+        words.replace(&format!("'{path}'"), "it").replace(&path, "it")
+    };
+    let wrong = |error: duckdb::Error| vec![format!("cannot be read as Parquet: {}", plain(&error))];
     let db = engine(&path).map_err(wrong)?;
     let columns = columns(&db, &path).map_err(wrong)?;
     let header =
@@ -51,7 +58,7 @@ pub fn read(file: &File, def: &PlantDef, times: [Timestamp; 2]) -> Result<Rows, 
         while batch.is_empty() {
             let next = match statement.step() {
                 Ok(next) => next?,
-                Err(error) => return Some((number + 1, Err(error.to_string()))),
+                Err(error) => return Some((number + 1, Err(plain(&error)))),
             };
             let cells: Vec<_> = next.columns().iter().map(|column| column.as_string::<i32>()).collect();
             let row = |row: usize| {
