@@ -101,6 +101,9 @@ fn write(args: &WriteArgs) -> Result<(), CliError> {
     in_runtime(async {
         let (source, period) = args.history.open(&def).await?;
         let Answer::Report(report) = source.query(Query::Report { period }).await? else { return Err(unexpected()) };
+        if report.unstored != Some(0) {
+            say_error("the history has not stored all records yet: what they say of the period is missing");
+        }
         for gap in &report.unreadable {
             let [from, to] = [gap.from, gap.to].map(|at| at.to_zoned(def.time_zone.clone()).strftime("%F %T"));
             say_error(&format!(

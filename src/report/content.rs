@@ -134,6 +134,10 @@ fn summary(report: &ShiftReport, def: &PlantDef) -> Vec<Fact> {
     if report.until < report.period.to {
         facts.push(fact("still running, figures until", Cell::Time(report.until)));
     }
+    if report.unstored != Some(0) {
+        let waiting = report.unstored.map_or(Cell::text("?"), |records| Cell::number(Some(records as f64), 0));
+        facts.push(fact("records not stored yet, and missing here", waiting));
+    }
     let good: f64 = report.tags.iter().map(|tag| tag.good).sum();
     let tags = report.tags.len();
     let share = (tags > 0).then(|| floor_percent(good / tags as f64));

@@ -269,6 +269,9 @@ pub struct ShiftReport {
     pub until: Timestamp,
     /// The last entry of the audit log before `until`: whoever changes the log later must change every copy of the report.
     pub audit: Option<ChainHash>,
+    /// Records that waited for the disk of the history when the report was made: whatever they say of the period is
+    /// missing. `None` where the history did not say in time how many.
+    pub unstored: Option<u64>,
     /// Where stored values could not be read: there, none is counted.
     pub unreadable: Vec<Gap>,
     /// One row a tag.

@@ -164,6 +164,7 @@ pub fn shift_report() -> ShiftReport {
         period: Period { name: named("morning 2026-11-21"), from, to: at("2026-11-21T14:00+07") },
         until: at("2026-11-21T13:59:30+07"),
         audit: Some(ChainHash { number: 17, hash: [0xA5; 32] }),
+        unstored: Some(0),
         unreadable: vec![Gap {
             from: from + Duration::from_secs(3_600),
             to: from + Duration::from_secs(3_720),

@@ -147,6 +147,23 @@ fn a_page_of_text_is_never_wider_than_80_columns() {
 }
 
 #[test]
+fn records_that_wait_for_the_disk_are_said_to_be_missing() {
+    let rows = |unstored| {
+        let def = plant("Asia/Bangkok", &THREE);
+        let report = crate::report::ShiftReport { unstored, ..shift_report() };
+        let document = document(&report, &def, Language::ENGLISH.locale());
+        let format = super::format("text").expect("a format");
+        let text =
+            String::from_utf8(format.render(&document, &Style::of(&def)).expect("it can be made")).expect("text");
+        text.lines().filter(|line| line.contains("not stored yet")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert!(rows(Some(0)).is_empty());
+    for (unstored, ends) in [(Some(7), " 7"), (None, " ?")] {
+        assert!(rows(unstored).iter().any(|row| row.ends_with(ends)), "{:?}", rows(unstored));
+    }
+}
+
+#[test]
 fn a_tag_has_its_label_beside_its_name() {
     let mut def = plant("Asia/Bangkok", &THREE);
     def.tags[0].label = "tank temperature".into();

@@ -157,7 +157,9 @@ impl Life {
         let hour = base.as_second() / 3600 * 3600;
         for from in [hour - 3600, hour - 7200] {
             let [from, to] = [from, from + 3600].map(|second| Timestamp::from_second(second).unwrap());
-            if let Some(Answer::Report(report)) = ask(session, Query::Report { period: Period::free(from, to) }).await {
+            if let Some(Answer::Report(report)) = ask(session, Query::Report { period: Period::free(from, to) }).await
+                && report.unstored == Some(0)
+            {
                 let figures = report::render(FORMATS[0], &report, def, &Style::of(def)).unwrap();
                 let figures = String::from_utf8(figures).unwrap().replace("\r\n", " / ");
                 match self.facts.figures.get(&from) {

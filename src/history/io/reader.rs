@@ -60,8 +60,8 @@ pub type Answerer = Arc<dyn Fn(&Store, &Query, Timestamp) -> Result<Answer, Hist
 /// What the reader asks of the writer.
 #[derive(Debug)]
 pub enum WriterRequest {
-    /// Store what is pending, and say when that is done.
-    Commit(oneshot::Sender<()>),
+    /// Store what is pending, and say how many records could not be stored.
+    Commit(oneshot::Sender<u64>),
     /// Report to the operator what cannot be read.
     Unreadable(String),
 }
@@ -140,11 +140,16 @@ impl Reader {
             let interrupt = store.interrupt_handle();
             let mut work = None;
             let answered = async {
-                if counts_a_period(&query) {
-                    commit_first(&writer).await;
-                }
+                let unstored = if counts_a_period(&query) { commit_first(&writer).await } else { Some(0) };
                 let now = clock.utc();
-                work.insert(spawn_blocking(move || (answer(&store, &query, now), store.unreadable.take()))).await
+                let answer = move || {
+                    let mut answer = answer(&store, &query, now);
+                    if let Ok(Answer::Report(report)) = &mut answer {
+                        report.unstored = unstored;
+                    }
+                    (answer, store.unreadable.take())
+                };
+                work.insert(spawn_blocking(answer)).await
             };
             let ended = tokio::select! {
                 answered = timeout(QUERY_TIME_MAX, answered) => answered.map_err(|_| HistoryError::TooLong { seconds: QUERY_TIME_MAX.as_secs() }),
@@ -217,12 +222,12 @@ fn counts_a_period(query: &Query) -> bool {
     }
 }
 
-/// Waits until what is pending is stored; a writer that is too busy for it is not waited for.
-async fn commit_first(writer: &mpsc::Sender<WriterRequest>) {
+/// Waits until what is pending is stored, and says how many records still wait; a writer that is too busy for it is not
+/// waited for: `None`.
+async fn commit_first(writer: &mpsc::Sender<WriterRequest>) -> Option<u64> {
     let (done, committed) = oneshot::channel();
-    if writer.try_send(WriterRequest::Commit(done)).is_ok() {
-        let _ = timeout(COMMIT_MAX, committed).await;
-    }
+    writer.try_send(WriterRequest::Commit(done)).ok()?;
+    timeout(COMMIT_MAX, committed).await.ok()?.ok()
 }
 
 /// Interrupts work until it has ended; `false` for what hangs in the disk, which is left behind.

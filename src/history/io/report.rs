@@ -100,6 +100,7 @@ impl Store {
             period,
             until,
             audit,
+            unstored: Some(0),
             unreadable,
             tags,
             compared,

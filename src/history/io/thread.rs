@@ -248,7 +248,7 @@ async fn run(
                     writer.commit(clock.utc());
                     outputs.publish(writer);
                     // The query may have been cancelled meanwhile.
-                    let _ = done.send(());
+                    let _ = done.send(writer.status().waiting);
                 }
                 WriterRequest::Unreadable(what) => {
                     writer.unreadable(what);

@@ -200,16 +200,17 @@ async fn a_report_waits_for_the_commit_but_not_for_ever() {
     let (_folder, db) = folder();
     let mut reader = alone(Arc::new(Store::answer));
     reader.hand_over(Some(open(&db, 0))).await;
-    for answers in [true, false] {
+    for stored in [Some(0), Some(7), None] {
         let (reply, mut answer) = oneshot::channel();
         let period = Period::free(sec(0), sec(10));
         reader.queries.send((1, QueryRequest { query: Query::Report { period }, reply })).await.unwrap();
         let Some(WriterRequest::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
         assert!(answer.try_recv().is_err(), "answered before the commit");
-        if answers {
-            done.send(()).unwrap();
+        if let Some(waiting) = stored {
+            done.send(waiting).unwrap();
         }
-        assert!(matches!(answer.await, Ok(Ok(Answer::Report(_)))));
+        let Ok(Ok(Answer::Report(report))) = answer.await else { panic!("no report") };
+        assert_eq!(report.unstored, stored, "what is missing in it is said");
     }
 }
 

@@ -177,6 +177,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
         period,
         until,
         audit: full.then_some(ChainHash { number: 1_042, hash: [0xA5; 32] }),
+        unstored: Some(0),
         unreadable: Vec::new(),
         compared: Vec::new(),
         runs: Vec::new(),

@@ -231,6 +231,9 @@ pub fn lines(
     // The CSV has the whole hash.
     let audit = report.audit.map(|entry| fit(&t!("  audit log: entry {entry}", entry), cx.area.width));
     lines.extend(audit.map(|words| Line::styled(words, theme.dim())));
+    if report.unstored != Some(0) {
+        lines.push(Line::styled(t!("  records not stored yet are missing here"), theme.trouble()));
+    }
     for gap in &report.unreadable {
         let time = |at: Timestamp| draw::local(cx, at, "%m-%d %H:%M");
         let words = t!("  not readable, not counted: {time} to {time2}", time = time(gap.from), time2 = time(gap.to));
