@@ -7,7 +7,7 @@ use ratatui::{Frame, layout::Rect, style::Style};
 use super::{
     Faceplate, Modal, Next,
     confirmed_value::ConfirmedValue,
-    form::{Field, Form, Turn},
+    form::{Field, Form, KeyOutcome},
     window,
 };
 use crate::{
@@ -212,9 +212,9 @@ impl Confirm {
         if let Some(form) = &mut self.reauthentication {
             // Letters belong to the name and the password.
             match form.on_key(event) {
-                Turn::Finished => return self.yes(cx),
-                Turn::Taken => self.problem = None,
-                Turn::Nothing => {}
+                KeyOutcome::Submitted => return self.yes(cx),
+                KeyOutcome::Taken => self.problem = None,
+                KeyOutcome::Ignored => {}
             }
             return Next::Stay(Modal::Confirm(self));
         }
@@ -292,8 +292,9 @@ impl Confirm {
     /// What of the window is below the words: rows of the form and of what is wrong with it.
     fn view_reauthentication(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16) {
         if let Some(form) = &self.reauthentication {
-            form.view(cx, canvas, y);
-            let y = y + form.rows();
+            let rows = y..y + form.rows();
+            form.view(cx, canvas, form.labels(), rows.clone());
+            let y = rows.end;
             if self.waiting {
                 canvas.text(0, y, t!("waiting for the station …"), cx.theme.dim());
             }
@@ -355,7 +356,7 @@ fn reauthentication_form(kind: Reauthentication) -> Form {
 fn credentials(form: &Form) -> Credentials {
     match form.rows() {
         1 => Credentials { user: None, password: form.secret(0) },
-        _ => Credentials { user: Some(form.name(0)), password: form.secret(1) },
+        _ => Credentials { user: Some(form.text(0)), password: form.secret(1) },
     }
 }
 

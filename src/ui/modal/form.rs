@@ -1,18 +1,17 @@
-//! A few lines to fill in, one below the other: names, passwords that are never shown, a role.
+//! A form: fields one below the other, typed or chosen. Every window that is filled in is one.
 
 use crate::t;
-use crate::text::translate;
-use std::fmt;
+use std::{fmt, ops::Range};
 
-use crossterm::event::{KeyCode, KeyEvent};
+use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 
 use super::line::Line;
 use crate::{
     access::Secret,
-    plant::{number::to_u16, role::Role},
+    plant::number::to_u16,
     ui::{
         ViewContext, keys,
-        widgets::text::{Canvas, pad, width},
+        widgets::text::{Canvas, fit, pad, width},
     },
 };
 
@@ -20,166 +19,306 @@ use crate::{
 const SECRET_CHARS: usize = 128;
 const NAME_CHARS: usize = 32;
 
-/// Lines to fill in.
+/// Fields to fill in.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Form {
     fields: Vec<Field>,
-    /// The one that is typed into.
+    /// The selected one.
     at: usize,
     /// Passwords are readable, on request.
     shown: bool,
+    /// Enter submits on any field, where a form is mostly filled in already.
+    submits: bool,
 }
 
-/// A line of a form. What was typed never comes out of its `Debug`.
+/// A field of a form. What was typed never comes out of its `Debug`.
 #[derive(Clone, PartialEq)]
 pub struct Field {
     label: &'static str,
-    what: What,
+    input: Input,
+    /// What may be typed, shown while it is; empty where it need not be said.
+    range: String,
+    /// It has no meaning beside what other fields hold: not shown, not reached.
+    hidden: bool,
 }
 
 #[derive(Clone, PartialEq)]
-enum What {
+enum Input {
     Text(Line),
+    /// Only digits: a letter may be a key of the window.
+    Digits(Line),
     Secret(Line),
-    Role(Role),
+    Choice(Vec<String>, usize),
 }
 
 /// What a key did to a form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Turn {
-    /// Something was typed, or another line is typed into now.
+pub enum KeyOutcome {
+    /// Something was typed or chosen, or another field is selected.
     Taken,
-    /// Enter on the last line: the form is finished.
-    Finished,
+    /// Enter: the form is submitted.
+    Submitted,
     /// Nothing.
-    Nothing,
+    Ignored,
+}
+
+/// Where a field was drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Drawn {
+    /// Its place in the form.
+    pub field: usize,
+    /// Its row.
+    pub y: u16,
+    /// The column behind its value.
+    pub end: u16,
 }
 
 impl Field {
     /// A name, empty.
     pub fn name(label: &'static str) -> Field {
-        Field { label, what: What::Text(Line::long("", NAME_CHARS)) }
+        Field::text(label, "", NAME_CHARS)
+    }
+    /// A text of at most so many characters, to start from.
+    pub fn text(label: &'static str, text: &str, chars: usize) -> Field {
+        Field::new(label, Input::Text(Line::long(text, chars)))
+    }
+    /// A whole number, to start from.
+    pub fn digits(label: &'static str, number: impl fmt::Display) -> Field {
+        Field::new(label, Input::Digits(Line::new(&number.to_string())))
     }
     /// A password, empty.
     pub fn secret(label: &'static str) -> Field {
-        Field { label, what: What::Secret(Line::long("", SECRET_CHARS)) }
+        Field::new(label, Input::Secret(Line::long("", SECRET_CHARS)))
     }
-    /// A role to choose.
-    pub fn role(label: &'static str, role: Role) -> Field {
-        Field { label, what: What::Role(role) }
+    /// One of a few, never none; this one at first.
+    pub fn choice(label: &'static str, options: impl IntoIterator<Item = impl Into<String>>, chosen: usize) -> Field {
+        let options: Vec<String> = options.into_iter().map(Into::into).collect();
+        Field::new(label, Input::Choice(options, chosen))
+    }
+    /// One of these, each with its words; this one at first.
+    pub fn one_of<T: Copy + PartialEq, W: Into<String>>(
+        label: &'static str,
+        all: &[T],
+        now: T,
+        words: impl Fn(T) -> W,
+    ) -> Field {
+        let chosen = all.iter().position(|one| *one == now).unwrap_or(0);
+        Field::choice(label, all.iter().map(|one| words(*one)), chosen)
+    }
+    /// With what may be typed.
+    pub fn within(self, range: impl Into<String>) -> Field {
+        Field { range: range.into(), ..self }
+    }
+
+    fn new(label: &'static str, input: Input) -> Field {
+        Field { label, input, range: String::new(), hidden: false }
+    }
+
+    fn line(&self) -> Option<&Line> {
+        match &self.input {
+            Input::Text(line) | Input::Digits(line) | Input::Secret(line) => Some(line),
+            Input::Choice(..) => None,
+        }
+    }
+
+    fn type_key(&mut self, event: KeyEvent) -> bool {
+        let is_letter = matches!(event.code, KeyCode::Char(c) if !c.is_ascii_digit());
+        match &mut self.input {
+            Input::Text(line) | Input::Secret(line) => line.on_key(event),
+            Input::Digits(_) if is_letter && !event.modifiers.contains(KeyModifiers::CONTROL) => false,
+            Input::Digits(line) => line.on_key(event),
+            Input::Choice(options, chosen) => {
+                let by = match event.code {
+                    KeyCode::Left => options.len() - 1,
+                    KeyCode::Right | KeyCode::Char(' ') => 1,
+                    _ => return false,
+                };
+                *chosen = (*chosen + by) % options.len();
+                true
+            }
+        }
     }
 }
 
 impl Form {
-    /// A form of these lines; the first is typed into.
+    /// A form of these fields; the first empty one is selected. Enter leads from one to the next, and submits on the last.
     pub fn new(fields: Vec<Field>) -> Form {
-        let mut form = Form { fields, at: 0, shown: false };
+        let mut form = Form { fields, at: 0, shown: false, submits: false };
         form.forget();
         form
     }
 
-    /// Lines of it.
+    /// The same, submitted with Enter on any field; this one is selected.
+    pub fn submitting(fields: Vec<Field>, at: usize) -> Form {
+        Form { fields, at, shown: false, submits: true }
+    }
+
+    /// Rows of it.
     pub fn rows(&self) -> u16 {
-        to_u16(self.fields.len())
+        to_u16(self.fields.iter().filter(|field| !field.hidden).count())
+    }
+
+    /// Its fields, hidden ones too.
+    pub fn count(&self) -> usize {
+        self.fields.len()
+    }
+
+    /// The place of the selected field.
+    pub fn selected(&self) -> usize {
+        self.at
+    }
+
+    /// Selects a field.
+    pub fn select(&mut self, n: usize) {
+        self.at = n.min(self.fields.len().saturating_sub(1));
+    }
+
+    /// Selects the next field that is shown, if there is one.
+    pub fn select_next(&mut self) {
+        self.at = self.next(1).unwrap_or(self.at);
     }
 
     /// Is there a password to be typed?
     pub fn has_secret(&self) -> bool {
-        self.fields.iter().any(|field| matches!(field.what, What::Secret(_)))
+        self.fields.iter().any(|field| matches!(field.input, Input::Secret(_)))
     }
 
-    /// What stands in line `n`, without blanks around it; empty for a role.
-    pub fn name(&self, n: usize) -> String {
-        match self.fields.get(n).map(|field| &field.what) {
-            Some(What::Text(line)) => line.text().trim().to_owned(),
-            Some(What::Secret(_) | What::Role(_)) | None => String::new(),
+    /// Is the selected field chosen with ← and →?
+    pub fn is_on_choice(&self) -> bool {
+        matches!(self.fields.get(self.at).map(|field| &field.input), Some(Input::Choice(..)))
+    }
+
+    /// Is every letter typed into the selected field, so that none is a key?
+    pub fn is_on_text(&self) -> bool {
+        matches!(self.fields.get(self.at).map(|field| &field.input), Some(Input::Text(_) | Input::Secret(_)))
+    }
+
+    /// What stands in field `n`, without blanks around it; of a choice its words, of a password nothing.
+    pub fn text(&self, n: usize) -> String {
+        match self.fields.get(n).map(|field| &field.input) {
+            Some(Input::Text(line) | Input::Digits(line)) => line.text().trim().to_owned(),
+            Some(Input::Choice(options, chosen)) => options[*chosen].clone(),
+            Some(Input::Secret(_)) | None => String::new(),
         }
     }
 
-    /// The password in line `n`, as it was typed.
+    /// The label of field `n`.
+    pub fn label(&self, n: usize) -> &'static str {
+        self.fields.get(n).map_or("", |field| field.label)
+    }
+
+    /// The password in field `n`, as it was typed.
     pub fn secret(&self, n: usize) -> Secret {
-        match self.fields.get(n).map(|field| &field.what) {
-            Some(What::Secret(line)) => Secret(line.text()),
-            Some(What::Text(_) | What::Role(_)) | None => Secret::default(),
+        match self.fields.get(n).map(|field| &field.input) {
+            Some(Input::Secret(line)) => Secret(line.text()),
+            Some(Input::Text(_) | Input::Digits(_) | Input::Choice(..)) | None => Secret::default(),
         }
     }
 
-    /// The role that is chosen.
-    pub fn role(&self) -> Option<Role> {
-        self.fields.iter().find_map(|field| match field.what {
-            What::Role(role) => Some(role),
-            What::Text(_) | What::Secret(_) => None,
-        })
+    /// Which of its options field `n` has, if it is a choice.
+    pub fn choice(&self, n: usize) -> Option<usize> {
+        match self.fields.get(n).map(|field| &field.input) {
+            Some(Input::Choice(_, chosen)) => Some(*chosen),
+            Some(Input::Text(_) | Input::Digits(_) | Input::Secret(_)) | None => None,
+        }
     }
 
-    /// The first line that holds something else than its author meant, or nothing; typing goes on there.
+    /// The same of a field that is one; 0 else.
+    pub fn chosen(&self, n: usize) -> usize {
+        self.choice(n).unwrap_or(0)
+    }
+
+    /// Puts another field in this place.
+    pub fn replace(&mut self, n: usize, field: Field) {
+        self.fields[n] = field;
+    }
+
+    /// Replaces all fields from this place on.
+    pub fn replace_from(&mut self, n: usize, fields: Vec<Field>) {
+        self.fields.splice(n.., fields);
+        self.select(self.at);
+    }
+
+    /// Is a field hidden?
+    pub fn is_hidden(&self, n: usize) -> bool {
+        self.fields[n].hidden
+    }
+
+    /// Hides a field, or shows it.
+    pub fn hide(&mut self, n: usize, hidden: bool) {
+        self.fields[n].hidden = hidden;
+    }
+
+    /// Does a field hold something else than its author meant? The text is incomplete until it is cleared.
+    pub fn is_cut(&self) -> bool {
+        self.fields.iter().filter(|field| !field.hidden).filter_map(Field::line).any(Line::missed)
+    }
+
+    /// The first field that holds something else than its author meant, or nothing; it is selected.
     pub fn lacking(&mut self) -> Option<String> {
-        let lacks = |field: &Field| match &field.what {
-            What::Text(line) | What::Secret(line) if line.missed() => {
-                Some(t!("the text was cut; Ctrl-U clears the line").to_owned())
-            }
-            What::Text(line) if line.text().trim().is_empty() => Some(required(field.label)),
-            What::Secret(line) if line.text().is_empty() => Some(required(field.label)),
-            What::Text(_) | What::Secret(_) | What::Role(_) => None,
+        let lacks = |field: &Field| match &field.input {
+            Input::Text(line) | Input::Digits(line) | Input::Secret(line) if line.missed() => Some(cut()),
+            Input::Text(line) | Input::Digits(line) if line.text().trim().is_empty() => Some(required(field.label)),
+            Input::Secret(line) if line.text().is_empty() => Some(required(field.label)),
+            Input::Text(_) | Input::Digits(_) | Input::Secret(_) | Input::Choice(..) => None,
         };
         let (n, why) = self.fields.iter().enumerate().find_map(|(n, field)| Some((n, lacks(field)?)))?;
         self.at = n;
         Some(why)
     }
 
-    /// Empties the passwords; the first empty line is typed into.
+    /// Empties the passwords; the first empty field is selected.
     pub fn forget(&mut self) {
         for field in &mut self.fields {
-            if let What::Secret(line) = &mut field.what {
+            if let Input::Secret(line) = &mut field.input {
                 *line = Line::long("", SECRET_CHARS);
             }
         }
-        let empty = |field: &Field| match &field.what {
-            What::Text(line) | What::Secret(line) => line.text().is_empty(),
-            What::Role(_) => false,
-        };
+        let empty = |field: &Field| field.line().is_some_and(|line| line.text().is_empty());
         self.at = self.fields.iter().position(empty).unwrap_or(0);
         self.shown = false;
     }
 
     /// A key.
-    pub fn on_key(&mut self, event: KeyEvent) -> Turn {
-        let last = self.fields.len().saturating_sub(1);
-        let choosing = matches!(self.fields.get(self.at).map(|field| &field.what), Some(What::Role(_)));
+    pub fn on_key(&mut self, event: KeyEvent) -> KeyOutcome {
+        let enter = keys::code(KeyCode::Enter).is(event);
         match event.code {
-            KeyCode::Enter if keys::code(KeyCode::Enter).is(event) && self.at >= last => return Turn::Finished,
-            KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => self.at += 1,
-            KeyCode::Down => self.at = (self.at + 1).min(last),
-            KeyCode::Tab => self.at = (self.at + 1) % (last + 1),
-            KeyCode::Up => self.at = self.at.saturating_sub(1),
-            KeyCode::BackTab => self.at = (self.at + last) % (last + 1),
-            KeyCode::Left if choosing => self.choose(-1),
-            KeyCode::Right | KeyCode::Char(' ') if choosing => self.choose(1),
-            _ if keys::ctrl('r').is(event) => self.shown = !self.shown,
+            KeyCode::Enter if enter && (self.submits || self.next(1).is_none()) => return KeyOutcome::Submitted,
+            KeyCode::Enter if !enter => return KeyOutcome::Ignored,
+            KeyCode::Enter | KeyCode::Down => self.at = self.next(1).unwrap_or(self.at),
+            KeyCode::Up => self.at = self.next(-1).unwrap_or(self.at),
+            KeyCode::Tab => self.at = self.next(1).or_else(|| self.shown_at(true)).unwrap_or(self.at),
+            KeyCode::BackTab => self.at = self.next(-1).or_else(|| self.shown_at(false)).unwrap_or(self.at),
+            _ if keys::ctrl('r').is(event) && self.has_secret() => self.shown = !self.shown,
             _ => {
-                let typed = match self.fields.get_mut(self.at).map(|field| &mut field.what) {
-                    Some(What::Text(line) | What::Secret(line)) => line.on_key(event),
-                    Some(What::Role(_)) | None => false,
-                };
-                return if typed { Turn::Taken } else { Turn::Nothing };
+                let typed = self.fields.get_mut(self.at).is_some_and(|field| field.type_key(event));
+                return if typed { KeyOutcome::Taken } else { KeyOutcome::Ignored };
             }
         }
-        Turn::Taken
+        KeyOutcome::Taken
     }
 
-    /// Pasted text goes into the line that is typed into; a line end at its end is no part of a password.
-    pub fn paste(&mut self, text: &str) {
-        match self.fields.get_mut(self.at).map(|field| &mut field.what) {
-            Some(What::Text(line)) => line.paste(text),
-            Some(What::Secret(line)) => line.paste_whole(text.trim_end_matches(['\r', '\n'])),
-            Some(What::Role(_)) | None => {}
+    /// The next field that is shown, down (1) or up (-1).
+    fn next(&self, by: isize) -> Option<usize> {
+        let is_shown = |n: &usize| !self.fields[*n].hidden;
+        match by {
+            1 => (self.at + 1..self.fields.len()).find(is_shown),
+            _ => (0..self.at).rev().find(is_shown),
         }
     }
 
-    fn choose(&mut self, by: isize) {
-        if let Some(What::Role(role)) = self.fields.get_mut(self.at).map(|field| &mut field.what) {
-            let place = Role::ALL.iter().position(|other| other == role).unwrap_or(0) as isize;
-            *role = Role::ALL[(place + by).rem_euclid(Role::ALL.len() as isize) as usize];
+    /// The first field that is shown, or the last.
+    fn shown_at(&self, first: bool) -> Option<usize> {
+        let mut shown = (0..self.fields.len()).filter(|n| !self.fields[*n].hidden);
+        if first { shown.next() } else { shown.next_back() }
+    }
+
+    /// Pasted text goes into the selected field if it is typed; a line end at its end is no part of a password.
+    pub fn paste(&mut self, text: &str) {
+        match self.fields.get_mut(self.at).map(|field| &mut field.input) {
+            Some(Input::Text(line) | Input::Digits(line)) => line.paste(text),
+            Some(Input::Secret(line)) => line.paste_whole(text.trim_end_matches(['\r', '\n'])),
+            Some(Input::Choice(..)) | None => {}
         }
     }
 
@@ -188,41 +327,51 @@ impl Form {
         self.labels() + 36
     }
 
-    fn labels(&self) -> u16 {
+    /// Columns of its labels, with the mark before and a gap behind them.
+    pub fn labels(&self) -> u16 {
         self.fields.iter().map(|field| width(field.label)).max().unwrap_or(0) + 4
     }
 
-    /// Draws it from row `y` on. The line that is typed into has the mark and the cursor.
-    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16) {
+    /// Draws it into these rows, values from column `x` on: on a small screen those around the selected field, which has the
+    /// mark, the cursor, or arrows around its choice.
+    pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, x: u16, rows: Range<u16>) -> Vec<Drawn> {
         let theme = cx.theme;
-        for (n, field) in self.fields.iter().enumerate() {
-            let (y, here) = (y + to_u16(n), n == self.at);
+        let shown: Vec<usize> = (0..self.fields.len()).filter(|n| !self.fields[*n].hidden).collect();
+        let selected = shown.iter().position(|n| *n == self.at).unwrap_or(0);
+        let first = (selected + 1).saturating_sub(rows.len());
+        let mut drawn = Vec::new();
+        for (y, n) in rows.zip(shown.into_iter().skip(first)) {
+            let (field, here) = (&self.fields[n], n == self.at);
             let mark = if here { theme.pick("▸ ", "> ") } else { "  " };
-            canvas.text(0, y, &format!("{mark}{}", pad(field.label, self.labels())), theme.normal());
-            let x = self.labels();
-            match &field.what {
-                What::Role(role) => {
+            let label = canvas.text(0, y, mark, theme.strong());
+            canvas.text(label, y, &pad(field.label, x.saturating_sub(label + 1)), theme.normal());
+            let end = match &field.input {
+                Input::Choice(options, chosen) => {
                     let style = if here { theme.focus() } else { theme.strong() };
-                    let end = canvas.text(x, y, translate(role.word()), style);
-                    if here {
-                        canvas.text(end + 2, y, theme.pick(t!("← → change"), t!("left/right change")), theme.dim());
-                    }
+                    canvas.text(x, y, &format!("‹ {} ›", options[*chosen]), style)
                 }
-                What::Text(line) => draw(cx, canvas, (x, y), line, here),
-                What::Secret(line) if self.shown => draw(cx, canvas, (x, y), line, here),
-                What::Secret(line) => draw(cx, canvas, (x, y), &line.hidden(theme.pick('•', '*')), here),
+                Input::Text(line) | Input::Digits(line) => draw(cx, canvas, (x, y), line, here),
+                Input::Secret(line) if self.shown => draw(cx, canvas, (x, y), line, here),
+                Input::Secret(line) => draw(cx, canvas, (x, y), &line.hidden(theme.pick('•', '*')), here),
+            };
+            if here {
+                let left = canvas.width().saturating_sub(end + 2);
+                canvas.text_right(canvas.width(), y, &fit(&field.range, left), theme.dim());
             }
+            drawn.push(Drawn { field: n, y, end });
         }
+        drawn
     }
 }
 
-fn draw(cx: &ViewContext, canvas: &mut Canvas, (x, y): (u16, u16), line: &Line, here: bool) {
+fn draw(cx: &ViewContext, canvas: &mut Canvas, (x, y): (u16, u16), line: &Line, here: bool) -> u16 {
     if here {
-        line.view(cx.theme, canvas, x, y);
+        line.view(cx.theme, canvas, x, y)
     } else if line.text().is_empty() {
         canvas.run(x, y, 20, '·', cx.theme.dim());
+        x + 20
     } else {
-        canvas.text(x, y, &line.text(), cx.theme.strong());
+        canvas.text(x, y, &line.text(), cx.theme.strong())
     }
 }
 
@@ -230,6 +379,11 @@ impl fmt::Debug for Field {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.label)
     }
+}
+
+/// What was typed or pasted is not all there.
+pub fn cut() -> String {
+    t!("the text was cut; Ctrl-U clears the line").to_owned()
 }
 
 /// `required: password`. Without an article, so that it stays right with every label and in every language.
@@ -240,11 +394,13 @@ fn required(label: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crossterm::event::KeyModifiers;
 
     fn form(keys: &str) -> Form {
-        let mut form =
-            Form::new(vec![Field::name("name"), Field::role("role", Role::Viewer), Field::secret("password")]);
+        let mut form = Form::new(vec![
+            Field::name("name"),
+            Field::choice("role", ["Viewer", "Technician"], 0),
+            Field::secret("password"),
+        ]);
         for c in keys.chars() {
             let code = if c == '⏎' { KeyCode::Enter } else { KeyCode::Char(c) };
             form.on_key(KeyEvent::new(code, KeyModifiers::NONE));
@@ -255,10 +411,7 @@ mod tests {
     #[test]
     fn enter_leads_from_line_to_line() {
         let form = form("anna⏎ ⏎a b ");
-        assert_eq!(
-            (form.name(0).as_str(), form.role(), form.secret(2).0.as_str()),
-            ("anna", Some(Role::Technician), "a b ")
-        );
+        assert_eq!((form.text(0).as_str(), form.chosen(1), form.secret(2).0.as_str()), ("anna", 1, "a b "));
     }
 
     #[test]
@@ -275,6 +428,6 @@ mod tests {
         assert!(form.lacking().is_some_and(|why| why.contains("the text was cut")));
         form.forget();
         assert_eq!(form.lacking().as_deref(), Some("required: password"));
-        assert_eq!(form.name(0), "anna");
+        assert_eq!(form.text(0), "anna");
     }
 }

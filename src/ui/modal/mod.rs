@@ -15,7 +15,7 @@ pub(crate) mod palette;
 pub(crate) mod prompt;
 pub(crate) mod reason;
 pub(crate) mod confirmed_value;
-pub(crate) mod settings;
+pub(crate) mod line_settings;
 pub(crate) mod terminal_settings;
 mod sheet;
 pub(crate) mod user_form;
@@ -32,11 +32,11 @@ pub use correction::Correction;
 pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use guidance::Guidance;
+pub use line_settings::LineSettings;
 pub use notice::Notice;
 pub use palette::{Palette, Target};
 pub use prompt::Prompt;
 pub use reason::Reason;
-pub use settings::Settings;
 pub use terminal_settings::TerminalSettings;
 pub use user_form::UserForm;
 pub use why::Why;
@@ -80,7 +80,7 @@ pub enum Modal {
     /// Why a value is what it is.
     Why(Why),
     /// How a line communicates.
-    Settings(Box<Settings>),
+    LineSettings(Box<LineSettings>),
     /// A frame, a block, a test of the bus tab.
     Bus(Box<bus::Window>),
     /// A form about users.
@@ -138,7 +138,7 @@ impl Modal {
                 | Modal::Notice(_)
                 | Modal::Guidance(_)
                 | Modal::Why(_)
-                | Modal::Settings(_)
+                | Modal::LineSettings(_)
                 | Modal::Bus(_)
                 | Modal::Palette(_)
                 | Modal::TerminalSettings(_)
@@ -162,7 +162,7 @@ impl Modal {
             Modal::Notice(notice) => notice.on_key(cx, event),
             Modal::Guidance(guidance) => guidance.on_key(cx, event),
             Modal::Why(why) => why.on_key(event),
-            Modal::Settings(settings) => settings.on_key(cx, event),
+            Modal::LineSettings(settings) => settings.on_key(cx, event),
             Modal::Bus(window) => window.on_key(cx, tabs, event),
             Modal::UserForm(form) => form.on_key(cx, event),
             Modal::AuditEntry(dialog) => dialog.on_key(event),
@@ -186,7 +186,7 @@ impl Modal {
             | Modal::Prompt(_)
             | Modal::Reason(_)
             | Modal::Correction(_)
-            | Modal::Settings(_)
+            | Modal::LineSettings(_)
             | Modal::UserForm(_) => true,
             Modal::Help(_)
             | Modal::Guidance(_)
@@ -214,7 +214,7 @@ impl Modal {
             | Modal::Prompt(_)
             | Modal::Reason(_)
             | Modal::Correction(_)
-            | Modal::Settings(_)
+            | Modal::LineSettings(_)
             | Modal::TerminalSettings(_)
             | Modal::UserForm(_) => false,
         }
@@ -228,7 +228,7 @@ impl Modal {
             Modal::Palette(palette) => palette.paste(cx, text),
             Modal::Reason(reason) => reason.paste(text),
             Modal::Correction(window) => window.paste(text),
-            Modal::Settings(settings) => settings.on_paste(text),
+            Modal::LineSettings(settings) => settings.on_paste(text),
             Modal::Confirm(confirm) => confirm.on_paste(text),
             Modal::UserForm(form) => form.paste(text),
             Modal::Help(_)
@@ -282,7 +282,7 @@ impl Modal {
             Modal::Notice(_) => vec![Hint::in_window(t!("Esc"), t!("close"))],
             Modal::Guidance(guidance) => guidance.hints(cx),
             Modal::Why(why) => why.hints(),
-            Modal::Settings(settings) => settings.hints(),
+            Modal::LineSettings(settings) => settings.hints(),
             Modal::Bus(window) => window.hints(),
             Modal::UserForm(form) => {
                 form.hints().into_iter().chain([Hint::in_window(t!("Esc"), t!("cancel"))]).collect()
@@ -312,7 +312,7 @@ impl Modal {
             Modal::Notice(notice) => notice.view(cx, frame, body),
             Modal::Guidance(guidance) => guidance.view(cx, frame, body),
             Modal::Why(why) => why.view(cx, frame, body),
-            Modal::Settings(settings) => settings.view(cx, frame, body),
+            Modal::LineSettings(settings) => settings.view(cx, frame, body),
             Modal::Bus(window) => window.view(cx, frame, body),
             Modal::UserForm(form) => form.view(cx, frame, body),
             Modal::AuditEntry(dialog) => dialog.view(cx, frame, body),

@@ -3,10 +3,14 @@
 use crate::t;
 use std::{sync::Arc, time::Duration};
 
-use crossterm::event::{KeyCode, KeyEvent};
+use crossterm::event::KeyEvent;
 use ratatui::{Frame, layout::Rect};
 
-use super::{Modal, Next, line::Line, view_keys, window};
+use super::{
+    Modal, Next,
+    form::{self, Field, Form, KeyOutcome},
+    view_keys, window,
+};
 use crate::{
     plant::{
         alarm::{AlarmCommand, command::NOTE_CHARS_MAX},
@@ -14,12 +18,7 @@ use crate::{
         def::AlarmId,
         number::to_u16,
     },
-    ui::{
-        UiAction, ViewContext,
-        keys::{self, Hint},
-        rights,
-        widgets::text::wrap,
-    },
+    ui::{UiAction, ViewContext, keys::Hint, rights, widgets::text::wrap},
 };
 
 /// The window.
@@ -28,12 +27,9 @@ pub struct Reason {
     title: String,
     /// What it is about.
     notes: Vec<String>,
-    /// What is done, one for each time that can be chosen; never empty.
-    choices: Vec<(String, CommandKind)>,
-    chosen: usize,
-    /// The time that is typed where none of the choices is wanted: the last one then.
-    time: Option<Time>,
-    line: Line,
+    action: Action,
+    /// The words are its last field.
+    form: Form,
     /// Nothing is done without words.
     needed: bool,
     /// What Enter does.
@@ -41,168 +37,145 @@ pub struct Reason {
     problem: Option<String>,
 }
 
+/// What is done.
+#[derive(Debug, Clone, PartialEq)]
+enum Action {
+    Command(CommandKind),
+    /// These alarms are shelved for one of these times, or any up to the longest that the plant allows.
+    Shelve(Arc<[AlarmId]>, Vec<Duration>, Duration),
+}
+
+/// The fields above the words where an alarm is shelved: one of a few times, and one that is typed.
+const TIME: usize = 0;
+const TYPED_TIME: usize = 1;
+const TIME_CHARS: usize = 16;
+
 impl Reason {
     /// An action with a text, which is required if `needed`.
     pub fn new(title: &str, verb: &'static str, notes: Vec<String>, kind: CommandKind, needed: bool) -> Reason {
-        let choices = vec![(String::new(), kind)];
-        let (title, line) = (title.to_owned(), Line::long("", NOTE_CHARS_MAX));
-        Reason { title, notes, choices, chosen: 0, time: None, line, needed, verb, problem: None }
+        let words = words(needed);
+        Reason::with(title, verb, notes, Action::Command(kind), needed, Form::submitting(vec![words], 0))
     }
 
     /// Shelve alarms for one of these times, each with its words, or for any other up to `max`.
     pub fn shelve(notes: Vec<String>, alarms: &[AlarmId], times: Vec<(String, Duration)>, max: Duration) -> Reason {
-        let alarms: Arc<[AlarmId]> = alarms.into();
-        let kind = |lasts| CommandKind::Alarm(AlarmCommand::Shelve { alarms: alarms.clone(), lasts });
-        let mut choices: Vec<_> = times.into_iter().map(|(words, lasts)| (words, kind(lasts))).collect();
-        choices.push((t!("other:").to_owned(), kind(max)));
-        let time = Some(Time { alarms: alarms.clone(), max, line: Line::default(), typing: choices.len() == 1 });
-        let first = choices[0].1.clone();
-        Reason { choices, time, ..Reason::new(t!("shelve an alarm"), t!("shelve"), notes, first, true) }
+        let (mut options, times): (Vec<String>, Vec<Duration>) = times.into_iter().unzip();
+        options.push(t!("another time").to_owned());
+        let first = if times.is_empty() { TYPED_TIME } else { TIME };
+        let range = t!("45 min, 1.5 h, 1:30; at most {spelled}", spelled = spelled(max));
+        let typed = Field::text(t!("other time"), "", TIME_CHARS).within(range);
+        let form = Form::submitting(vec![Field::choice(t!("time"), options, 0), typed, words(true)], first);
+        let action = Action::Shelve(alarms.into(), times, max);
+        let mut reason = Reason::with(t!("shelve an alarm"), t!("shelve"), notes, action, true, form);
+        reason.fit();
+        reason
+    }
+
+    fn with(title: &str, verb: &'static str, notes: Vec<String>, action: Action, needed: bool, form: Form) -> Reason {
+        Reason { title: title.to_owned(), notes, action, form, needed, verb, problem: None }
+    }
+
+    /// A time is typed only where none of the others is chosen.
+    fn fit(&mut self) {
+        if let Action::Shelve(_, times, _) = &self.action {
+            self.form.hide(TYPED_TIME, self.form.chosen(TIME) < times.len());
+        }
     }
 
     /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
-        let choose = (1 < self.choices.len()).then(|| Hint::in_window("↑↓", t!("select")));
-        let other = self.other().map(|time| {
-            Hint::in_window(t!("Tab"), if time.typing { t!("enter the reason") } else { t!("enter the time") })
-        });
+        let select = (1 < self.form.rows()).then(|| Hint::in_window("↑↓", t!("select")));
+        let change = self.form.is_on_choice().then(|| Hint::in_window("←→", t!("change")));
         let (enter, escape) = (Hint::in_window("⏎", self.verb), Hint::in_window(t!("Esc"), t!("cancel")));
-        [enter].into_iter().chain(choose).chain(other).chain([escape]).collect()
+        [Some(enter), select, change, Some(escape)].into_iter().flatten().collect()
     }
 
     pub(super) fn paste(&mut self, text: &str) {
-        match self.time.as_mut().filter(|time| time.typing) {
-            Some(time) => time.line.paste(text),
-            None => self.line.paste(text),
-        }
+        self.leave_choice();
+        self.form.paste(text);
     }
 
-    /// The time that is typed, where that is what is chosen.
-    fn other(&self) -> Option<&Time> {
-        self.time.as_ref().filter(|_| self.chosen + 1 == self.choices.len())
+    /// What is typed on a choice goes into the next field: the reason, or the time that is wanted instead.
+    fn leave_choice(&mut self) {
+        if self.form.is_on_choice() {
+            self.form.select_next();
+        }
     }
 
     /// What is done, once a time that is typed is one.
     fn command_kind(&self) -> Result<CommandKind, String> {
-        match self.other() {
-            Some(time) => {
-                let lasts = typed_time(&time.line.text(), time.max)?;
-                Ok(CommandKind::Alarm(AlarmCommand::Shelve { alarms: time.alarms.clone(), lasts }))
+        match &self.action {
+            Action::Command(kind) => Ok(kind.clone()),
+            Action::Shelve(alarms, times, max) => {
+                let chosen = times.get(self.form.chosen(TIME));
+                let lasts = chosen.map_or_else(|| typed_time(&self.form.text(TYPED_TIME), *max), |lasts| Ok(*lasts))?;
+                Ok(CommandKind::Alarm(AlarmCommand::Shelve { alarms: alarms.clone(), lasts }))
             }
-            None => Ok(self.choices[self.chosen].1.clone()),
         }
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
-        let last = self.choices.len() - 1;
-        match event.code {
-            KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => return self.finish(cx),
-            KeyCode::Up => self.choose(self.chosen.saturating_sub(1)),
-            KeyCode::Down => self.choose((self.chosen + 1).min(last)),
-            KeyCode::Tab if self.other().is_some() => {
-                if let Some(time) = &mut self.time {
-                    time.typing = !time.typing;
-                }
-            }
-            _ => {
-                let line = match self.time.as_mut().filter(|time| time.typing) {
-                    Some(time) => &mut time.line,
-                    None => &mut self.line,
-                };
-                if line.on_key(event) {
-                    self.problem = None;
-                }
+        match self.form.on_key(event) {
+            KeyOutcome::Submitted => return self.finish(cx),
+            KeyOutcome::Taken => self.problem = None,
+            KeyOutcome::Ignored => {
+                self.leave_choice();
+                self.form.on_key(event);
             }
         }
+        self.fit();
         Next::Stay(Modal::Reason(Box::new(self)))
     }
 
-    /// A time to be typed is typed first.
-    fn choose(&mut self, chosen: usize) {
-        self.chosen = chosen;
-        let typing = self.other().is_some();
-        if let Some(time) = &mut self.time {
-            time.typing = typing;
-        }
-    }
-
     fn finish(mut self, cx: &ViewContext) -> Next {
-        let kind = match self.command_kind() {
-            Ok(kind) => kind,
+        let last = self.form.count() - 1;
+        let (kind, words) = (self.command_kind(), self.form.text(last));
+        self.problem = match &kind {
             Err(why) => {
-                self.problem = Some(why);
-                return Next::Stay(Modal::Reason(Box::new(self)));
+                self.form.select(TYPED_TIME);
+                Some(why.clone())
             }
+            Ok(_) if self.form.is_cut() => Some(form::cut()),
+            Ok(_) if self.needed && words.is_empty() => {
+                self.form.select(last);
+                Some(t!("reason required").to_owned())
+            }
+            Ok(_) if matches!(&self.action, Action::Shelve(.., max) if typed_time(&words, *max).is_ok()) => {
+                // Typed for the time, while another one was selected.
+                Some(t!("a time is not a reason: select \"another time\" to enter a time").to_owned())
+            }
+            Ok(kind) => rights::missing(cx, kind),
         };
-        if let Some(time) = &mut self.time {
-            time.typing = false;
+        match kind {
+            Ok(kind) if self.problem.is_none() => {
+                let note = (!words.is_empty()).then(|| Arc::from(words));
+                Next::Do(vec![UiAction::SendCommand(Command { note, ..kind.into() }, None)])
+            }
+            Ok(_) | Err(_) => Next::Stay(Modal::Reason(Box::new(self))),
         }
-        let words = self.line.text().trim().to_owned();
-        self.problem = if self.line.missed() {
-            Some(t!("the text was cut; Ctrl-U clears the line").to_owned())
-        } else if self.needed && words.is_empty() {
-            Some(t!("reason required").to_owned())
-        } else if self.time.as_ref().is_some_and(|time| typed_time(&words, time.max).is_ok()) {
-            // Typed for the time, while another one was selected.
-            Some(t!("a time is not a reason: select \"other\" to enter a time").to_owned())
-        } else {
-            rights::missing(cx, &kind)
-        };
-        if self.problem.is_some() {
-            return Next::Stay(Modal::Reason(Box::new(self)));
-        }
-        let note = (!words.is_empty()).then(|| Arc::from(words));
-        Next::Do(vec![UiAction::SendCommand(Command { note, ..kind.into() }, None)])
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let theme = cx.theme;
         let room = body.width.saturating_sub(8).min(72);
         let notes: Vec<String> = self.notes.iter().flat_map(|note| wrap(note, room)).collect();
-        let times = if 1 < self.choices.len() || self.time.is_some() { to_u16(self.choices.len()) } else { 0 };
-        let height = to_u16(notes.len()) + times + 6;
-        let mut canvas = window(cx, frame, body, &self.title, (room, height));
+        let (above, rows) = (to_u16(notes.len()), self.form.rows());
+        let mut canvas = window(cx, frame, body, &self.title, (room, above + rows + 5));
         for (y, note) in notes.iter().enumerate() {
-            canvas.text(0, y, note, theme.normal());
+            canvas.text(0, to_u16(y), note, theme.normal());
         }
-        let mut y = to_u16(notes.len());
-        for (n, (words, _)) in self.choices.iter().enumerate().filter(|_| times > 0) {
-            let style = if n == self.chosen { theme.focus() } else { theme.normal() };
-            canvas.text(0, y, if n == self.chosen { "▸ " } else { "  " }, theme.strong());
-            let x = canvas.text(2, y, words, style);
-            if let Some(time) = self.time.as_ref().filter(|_| n + 1 == self.choices.len()) {
-                let x = match self.other() {
-                    Some(_) => time.line.view(theme, &mut canvas, x + 1, y),
-                    None => x,
-                };
-                canvas.text(
-                    x + 2,
-                    y,
-                    &t!("45 min, 1.5 h, 1:30; at most {spelled}", spelled = spelled(time.max)),
-                    theme.dim(),
-                );
-            }
-            y += 1;
-        }
-        canvas.text(0, y, if self.needed { t!("reason:") } else { t!("note (optional):") }, theme.dim());
-        self.line.view(theme, &mut canvas, 0, y + 1);
-        let problem = self.problem.clone().or_else(|| rights::missing(cx, &self.choices[self.chosen].1));
-        for (n, line) in wrap(&problem.unwrap_or_default(), room).iter().take(2).enumerate() {
-            canvas.text(0, y + 2 + to_u16(n), line, theme.trouble());
+        self.form.view(cx, &mut canvas, self.form.labels(), above..above + rows);
+        let missing = || self.command_kind().ok().and_then(|kind| rights::missing(cx, &kind));
+        let problem = self.problem.clone().or_else(missing).unwrap_or_default();
+        for (n, line) in wrap(&problem, room).iter().take(2).enumerate() {
+            canvas.text(0, above + rows + 1 + to_u16(n), line, theme.trouble());
         }
         view_keys(cx, &mut canvas, &self.hints());
     }
 }
 
-/// A time that is typed.
-#[derive(Debug, Clone, PartialEq)]
-struct Time {
-    alarms: Arc<[AlarmId]>,
-    /// The longest that the plant allows.
-    max: Duration,
-    line: Line,
-    /// What is typed goes here, not into the reason.
-    typing: bool,
+fn words(needed: bool) -> Field {
+    Field::text(if needed { t!("reason") } else { t!("note (optional)") }, "", NOTE_CHARS_MAX)
 }
 
 /// `45`, `45 min`, `1.5 h`, `1:30`: a time of at most `max`, a bare number in minutes.

@@ -6,7 +6,11 @@ mod tests;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Modal, Next, window};
+use super::{
+    Modal, Next,
+    form::{Field, Form, KeyOutcome},
+    window,
+};
 use crate::{
     plant::{def::Priority, number::to_u16},
     t,
@@ -14,13 +18,12 @@ use crate::{
     ui::{
         Model, UiAction, ViewContext,
         graphics::{Pictures, Protocol},
-        keys,
         keys::Hint,
         preferences::{Bell, Characters, Preferences},
         theme::{Colours, Glyphs, ThemeName},
         widgets::{
             chart,
-            text::{Canvas, fit_words, pad, width, wrap},
+            text::{Canvas, fit_words, width, wrap},
         },
     },
 };
@@ -36,9 +39,9 @@ pub struct TerminalSettings {
     row: usize,
 }
 
-/// A row.
+/// The fields of the form, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Field {
+enum Row {
     Theme,
     Characters,
     Pictures,
@@ -48,8 +51,7 @@ enum Field {
     Language,
 }
 
-const FIELDS: [Field; 7] =
-    [Field::Theme, Field::Characters, Field::Pictures, Field::Motion, Field::Bell, Field::Mouse, Field::Language];
+const ROWS: [Row; 7] = [Row::Theme, Row::Characters, Row::Pictures, Row::Motion, Row::Bell, Row::Mouse, Row::Language];
 
 impl TerminalSettings {
     /// What is in use, to be changed.
@@ -74,83 +76,76 @@ impl TerminalSettings {
         ]
     }
 
+    /// The form in the language of the moment, which may be the one that is tried.
+    fn form(&self) -> Form {
+        let Preferences { theme, characters, pictures, motion, bell, mouse, language } = self.chosen;
+        let on = |label, on: bool| Field::choice(label, [t!("on"), t!("off")], usize::from(!on));
+        let fields = vec![
+            Field::one_of(t!("theme"), &ThemeName::ALL, theme, |theme| translate(theme.word())),
+            Field::one_of(t!("characters"), &Characters::ALL, characters, |characters| translate(characters.word())),
+            Field::one_of(t!("pictures"), &Pictures::ALL, pictures, |pictures| translate(pictures.word())),
+            on(t!("motion"), motion),
+            Field::one_of(t!("bell"), &Bell::ALL, bell, |bell| translate(bell.word())),
+            on(t!("mouse"), mouse),
+            Field::one_of(t!("language"), &languages(), language, |one| one.map_or(t!("automatic"), Language::name)),
+        ];
+        Form::submitting(fields, self.row)
+    }
+
     pub(super) fn on_key(mut self, event: KeyEvent) -> Next {
-        let last = FIELDS.len() - 1;
-        match event.code {
-            KeyCode::Enter if keys::code(KeyCode::Enter).is(event) => {
+        let mut form = self.form();
+        match form.on_key(event) {
+            KeyOutcome::Submitted => {
                 let keep = UiAction::KeepPreferences(self.chosen);
                 // It stays below the password of a locked terminal; what is kept closes it.
                 return Next::Both(Modal::TerminalSettings(self), vec![keep]);
             }
-            KeyCode::Up => self.row = self.row.checked_sub(1).unwrap_or(last),
-            KeyCode::Down | KeyCode::Tab => self.row = if self.row == last { 0 } else { self.row + 1 },
-            KeyCode::Left => self.step(-1),
-            KeyCode::Right | KeyCode::Char(' ') => self.step(1),
-            KeyCode::Char('q') => return Next::Close,
-            _ => {}
+            KeyOutcome::Ignored if event.code == KeyCode::Char('q') => return Next::Close,
+            KeyOutcome::Ignored | KeyOutcome::Taken => {}
         }
+        let chosen = |row: Row| form.chosen(row as usize);
+        self.row = form.selected();
+        self.chosen = Preferences {
+            theme: ThemeName::ALL[chosen(Row::Theme)],
+            characters: Characters::ALL[chosen(Row::Characters)],
+            pictures: Pictures::ALL[chosen(Row::Pictures)],
+            motion: chosen(Row::Motion) == 0,
+            bell: Bell::ALL[chosen(Row::Bell)],
+            mouse: chosen(Row::Mouse) == 0,
+            language: languages()[chosen(Row::Language)],
+        };
         Next::Stay(Modal::TerminalSettings(self))
     }
 
-    fn step(&mut self, by: isize) {
-        let field = FIELDS[self.row.min(FIELDS.len() - 1)];
-        let chosen = &mut self.chosen;
-        match field {
-            Field::Theme => chosen.theme = stepped(&ThemeName::ALL, chosen.theme, by),
-            Field::Characters => chosen.characters = stepped(&Characters::ALL, chosen.characters, by),
-            Field::Pictures => chosen.pictures = stepped(&Pictures::ALL, chosen.pictures, by),
-            Field::Motion => chosen.motion = !chosen.motion,
-            Field::Bell => chosen.bell = stepped(&Bell::ALL, chosen.bell, by),
-            Field::Mouse => chosen.mouse = !chosen.mouse,
-            Field::Language => {
-                let all: Vec<_> = std::iter::once(None).chain(Language::all().map(Some)).collect();
-                chosen.language = stepped(&all, chosen.language, by);
-            }
-        }
-    }
-
-    fn value(&self, field: Field) -> &'static str {
-        let on = |on: bool| if on { t!("on") } else { t!("off") };
-        match field {
-            Field::Theme => translate(self.chosen.theme.word()),
-            Field::Characters => translate(self.chosen.characters.word()),
-            Field::Pictures => translate(self.chosen.pictures.word()),
-            Field::Motion => on(self.chosen.motion),
-            Field::Bell => translate(self.chosen.bell.word()),
-            Field::Mouse => on(self.chosen.mouse),
-            Field::Language => self.chosen.language.map_or(t!("automatic"), Language::name),
-        }
-    }
-
     /// What the choice means.
-    fn note(&self, cx: &ViewContext, field: Field) -> &'static str {
-        match field {
-            Field::Theme if cx.theme.colours == Colours::None => t!("no colours here"),
-            Field::Theme => match self.chosen.theme {
+    fn note(&self, cx: &ViewContext, row: Row) -> &'static str {
+        match row {
+            Row::Theme if cx.theme.colours == Colours::None => t!("no colours here"),
+            Row::Theme => match self.chosen.theme {
                 ThemeName::Grey => t!("abnormal in colour"),
                 ThemeName::Dark => t!("more colour on black"),
                 ThemeName::Light => t!("for bright rooms"),
                 ThemeName::HighContrast => t!("bright on black"),
                 ThemeName::Mono => t!("without hue"),
             },
-            Field::Characters => match cx.theme.glyphs {
+            Row::Characters => match cx.theme.glyphs {
                 Glyphs::Braille => t!("as braille dots"),
                 Glyphs::Block => t!("as blocks"),
                 Glyphs::Ascii => t!("as ASCII characters"),
             },
-            Field::Pictures => match cx.theme.graphics.protocol(self.chosen.pictures) {
+            Row::Pictures => match cx.theme.graphics.protocol(self.chosen.pictures) {
                 Ok((Protocol::Kitty, _)) => t!("i in Trends: Kitty"),
                 Ok((Protocol::Sixel, _)) => t!("i in Trends: Sixel"),
                 Err(_) => t!("characters only"),
             },
-            Field::Motion => t!("agitators and arrows"),
-            Field::Bell => match self.chosen.bell {
+            Row::Motion => t!("agitators and arrows"),
+            Row::Bell => match self.chosen.bell {
                 Bell::Off => t!("alarms make no sound"),
                 Bell::Once | Bell::Repeated => t!("Ctrl-S silences"),
             },
-            Field::Mouse if self.chosen.mouse => t!("Shift selects text"),
-            Field::Mouse => t!("selects text"),
-            Field::Language => "",
+            Row::Mouse if self.chosen.mouse => t!("Shift selects text"),
+            Row::Mouse => t!("selects text"),
+            Row::Language => "",
         }
     }
 
@@ -162,24 +157,19 @@ impl TerminalSettings {
             Err(words) => (words, theme.trouble()),
         };
         let kept: Vec<_> = wrap(words, room).into_iter().map(|row| (row, style)).collect();
-        let rows = to_u16(FIELDS.len());
+        let form = self.form();
+        let (rows, labels) = (form.rows(), form.labels().saturating_sub(1));
         let wanted = rows + 3 + to_u16(kept.len());
         let mut canvas = window(cx, frame, body, t!("terminal settings"), (room, wanted));
-        let names = FIELDS.iter().map(|field| width(field.name())).max().unwrap_or(0);
-        let values = FIELDS.iter().map(|field| width(self.value(*field))).max().unwrap_or(0).max(18);
-        for (y, (n, field)) in (0..).zip(FIELDS.into_iter().enumerate()) {
-            let selected = n == self.row;
-            canvas.text(0, y, if selected { theme.pick("▸", ">") } else { " " }, theme.strong());
-            let x = canvas.text(2, y, &pad(field.name(), names), if selected { theme.focus() } else { theme.normal() });
-            let value = self.value(field);
-            let value = if selected { format!("‹ {value} ›") } else { format!("  {value}") };
-            canvas.text(x + 1, y, &value, if selected { theme.strong() } else { theme.normal() });
-            let x = x + values + 6;
-            canvas.text(x, y, &fit_words(self.note(cx, field), canvas.width().saturating_sub(x)), theme.dim());
+        let values = (0..ROWS.len()).map(|n| width(&form.text(n))).max().unwrap_or(0).max(18);
+        let notes = labels + values + 5;
+        let last = canvas.height().saturating_sub(to_u16(kept.len()));
+        for drawn in form.view(cx, &mut canvas, labels, 0..rows.min(last)) {
+            let note = fit_words(self.note(cx, ROWS[drawn.field]), canvas.width().saturating_sub(notes));
+            canvas.text(notes, drawn.y, &note, theme.dim());
         }
         // Blank rows give way on a small screen, then the sample.
         let gap = u16::from(wanted <= canvas.height());
-        let last = canvas.height().saturating_sub(to_u16(kept.len()));
         if rows < last {
             sample(cx, &mut canvas, rows + gap);
         }
@@ -187,24 +177,9 @@ impl TerminalSettings {
     }
 }
 
-impl Field {
-    fn name(self) -> &'static str {
-        match self {
-            Field::Theme => t!("theme"),
-            Field::Characters => t!("characters"),
-            Field::Pictures => t!("pictures"),
-            Field::Motion => t!("motion"),
-            Field::Bell => t!("bell"),
-            Field::Mouse => t!("mouse"),
-            Field::Language => t!("language"),
-        }
-    }
-}
-
-/// The choice so many places further, round and round.
-fn stepped<T: Copy + PartialEq>(all: &[T], now: T, by: isize) -> T {
-    let at = all.iter().position(|one| *one == now).unwrap_or(0);
-    all[at.saturating_add_signed(by + all.len() as isize) % all.len()]
+/// What can be chosen as the language; the first is that of the environment.
+fn languages() -> Vec<Option<Language>> {
+    std::iter::once(None).chain(Language::all().map(Some)).collect()
 }
 
 /// Priorities, qualities and pens as they look.

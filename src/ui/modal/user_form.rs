@@ -10,7 +10,7 @@ use ratatui::{Frame, layout::Rect, style::Style};
 
 use super::{
     Modal, Next,
-    form::{Field, Form, Turn},
+    form::{Field, Form, KeyOutcome},
     window,
 };
 use crate::{
@@ -19,6 +19,7 @@ use crate::{
         session_request::{Secret, UserRow},
     },
     plant::{number::to_u16, role::Role},
+    text::translate,
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint},
@@ -82,12 +83,11 @@ impl UserForm {
             }
             Purpose::Unlock(_) => vec![Field::secret(t!("password"))],
             // What is given already stands above: Enter leads through what must be typed.
-            Purpose::Add => [Field::role(t!("role"), Role::Technician), Field::name(t!("name"))]
-                .into_iter()
-                .chain(twice())
-                .collect(),
+            Purpose::Add => {
+                [role_field(Role::Technician), Field::name(t!("name"))].into_iter().chain(twice()).collect()
+            }
             Purpose::Reset(_) => twice().to_vec(),
-            Purpose::Role(_) => vec![Field::role(t!("role"), Role::Technician)],
+            Purpose::Role(_) => vec![role_field(Role::Technician)],
             Purpose::Disable(..) => Vec::new(),
             Purpose::Delete(_) => vec![Field::name(t!("name"))],
         };
@@ -96,7 +96,7 @@ impl UserForm {
 
     /// Another role for this user; the present one is shown first.
     pub fn role_of(row: &UserRow) -> UserForm {
-        let form = Form::new(vec![Field::role(t!("role"), row.role)]);
+        let form = Form::new(vec![role_field(row.role)]);
         UserForm { form, ..UserForm::new(Purpose::Role(row.user.clone())) }
     }
 
@@ -132,10 +132,8 @@ impl UserForm {
         if self.waiting {
             return None;
         }
-        let enter = self.form.rows() == 0 && keys::code(crossterm::event::KeyCode::Enter).is(event);
-        let turn = if enter { Turn::Finished } else { self.form.on_key(event) };
-        match turn {
-            Turn::Finished if self.wait(cx) == 0 => match self.request(cx) {
+        match self.form.on_key(event) {
+            KeyOutcome::Submitted if self.wait(cx) == 0 => match self.request(cx) {
                 Ok(request) => {
                     (self.waiting, self.problem) = (true, None);
                     return Some(request);
@@ -143,8 +141,8 @@ impl UserForm {
                 Err(problem) => self.problem = Some((problem, cx.phase)),
             },
             // How long one must wait stays to be read.
-            Turn::Taken if self.wait(cx) == 0 => self.problem = None,
-            Turn::Finished | Turn::Taken | Turn::Nothing => {}
+            KeyOutcome::Taken if self.wait(cx) == 0 => self.problem = None,
+            KeyOutcome::Submitted | KeyOutcome::Taken | KeyOutcome::Ignored => {}
         }
         None
     }
@@ -167,7 +165,7 @@ impl UserForm {
         if let Some(why) = self.form.lacking() {
             return Err(why);
         }
-        let name = self.form.name(usize::from(self.purpose == Purpose::Add));
+        let name = self.form.text(usize::from(self.purpose == Purpose::Add));
         Ok(match &self.purpose {
             Purpose::First => SessionRequest::FirstSupervisor { user: name, password: self.new_password(cx, 1)? },
             Purpose::Login => SessionRequest::Login { user: name, password: self.form.secret(1) },
@@ -180,14 +178,14 @@ impl UserForm {
             Purpose::Unlock(_) => SessionRequest::Unlock(self.form.secret(0)),
             Purpose::Add => SessionRequest::AddUser {
                 user: name,
-                role: self.form.role().unwrap_or(Role::Viewer),
+                role: Role::ALL[self.form.chosen(0)],
                 password: self.new_password(cx, 2)?,
             },
             Purpose::Reset(user) => {
                 SessionRequest::ResetPassword { user: user.to_string(), password: self.new_password(cx, 0)? }
             }
             Purpose::Role(user) => {
-                SessionRequest::SetRole { user: user.to_string(), role: self.form.role().unwrap_or(Role::Viewer) }
+                SessionRequest::SetRole { user: user.to_string(), role: Role::ALL[self.form.chosen(0)] }
             }
             Purpose::Disable(user, disabled) => SessionRequest::Disable { user: user.to_string(), disabled: *disabled },
             Purpose::Delete(user) if name == **user => SessionRequest::DeleteUser { user: name },
@@ -258,8 +256,9 @@ impl UserForm {
             canvas.text(0, y, &words, style);
             y += 1;
         }
-        self.form.view(cx, canvas, y);
-        y += self.form.rows();
+        let rows = y..y + self.form.rows();
+        self.form.view(cx, canvas, self.form.labels(), rows.clone());
+        y = rows.end;
         let style = if self.waiting { cx.theme.dim() } else { cx.theme.trouble() };
         let room = canvas.width();
         for words in self.problem_text(cx).iter().flat_map(|words| wrap(words, room)) {
@@ -280,6 +279,11 @@ impl UserForm {
         let last = canvas.height().saturating_sub(1);
         canvas.text(0, last, &keys, cx.theme.strong());
     }
+}
+
+/// A role to choose.
+fn role_field(role: Role) -> Field {
+    Field::one_of(t!("role"), &Role::ALL, role, |role| translate(role.word()))
 }
 
 #[cfg(test)]

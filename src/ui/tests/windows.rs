@@ -159,12 +159,12 @@ fn an_alarm_is_shelved_for_half_an_hour_or_for_any_time_typed() {
         };
         (lasts, shown)
     };
-    assert_eq!(shelved("3z↓leak").0, Some(30));
+    assert_eq!(shelved("3z→leak").0, Some(30));
     // A time that was typed while another one is selected is neither.
-    assert_eq!(shelved("3z↓45").0, None);
-    // The last choice is a time of one's own: it is typed first, Tab leads on to the reason.
+    assert_eq!(shelved("3z→45").0, None);
+    // The last choice is a time of one's own: what is typed there is the time, Tab leads on to the reason.
     for (time, minutes) in [("45 min", Some(45)), ("1:30", Some(90)), ("99 h", None)] {
-        let keys = format!("3z↓↓↓↓↓↓{time}⇥leak");
+        let keys = format!("3z←{time}⇥leak");
         let (lasts, shown) = shelved(&keys);
         assert_eq!(lasts, minutes, "{time}:\n{shown}");
         assert!(shown.contains(time), "{shown}");

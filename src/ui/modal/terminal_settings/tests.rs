@@ -1,6 +1,7 @@
 //! What is tried is seen, what is kept stays, and everything else is as before.
 
 use super::*;
+use crate::ui::keys;
 use crate::ui::{
     Effect, Msg,
     fixture::Fixture,
@@ -106,7 +107,7 @@ fn no_note_of_a_choice_is_cut_at_60_columns() {
     let mut model = settings(&Fixture::alarm());
     for language in Language::all() {
         model.preferences.language = Some(language);
-        for row in 0..FIELDS.len() {
+        for row in 0..ROWS.len() {
             for choice in 0..5 {
                 let mut window = TerminalSettings::new(&model);
                 window.chosen.language = Some(language);
@@ -114,7 +115,7 @@ fn no_note_of_a_choice_is_cut_at_60_columns() {
                 model.modal = Some(Modal::TerminalSettings(window));
                 type_keys(&mut model, &"→".repeat(choice));
                 let shown = screen(&mut model, 60, 20);
-                let cut = shown.lines().skip(4).take(FIELDS.len() + 1).find(|row| row.contains('…'));
+                let cut = shown.lines().skip(4).take(ROWS.len() + 1).find(|row| row.contains('…'));
                 assert_eq!(cut, None, "{shown}");
             }
         }

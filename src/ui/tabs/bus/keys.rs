@@ -1,7 +1,7 @@
 //! The keys of the bus tab, page by page.
 
 use super::*;
-use crate::ui::modal::Settings;
+use crate::ui::modal::LineSettings;
 
 /// A row of the tables here.
 type Key = crate::ui::keys::Key<Bus>;
@@ -37,7 +37,7 @@ const LINE: &[Key] = &[
     Key::new(char('c'), "settings", "communication settings of the line", |bus, cx| {
         bus.on_line(cx, |bus, at| {
             let kind = CommandKind::Configure(Box::new(at.settings.clone()));
-            let window = Modal::Settings(Box::new(Settings::new(cx, bus.line)));
+            let window = Modal::LineSettings(Box::new(LineSettings::new(cx, bus.line)));
             vec![Notice::or(cx, t!("settings of the line"), &kind, window)]
         })
     })

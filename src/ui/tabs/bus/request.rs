@@ -30,35 +30,27 @@ use crate::{
         number::{to_u8, to_u32, to_u64},
         tag::Table,
     },
-    ui::modal::{Next, line::Line, window},
+    ui::modal::{
+        Next,
+        form::{self, Field, Form, KeyOutcome},
+        window,
+    },
 };
+
+/// Most characters of a field.
+const CHARS: usize = 400;
 
 /// A test with its fields.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Form {
+pub struct RequestForm {
     line: LineId,
     tried: Tried,
-    fields: Vec<Field>,
-    /// The field that is edited.
-    at: usize,
+    form: Form,
     problem: Option<String>,
 }
 
-/// One field.
-#[derive(Debug, Clone, PartialEq)]
-struct Field {
-    label: &'static str,
-    input: Input,
-    /// What may be typed; empty where it need not be said.
-    range: String,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-enum Input {
-    Text(Line),
-    /// One of a few.
-    Choice(Vec<String>, usize),
-}
+/// The field of a request with its function.
+const FUNCTION: usize = 1;
 
 /// A form that makes sense: the test, and what it does in words.
 type Built = (Diagnostic, Vec<String>);
@@ -67,25 +59,22 @@ type Built = (Diagnostic, Vec<String>);
 const BAUDS: [u32; 8] = [9_600, 19_200, 115_200, 38_400, 57_600, 4_800, 2_400, 1_200];
 const CHARACTERS: [(Parity, u8); 4] = [(Parity::None, 1), (Parity::Even, 1), (Parity::Odd, 1), (Parity::None, 2)];
 
-impl Form {
+/// A field that is typed, with what may be typed.
+fn typed(label: &'static str, text: &str, range: &str) -> Field {
+    Field::text(label, text, CHARS).within(range)
+}
+
+impl RequestForm {
     /// With what suits most.
-    pub fn new(cx: &ViewContext, at: &LineView, tried: Tried) -> Form {
+    pub fn new(cx: &ViewContext, at: &LineView, tried: Tried) -> RequestForm {
         let unit = cx.def().devices.iter().find(|device| device.line == at.id).map_or(1, |device| device.unit);
-        let typed = |label, text: &str, range: &str| Field {
-            label,
-            input: Input::Text(Line::long(text, 400)),
-            range: range.to_owned(),
-        };
-        let text = |label, text: &str| typed(label, text, "");
-        let choice =
-            |label, options: Vec<String>| Field { label, input: Input::Choice(options, 0), range: String::new() };
-        let unit = text(t!("unit"), &unit.to_string());
+        let unit = typed(t!("unit"), &unit.to_string(), "");
         let fields = match tried {
             Tried::Sweep => sweep::fields(unit),
             Tried::Signal => signal::fields(),
             Tried::Bytes | Tried::Request => {
-                let function = choice(t!("function"), FUNCTIONS.map(dissect::function_words).to_vec());
-                [vec![unit, function], functions::fields(FUNCTIONS[0], &[])].concat()
+                let function = Field::choice(t!("function"), FUNCTIONS.map(dissect::function_words), 0);
+                [vec![unit, function], functions::fields(FUNCTIONS[0], &|_| None)].concat()
             }
             Tried::Loopback => vec![unit, typed(t!("times"), "10", "1 – 1000")],
             Tried::Plug => vec![typed(t!("patterns"), "60", "1 – 500")],
@@ -95,14 +84,12 @@ impl Form {
                 if at.settings.transport.serial().is_some() {
                     settings.push(t!("all baud rates and parities; polling pauses").to_owned());
                 }
-                let units = [text(t!("from unit"), "1"), text(t!("to unit"), "247")];
-                units
-                    .into_iter()
-                    .chain([choice(t!("settings"), settings), typed(t!("wait ms"), "200", "10 – 10000")])
-                    .collect()
+                let units = [typed(t!("from unit"), "1", ""), typed(t!("to unit"), "247", "")];
+                let wait = typed(t!("wait ms"), "200", "10 – 10000");
+                units.into_iter().chain([Field::choice(t!("settings"), settings, 0), wait]).collect()
             }
         };
-        Form { line: at.id, tried, fields, at: 0, problem: None }
+        RequestForm { line: at.id, tried, form: Form::submitting(fields, 0), problem: None }
     }
 
     /// Is it for this test of this line?
@@ -113,8 +100,8 @@ impl Form {
     /// A key; what is filled in is kept for the next time.
     pub fn on_key(mut self, cx: &ViewContext, bus: &mut Bus, event: KeyEvent) -> Next {
         let bench = &mut bus.test;
-        let last = self.fields.len() - 1;
-        if keys::code(KeyCode::Enter).is(event) {
+        let function = self.form.chosen(FUNCTION);
+        if self.form.on_key(event) == KeyOutcome::Submitted {
             self.problem = match self.start(cx) {
                 Ok(mut acts) => {
                     // It may have been opened on another tab.
@@ -128,11 +115,11 @@ impl Form {
             return Window::Form(self).stay();
         }
         self.problem = None;
-        match event.code {
-            KeyCode::Up | KeyCode::BackTab => self.at = self.at.saturating_sub(1),
-            KeyCode::Down => self.at = (self.at + 1).min(last),
-            KeyCode::Tab => self.at = (self.at + 1) % (last + 1),
-            _ => self.edit(event),
+        if self.tried == Tried::Request && function != self.form.chosen(FUNCTION) {
+            let filled: Vec<(&str, String)> =
+                (2..self.form.count()).map(|n| (self.form.label(n), self.form.text(n))).collect();
+            let before = |label: &str| filled.iter().find(|(of, _)| *of == label).map(|(_, text)| text.clone());
+            self.form.replace_from(2, functions::fields(FUNCTIONS[self.form.chosen(FUNCTION)], &before));
         }
         bench.form = Some(self.clone());
         Window::Form(self).stay()
@@ -140,60 +127,21 @@ impl Form {
 
     /// Pasted text.
     pub fn on_paste(&mut self, text: &str) {
-        if let Input::Text(line) = &mut self.fields[self.at].input {
-            line.paste(text);
-        }
-    }
-
-    fn edit(&mut self, event: KeyEvent) {
-        match &mut self.fields[self.at].input {
-            Input::Text(line) => {
-                line.on_key(event);
-            }
-            Input::Choice(options, at) => match event.code {
-                KeyCode::Left => *at = (*at + options.len() - 1) % options.len(),
-                KeyCode::Right | KeyCode::Char(' ') => *at = (*at + 1) % options.len(),
-                _ => {}
-            },
-        }
-        if (self.tried, self.at) == (Tried::Request, 1)
-            && let Some(function) = FUNCTIONS.get(self.chosen(1))
-        {
-            let own = functions::fields(*function, &self.fields[2..]);
-            self.fields.splice(2.., own);
-        }
+        self.form.paste(text);
     }
 
     fn start(&self, cx: &ViewContext) -> Result<Vec<UiAction>, String> {
         let at = LineView::new(cx, self.line).ok_or(t!("this line no longer exists"))?;
-        let missed = |field: &Field| matches!(&field.input, Input::Text(line) if line.missed());
-        if self.fields.iter().any(missed) {
-            return Err(t!("the text was cut; Ctrl-U clears a field").to_owned());
+        if self.form.is_cut() {
+            return Err(form::cut());
         }
         let diagnostic = self.build(at.settings)?.0;
         Ok(vec![test::start(cx, &at, diagnostic)?])
     }
 
-    fn text(&self, n: usize) -> String {
-        match &self.fields[n].input {
-            Input::Text(line) => line.text().trim().to_owned(),
-            Input::Choice(options, at) => options[*at].clone(),
-        }
-    }
-
     /// What a function takes of a field: of a choice its number.
     fn entry(&self, n: usize) -> String {
-        match &self.fields[n].input {
-            Input::Text(_) => self.text(n),
-            Input::Choice(_, at) => at.to_string(),
-        }
-    }
-
-    fn chosen(&self, n: usize) -> usize {
-        match &self.fields[n].input {
-            Input::Choice(_, at) => *at,
-            Input::Text(_) => 0,
-        }
+        self.form.choice(n).map_or_else(|| self.form.text(n), |chosen| chosen.to_string())
     }
 
     fn build(&self, line: &LineDef) -> Result<Built, String> {
@@ -201,16 +149,16 @@ impl Form {
         let top = if framing == Framing::Mbap { 255 } else { 247 };
         // Unit 0 of a serial line is a broadcast: it can be written to, and answers nothing.
         let least = if framing == Framing::Mbap || self.tried == Tried::Request { 0 } else { 1 };
-        let unit = |n: usize| number(&self.text(n), self.fields[n].label, least..=top).map(to_u8);
+        let unit = |n: usize| number(&self.form.text(n), self.form.label(n), least..=top).map(to_u8);
         Ok(match self.tried {
             Tried::Bytes | Tried::Request => {
-                let entries: Vec<String> = (2..self.fields.len()).map(|n| self.entry(n)).collect();
-                let message = functions::message(unit(0)?, FUNCTIONS[self.chosen(1)], &entries)?;
+                let entries: Vec<String> = (2..self.form.count()).map(|n| self.entry(n)).collect();
+                let message = functions::message(unit(0)?, FUNCTIONS[self.form.chosen(FUNCTION)], &entries)?;
                 let words = request_text(&message, framing)?;
                 (Diagnostic::Send(frame::wrap(framing, TRANSACTION, &message)), words)
             }
             Tried::Loopback => {
-                let (unit, count) = (unit(0)?, to_u16(number(&self.text(1), t!("times"), 1..=1_000)?));
+                let (unit, count) = (unit(0)?, to_u16(number(&self.form.text(1), t!("times"), 1..=1_000)?));
                 let words = t!("sends a word to unit {unit} and expects it back, {count} times", unit, count);
                 (Diagnostic::Loopback { unit, data: 0xA537, count }, vec![words])
             }
@@ -218,7 +166,7 @@ impl Form {
                 return Err(t!("Modbus TCP has no plug: this needs a serial line").to_owned());
             }
             Tried::Plug => {
-                let count = to_u16(number(&self.text(0), t!("patterns"), 1..=i64::from(PATTERNS_MAX))?);
+                let count = to_u16(number(&self.form.text(0), t!("patterns"), 1..=i64::from(PATTERNS_MAX))?);
                 let bits = line.transport.serial().map_or(8, |serial| serial.data_bits);
                 let words = t!("sends {count} patterns of 32 bytes and compares what comes back", count);
                 (Diagnostic::Pattern { bits, count }, vec![words])
@@ -238,8 +186,8 @@ impl Form {
         if last < first {
             return Err(t!("from unit {first} to unit {last}: the first is greater than the last", first, last));
         }
-        let timeout = Duration::from_millis(to_u64(number(&self.text(3), t!("wait ms"), 10..=10_000)?));
-        let serials = if self.chosen(2) == 1 { all_settings(line) } else { Vec::new() };
+        let timeout = Duration::from_millis(to_u64(number(&self.form.text(3), t!("wait ms"), 10..=10_000)?));
+        let serials = if self.form.chosen(2) == 1 { all_settings(line) } else { Vec::new() };
         let (units, settings) = (u32::from(last - first) + 1, to_u32(serials.len().max(1)));
         let longest = ms(timeout * units * settings);
         let words = t!(
@@ -268,32 +216,12 @@ impl Form {
         if let Some(why) = problem.filter(|why| !notes.iter().any(|(line, _)| line.ends_with(why.as_str()))) {
             notes.extend(wrapped(&format!("! {why}"), theme.trouble()));
         }
-        let rows = to_u16(self.fields.len());
+        let rows = self.form.rows();
         let mut canvas = window(cx, screen, body, self.title(), (room, rows + to_u16(notes.len()) + 3));
-        // On a small screen the chosen field is always seen, and the notes below are cut with a word.
+        // On a small screen the selected field is always seen, and the notes below are cut with a word.
         let last = canvas.height().saturating_sub(1);
         let shown = rows.min(last).max(1);
-        let first = (self.at + 1).saturating_sub(usize::from(shown));
-        for (n, field) in self.fields.iter().enumerate().skip(first).take(usize::from(shown)) {
-            let y = to_u16(n - first);
-            let mark = if n == self.at { "▸ " } else { "  " };
-            let x = canvas.text(0, y, mark, theme.strong());
-            let x = canvas.text(x, y, &pad(field.label, 10), theme.dim());
-            match &field.input {
-                Input::Text(line) if n == self.at => {
-                    line.view(theme, &mut canvas, x, y);
-                    let left = canvas.width().saturating_sub(x + width(&line.text()) + 3);
-                    canvas.text_right(canvas.width(), y, &fit(&field.range, left), theme.dim());
-                }
-                Input::Text(line) => {
-                    canvas.text(x, y, &line.text(), theme.normal());
-                }
-                Input::Choice(options, chosen) => {
-                    let style = if n == self.at { theme.focus() } else { theme.normal() };
-                    canvas.text(x, y, &format!("‹ {} ›", options[*chosen]), style);
-                }
-            }
-        }
+        self.form.view(cx, &mut canvas, self.form.labels(), 0..shown);
         let room = usize::from(last.saturating_sub(shown + 1));
         for (y, _, (line, style)) in on_screen(&notes, 0, room) {
             canvas.text(0, shown + 1 + y, line, *style);

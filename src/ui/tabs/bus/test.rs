@@ -8,7 +8,7 @@ pub use send::Send;
 use super::{
     LineView, Window,
     frames::{broken, bytes_text},
-    request::Form,
+    request::RequestForm,
     results,
     rows::{self, Row, plain},
 };
@@ -96,7 +96,7 @@ pub struct Bench {
     /// As it is typed, without a check.
     pub bare: bool,
     /// The form that was filled in last.
-    pub form: Option<Form>,
+    pub form: Option<RequestForm>,
 }
 
 impl Bench {
@@ -124,7 +124,7 @@ impl Bench {
             | Tried::Scan
             | Tried::Sweep => {
                 let last = self.form.take_if(|form| form.is(at.id, tried));
-                Window::Form(last.unwrap_or_else(|| Form::new(cx, at, tried)))
+                Window::Form(last.unwrap_or_else(|| RequestForm::new(cx, at, tried)))
             }
         };
         // What is sent as it was typed may be a write.

@@ -5,7 +5,7 @@ use ratatui::Frame as Screen;
 use super::{
     frames::{broken, bytes_text},
     line::short_ms,
-    request::Form,
+    request::RequestForm,
     rows::{self, Row, plain},
     test::Send,
 };
@@ -31,7 +31,7 @@ pub enum Window {
     /// Bytes or words to be sent.
     Send(Send),
     /// A test with its fields.
-    Form(Form),
+    Form(RequestForm),
 }
 
 impl Window {

@@ -14,7 +14,7 @@ use crate::{
     access::right,
     plant::{def::ProgramDef, interlock::role_to_write},
     ui::{
-        modal::{Choice, Settings},
+        modal::{Choice, LineSettings},
         rights,
         tabs::line_switch,
     },
@@ -101,7 +101,7 @@ impl Controllers {
     }
 
     pub(super) fn open_settings(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.on_device(cx, |_, device| open(Modal::Settings(Box::new(Settings::new(cx, device.line)))))
+        self.on_device(cx, |_, device| open(Modal::LineSettings(Box::new(LineSettings::new(cx, device.line)))))
     }
 
     /// Auto-tuning at work is stopped, else the window asks which kind is wanted.

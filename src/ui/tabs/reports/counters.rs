@@ -56,7 +56,7 @@ fn correct(cx: &ViewContext, report: Option<&ShiftReport>, charted: usize) -> Ve
     let named = |name: &str| counters.iter().position(|tag| cx.def().tag(*tag).name == name);
     let row = report.and_then(|report| named(&report.tags.get(charted)?.tag));
     let step = report.and_then(|report| named(&report.counters.last()?.tag));
-    let Some(window) = Correction::new(counters, row.or(step).unwrap_or(0)) else { return Vec::new() };
+    let Some(window) = Correction::new(cx.def(), counters, row.or(step).unwrap_or(0)) else { return Vec::new() };
     let kind = window.command_kind(Exact::from(1.0));
     vec![Notice::or(cx, t!("correct a counter"), &kind, Modal::Correction(Box::new(window)))]
 }

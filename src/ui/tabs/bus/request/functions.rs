@@ -1,14 +1,14 @@
 //! The functions of the form, a row each: what they are filled in with, and how that becomes bytes (V1.1b3, 6).
 
 use super::{
-    Field, Input,
+    Field,
     fields::{address, bit, number, register},
+    typed,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
     bus::names,
     plant::{number::to_u8, tag::Table},
-    ui::modal::line::Line,
 };
 
 /// Functions that the form offers, the most used first.
@@ -74,34 +74,22 @@ fn range(kind: Kind, table: Table) -> String {
     }
 }
 
-/// The fields of a function; what was filled in under the same label before stays, where the table is the same.
-pub fn fields(function: u8, before: &[Field]) -> Vec<Field> {
+/// The fields of a function; what was filled in under the same label before stays, where it can.
+pub fn fields(function: u8, before: &dyn Fn(&str) -> Option<String>) -> Vec<Field> {
     let table = names::table(function);
-    let field = |(label, kind, first): (&'static str, Kind, &str)| {
-        let choice = |options: Vec<String>| Input::Choice(options, 0);
-        let input = match kind {
-            Kind::SubFunction => {
-                choice(SUB_FUNCTIONS.map(|code| format!("{code} / 0x{code:02X} {}", names::diagnostic(code))).to_vec())
-            }
-            Kind::ReadCode => choice(READ_CODES.map(|code| format!("{code} {}", names::identification(code))).to_vec()),
-            Kind::Address
-            | Kind::Count(_)
-            | Kind::Bit
-            | Kind::Bits
-            | Kind::Register
-            | Kind::Registers
-            | Kind::Object => {
-                let same = before.iter().find(|field| field.label == label).map(|field| &field.input);
-                let kept = match same {
-                    Some(Input::Text(line)) => Some(line.text()),
-                    Some(Input::Choice(..)) | None => None,
-                };
-                let kept = kept.filter(|text| kind != Kind::Address || address(text, table).is_ok());
-                let first = if kind == Kind::Address { table.modicon(0) } else { first.to_owned() };
-                Input::Text(Line::long(&kept.unwrap_or(first), 400))
-            }
-        };
-        Field { label, input, range: range(kind, table) }
+    let field = |(label, kind, first): (&'static str, Kind, &str)| match kind {
+        Kind::SubFunction => {
+            let words = SUB_FUNCTIONS.map(|code| format!("{code} / 0x{code:02X} {}", names::diagnostic(code)));
+            Field::choice(label, words, 0)
+        }
+        Kind::ReadCode => {
+            Field::choice(label, READ_CODES.map(|code| format!("{code} {}", names::identification(code))), 0)
+        }
+        Kind::Address | Kind::Count(_) | Kind::Bit | Kind::Bits | Kind::Register | Kind::Registers | Kind::Object => {
+            let kept = before(label).filter(|text| kind != Kind::Address || address(text, table).is_ok());
+            let first = if kind == Kind::Address { table.modicon(0) } else { first.to_owned() };
+            typed(label, &kept.unwrap_or(first), &range(kind, table))
+        }
     };
     row(function).into_iter().map(field).collect()
 }

@@ -84,7 +84,7 @@ fn pages_are_turned_by_arrows_and_letters() {
         assert!(shown.contains("‹Frames›") && shown.contains("This key does nothing here"), "{key}: {shown}");
     }
     type_keys(&mut model, "lc");
-    assert!(matches!(model.modal, Some(Modal::Settings(_))));
+    assert!(matches!(model.modal, Some(Modal::LineSettings(_))));
 }
 
 #[test]

@@ -73,7 +73,7 @@ fn a_supervisor_corrects_a_counter_with_a_reason() {
     assert_eq!(sent(&mut stand), Some((kind, Some("new meter".into()))));
     assert!(!stand.screen().contains("correct a counter"));
     // Another counter, the reason first.
-    stand.press("x↑⇥read by hand⇥3⏎");
+    stand.press("x↑←⇥⇥read by hand↑3⏎");
     let kind = CommandKind::CorrectCounter { tag: output, amount: 3.0.into() };
     assert_eq!(sent(&mut stand), Some((kind, Some("read by hand".into()))));
 }
@@ -95,7 +95,7 @@ fn only_a_supervisor_is_asked_for_an_amount() {
     stand.send(Msg::SessionStatus(Arc::new(SessionStatus { who, ..session })));
     stand.press("x5⏎");
     let shown = stand.screen();
-    assert!(shown.contains("upervisor") && !shown.contains("amount:"), "{shown}");
+    assert!(shown.contains("upervisor") && !shown.contains("amount "), "{shown}");
     assert_eq!(sent(&mut stand), None);
 }
 

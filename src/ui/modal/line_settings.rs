@@ -8,7 +8,12 @@ use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
 
-use super::{Modal, Next, faceplate::device_text, window};
+use super::{
+    Modal, Next,
+    faceplate::device_text,
+    form::{Drawn, KeyOutcome},
+    window,
+};
 use crate::{
     plant::{
         command::{CommandKind, Outcome},
@@ -20,18 +25,16 @@ use crate::{
     ui::{
         UiAction, ViewContext, keys,
         keys::Hint,
-        widgets::text::{Canvas, fit, fit_words, width, wrap},
+        widgets::text::{fit, fit_words, wrap},
     },
 };
-use draft::{Draft, Field};
+use draft::{Draft, Row};
 
 /// The form.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct LineSettings {
     line: LineId,
     draft: Draft,
-    /// The selected row.
-    row: usize,
     /// What Enter will do, asked once more.
     asking: Option<SettingsAction>,
     problem: Option<String>,
@@ -45,127 +48,103 @@ enum SettingsAction {
     Save,
 }
 
-impl Settings {
+impl LineSettings {
     /// The settings in use of a line, to be changed.
-    pub fn new(cx: &ViewContext, line: LineId) -> Settings {
-        // The speed is what differs most often.
-        Settings { line, draft: Draft::new(in_use(cx, line)), row: 2, asking: None, problem: None }.in_range()
+    pub fn new(cx: &ViewContext, line: LineId) -> LineSettings {
+        LineSettings { line, draft: Draft::new(in_use(cx, line)), asking: None, problem: None }
     }
 
     pub(super) fn hints(&self) -> Vec<Hint> {
+        let escape = Hint::in_window(t!("Esc"), t!("close"));
         if self.asking.is_some() {
-            return vec![
-                Hint::in_window("⏎", t!("yes")),
-                Hint::in_window("n", t!("no")),
-                Hint::in_window(t!("Esc"), t!("close")),
-            ];
+            return vec![Hint::in_window("⏎", t!("yes")), Hint::in_window("n", t!("no")), escape];
         }
+        let form = &self.draft.form;
         let mut hints = vec![Hint::in_window("↑↓", t!("select"))];
-        if self.field().is_choice() {
+        if form.is_on_choice() {
             hints.push(Hint::in_window("←→", t!("change")));
         }
         hints.push(Hint::in_window("⏎", t!("apply")));
-        if !self.field().is_text() {
+        if !form.is_on_text() {
             hints.extend([Hint::in_window("u", t!("revert")), Hint::in_window("S", t!("save to plant file"))]);
         }
-        hints.push(Hint::in_window(t!("Esc"), t!("close")));
+        hints.push(escape);
         hints
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
-        let enter = keys::code(KeyCode::Enter).is(event);
         if let Some(action) = self.asking.take() {
-            let yes = enter || keys::char('y').is(event);
+            let yes = keys::code(KeyCode::Enter).is(event) || keys::char('y').is(event);
             let acts = if yes { vec![UiAction::Command(self.command_kind(action))] } else { Vec::new() };
             // Off the text field, so that u and S are keys again.
-            self.row = 0;
-            return Next::Both(Modal::Settings(Box::new(self)), acts);
+            self.draft.form.select(0);
+            return Next::Both(Modal::LineSettings(Box::new(self)), acts);
         }
-        self.problem = None;
-        let asked = match event.code {
-            KeyCode::Enter if enter => self.ask_apply(cx),
-            KeyCode::Up => self.select(-1),
-            KeyCode::Down | KeyCode::Tab => self.select(1),
-            KeyCode::Left if self.field().is_choice() => self.draft.step(self.field(), -1),
-            KeyCode::Right if self.field().is_choice() => self.draft.step(self.field(), 1),
-            KeyCode::Char(' ') if self.field().is_choice() => self.draft.step(self.field(), 1),
-            _ if self.draft.on_key(self.field(), event) => Ok(None),
-            KeyCode::Char('u') if keys::char('u').is(event) => self.ask_revert(cx),
-            KeyCode::Char('S') if keys::char('S').is(event) => self.ask_save(cx),
-            KeyCode::Char('q') => return Next::Close,
-            _ => Ok(None),
+        let asked = match self.draft.form.on_key(event) {
+            KeyOutcome::Submitted => self.ask_apply(cx),
+            KeyOutcome::Taken => self.on_change(event).map(|()| None),
+            KeyOutcome::Ignored if keys::char('u').is(event) => self.ask_revert(cx),
+            KeyOutcome::Ignored if keys::char('S').is(event) => self.ask_save(cx),
+            KeyOutcome::Ignored if keys::char('q').is(event) => return Next::Close,
+            KeyOutcome::Ignored => Ok(None),
         };
-        match asked {
-            Ok(action) => self.asking = action,
-            Err(problem) => self.problem = Some(problem),
+        self.problem = match asked {
+            Ok(action) => {
+                self.asking = action;
+                None
+            }
+            Err(problem) => Some(problem),
+        };
+        Next::Stay(Modal::LineSettings(Box::new(self)))
+    }
+
+    fn on_change(&mut self, event: KeyEvent) -> Result<(), String> {
+        let is_choice = matches!(event.code, KeyCode::Left | KeyCode::Right | KeyCode::Char(' '));
+        match self.draft.form.selected() {
+            n if is_choice && n == Row::Mode as usize => self.draft.on_mode(),
+            n if is_choice && n == Row::DataBits as usize && !self.draft.has_data_bits() => {
+                return Err(t!("Modbus RTU always has 8 data bits; 7 are for ASCII").to_owned());
+            }
+            _ => {}
         }
-        Next::Stay(Modal::Settings(Box::new(self.in_range())))
+        Ok(())
     }
 
     pub(super) fn on_paste(&mut self, text: &str) {
-        let field = self.field();
         if self.asking.is_none() {
-            self.draft.paste(field, text);
+            self.draft.form.paste(text);
         }
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let theme = cx.theme;
         let used = in_use(cx, self.line);
-        let fields = self.draft.fields();
+        let form = &self.draft.form;
         let room = body.width.saturating_sub(4).min(72);
         let (status, pinned) = (self.status(cx, used, room), self.pinned(cx, used, room));
         let title = t!("communication settings of {name}", name = used.name);
-        let wanted = 1 + fields.len() + 1 + status.len() + 1 + pinned.len();
-        let mut canvas = window(cx, frame, body, &title, (room, wanted));
+        let rows = usize::from(form.rows());
+        let mut canvas = window(cx, frame, body, &title, (room, 1 + rows + 1 + status.len() + 1 + pinned.len()));
         // On a small screen: first the keys and what is asked, then the fields around the selected one, then the rest.
         let height = usize::from(canvas.height());
-        let shown = fields.len().min(height.saturating_sub(1 + pinned.len()));
-        let first = (self.row + 1).saturating_sub(shown);
-        let used_at = fields.iter().map(|field| width(field.name()) + 3).max().unwrap_or(0).max(NAME);
+        let shown = rows.min(height.saturating_sub(1 + pinned.len()));
+        let used_at = form.labels();
         let new_at = used_at + room.saturating_sub(used_at) / 2;
         canvas.text(used_at, 0, t!("in use"), theme.dim());
         canvas.text(new_at, 0, t!("new"), theme.dim());
         let old = Draft::new(used);
-        for (y, (n, field)) in fields.iter().enumerate().skip(first).take(shown).enumerate() {
-            let y = to_u16(y) + 1;
-            let selected = n == self.row && self.asking.is_none();
-            canvas.text(2, y, field.name(), if selected { theme.focus() } else { theme.normal() });
-            let before = old.words(*field);
+        for Drawn { field, y, end } in form.view(cx, &mut canvas, new_at, 1..to_u16(1 + shown)) {
+            let before = old.words(field);
             canvas.text(used_at, y, &fit(&before, new_at.saturating_sub(used_at + 2)), theme.dim());
-            self.value(cx, &mut canvas, (new_at, y), *field, selected, before != self.draft.words(*field));
+            canvas.text(end + 1, y, Row::unit(field), theme.dim());
+            if before != self.draft.words(field) {
+                canvas.text_right(canvas.width(), y, t!("◂ changed"), theme.strong());
+            }
         }
         let free = height.saturating_sub(1 + shown + pinned.len());
         let gap = usize::from(status.len() < free);
         canvas.rows(0, 1 + shown + gap, &status[..free.min(status.len())]);
         canvas.rows(0, height.saturating_sub(pinned.len()), &pinned);
-    }
-
-    /// The new value of a field: a text with its cursor, or a choice between arrows; bold where it differs.
-    fn value(
-        &self,
-        cx: &ViewContext,
-        canvas: &mut Canvas,
-        (x, y): (u16, u16),
-        field: Field,
-        selected: bool,
-        differs: bool,
-    ) {
-        let theme = cx.theme;
-        let words = self.draft.words(field);
-        let style = if differs { theme.strong() } else { theme.normal() };
-        let end = match (selected, self.draft.text(field)) {
-            (true, Some(line)) => {
-                let rest = canvas.width().saturating_sub(x);
-                x + line.view(theme, &mut canvas.part(x, y, rest, 1), 0, 0)
-            }
-            (true, None) => canvas.text(x, y, &format!("‹ {words} ›"), style),
-            (false, _) => canvas.text(x, y, &words, style),
-        };
-        canvas.text(end + 1, y, field.unit(), theme.dim());
-        if differs {
-            canvas.text_right(canvas.width(), y, t!("◂ changed"), theme.strong());
-        }
     }
 
     /// How the line does with what it uses, and what can be taken back.
@@ -194,7 +173,7 @@ impl Settings {
         };
         let keys = match self.asking {
             Some(_) => t!("⏎ yes   n no"),
-            None if self.field().is_text() => t!("type it   ⏎ apply   Esc close"),
+            None if self.draft.form.is_on_text() => t!("type it   ⏎ apply   Esc close"),
             None => t!("⏎ apply   u revert   S save to plant file   Esc close"),
         };
         let rows = wrap(&words, room).into_iter().map(|row| (row, style));
@@ -256,26 +235,7 @@ impl Settings {
         }
         Ok(Some(SettingsAction::Save))
     }
-
-    fn select(&mut self, by: isize) -> Result<Option<SettingsAction>, String> {
-        self.row = self.row.saturating_add_signed(by);
-        Ok(None)
-    }
-
-    fn field(&self) -> Field {
-        let fields = self.draft.fields();
-        fields[self.row.min(fields.len() - 1)]
-    }
-
-    /// Another mode has another number of rows.
-    fn in_range(mut self) -> Settings {
-        self.row = self.row.min(self.draft.fields().len() - 1);
-        self
-    }
 }
-
-/// Columns of a name at least.
-const NAME: u16 = 13;
 
 /// The settings that a line works with now.
 fn in_use<'a>(cx: &ViewContext<'a>, line: LineId) -> &'a LineDef {
