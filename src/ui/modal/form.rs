@@ -1,9 +1,11 @@
 //! A form: fields one below the other, typed or chosen. Every window that is filled in is one.
 
-use crate::t;
-use std::{fmt, ops::Range};
+mod field;
 
-use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
+use crate::t;
+use std::ops::Range;
+
+use crossterm::event::{KeyCode, KeyEvent};
 
 use super::line::Line;
 use crate::{
@@ -14,10 +16,8 @@ use crate::{
         widgets::text::{Canvas, fit, pad, width},
     },
 };
-
-/// Most characters of a password, and of a name.
-const SECRET_CHARS: usize = 128;
-const NAME_CHARS: usize = 32;
+pub use field::Field;
+use field::{Input, SECRET_CHARS};
 
 /// Fields to fill in.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,26 +29,6 @@ pub struct Form {
     shown: bool,
     /// Enter submits on any field, where a form is mostly filled in already.
     submits: bool,
-}
-
-/// A field of a form. What was typed never comes out of its `Debug`.
-#[derive(Clone, PartialEq)]
-pub struct Field {
-    label: &'static str,
-    input: Input,
-    /// What may be typed, shown while it is; empty where it need not be said.
-    range: String,
-    /// It has no meaning beside what other fields hold: not shown, not reached.
-    hidden: bool,
-}
-
-#[derive(Clone, PartialEq)]
-enum Input {
-    Text(Line),
-    /// Only digits: a letter may be a key of the window.
-    Digits(Line),
-    Secret(Line),
-    Choice(Vec<String>, usize),
 }
 
 /// What a key did to a form.
@@ -71,73 +51,6 @@ pub struct Drawn {
     pub y: u16,
     /// The column behind its value.
     pub end: u16,
-}
-
-impl Field {
-    /// A name, empty.
-    pub fn name(label: &'static str) -> Field {
-        Field::text(label, "", NAME_CHARS)
-    }
-    /// A text of at most so many characters, to start from.
-    pub fn text(label: &'static str, text: &str, chars: usize) -> Field {
-        Field::new(label, Input::Text(Line::long(text, chars)))
-    }
-    /// A whole number, to start from.
-    pub fn digits(label: &'static str, number: impl fmt::Display) -> Field {
-        Field::new(label, Input::Digits(Line::new(&number.to_string())))
-    }
-    /// A password, empty.
-    pub fn secret(label: &'static str) -> Field {
-        Field::new(label, Input::Secret(Line::long("", SECRET_CHARS)))
-    }
-    /// One of a few, never none; this one at first.
-    pub fn choice(label: &'static str, options: impl IntoIterator<Item = impl Into<String>>, chosen: usize) -> Field {
-        let options: Vec<String> = options.into_iter().map(Into::into).collect();
-        Field::new(label, Input::Choice(options, chosen))
-    }
-    /// One of these, each with its words; this one at first.
-    pub fn one_of<T: Copy + PartialEq, W: Into<String>>(
-        label: &'static str,
-        all: &[T],
-        now: T,
-        words: impl Fn(T) -> W,
-    ) -> Field {
-        let chosen = all.iter().position(|one| *one == now).unwrap_or(0);
-        Field::choice(label, all.iter().map(|one| words(*one)), chosen)
-    }
-    /// With what may be typed.
-    pub fn within(self, range: impl Into<String>) -> Field {
-        Field { range: range.into(), ..self }
-    }
-
-    fn new(label: &'static str, input: Input) -> Field {
-        Field { label, input, range: String::new(), hidden: false }
-    }
-
-    fn line(&self) -> Option<&Line> {
-        match &self.input {
-            Input::Text(line) | Input::Digits(line) | Input::Secret(line) => Some(line),
-            Input::Choice(..) => None,
-        }
-    }
-
-    fn type_key(&mut self, event: KeyEvent) -> bool {
-        let is_letter = matches!(event.code, KeyCode::Char(c) if !c.is_ascii_digit());
-        match &mut self.input {
-            Input::Text(line) | Input::Secret(line) => line.on_key(event),
-            Input::Digits(_) if is_letter && !event.modifiers.contains(KeyModifiers::CONTROL) => false,
-            Input::Digits(line) => line.on_key(event),
-            Input::Choice(options, chosen) => {
-                let by = match event.code {
-                    KeyCode::Left => options.len() - 1,
-                    KeyCode::Right | KeyCode::Char(' ') => 1,
-                    _ => return false,
-                };
-                *chosen = (*chosen + by) % options.len();
-                true
-            }
-        }
-    }
 }
 
 impl Form {
@@ -375,12 +288,6 @@ fn draw(cx: &ViewContext, canvas: &mut Canvas, (x, y): (u16, u16), line: &Line, 
     }
 }
 
-impl fmt::Debug for Field {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.label)
-    }
-}
-
 /// What was typed or pasted is not all there.
 pub fn cut() -> String {
     t!("the text was cut; Ctrl-U clears the line").to_owned()
@@ -394,6 +301,7 @@ fn required(label: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crossterm::event::KeyModifiers;
 
     fn form(keys: &str) -> Form {
         let mut form = Form::new(vec![
