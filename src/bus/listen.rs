@@ -40,9 +40,8 @@ use self::{
     pairing::{Answered, Next, Open},
 };
 use super::{
-    ascii,
-    cut::{self, Cut},
-    frame,
+    ascii, frame,
+    frame_boundaries::{self, Cut},
     pdu::{self, Length},
 };
 use crate::plant::{
@@ -187,7 +186,7 @@ impl Listener {
     fn take_frames(&mut self, ended: bool, heard: &mut Vec<Heard>) {
         while self.noise < self.bytes.len() {
             let asked = self.open.front().map(|open| &open.message[..]);
-            match cut::cut(self.framing, &self.bytes[self.noise..], asked, ended) {
+            match frame_boundaries::cut(self.framing, &self.bytes[self.noise..], asked, ended) {
                 Cut::Frame(length) => {
                     self.end_noise(heard);
                     self.take(length, heard);
@@ -209,7 +208,9 @@ impl Listener {
     /// What stood before a frame or a silence is noise, or frames of functions that are not in the standard.
     fn end_noise(&mut self, heard: &mut Vec<Heard>) {
         let noise = &self.bytes[..self.noise];
-        match cut::of_unknown_functions(noise).filter(|_| self.framing == Framing::Rtu && !noise.is_empty()) {
+        match frame_boundaries::of_unknown_functions(noise)
+            .filter(|_| self.framing == Framing::Rtu && !noise.is_empty())
+        {
             Some(lengths) => {
                 self.noise = 0;
                 lengths.into_iter().for_each(|length| self.take(length, heard));

@@ -27,7 +27,7 @@ pub(crate) mod pdu;
 pub mod ascii;
 pub mod frame;
 pub mod framing;
-mod cut;
+mod frame_boundaries;
 pub mod names;
 pub mod request_lint;
 pub mod dissect;

@@ -1,6 +1,6 @@
 //! The command line: one file a subcommand, one place for exit codes.
 
-mod act;
+mod ack_write;
 mod attach;
 mod batches;
 mod procedure;
@@ -107,11 +107,11 @@ enum Command {
     /// Show the state of the running station and its plant, as lines or JSON
     Status(status::Args),
     /// Acknowledge alarms at the running station
-    Ack(act::AckArgs),
+    Ack(ack_write::AckArgs),
     /// Write a tag at the running station and wait until it is verified
-    Write(act::WriteArgs),
+    Write(ack_write::WriteArgs),
     /// Correct what a counter counted, from now on and with a reason (--note)
-    Correct(act::CorrectArgs),
+    Correct(ack_write::CorrectArgs),
     /// Verify the audit log: `audit verify` names the first line that was changed, `audit key` has it sealed
     Audit(audit::Args),
     /// Stop the running station
@@ -294,9 +294,9 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Run(args)) => run::main(args),
         Some(Command::Attach(args)) => attach::main(args),
         Some(Command::Status(args)) => status::main(args),
-        Some(Command::Ack(args)) => act::ack(args),
-        Some(Command::Write(args)) => act::write(args),
-        Some(Command::Correct(args)) => act::correct(args),
+        Some(Command::Ack(args)) => ack_write::ack(args),
+        Some(Command::Write(args)) => ack_write::write(args),
+        Some(Command::Correct(args)) => ack_write::correct(args),
         Some(Command::Audit(args)) => audit::main(args),
         Some(Command::Stop(args)) => control::stop(args),
         Some(Command::Reload(args)) => control::reload(args),

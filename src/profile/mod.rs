@@ -38,7 +38,7 @@ mod north;
 mod picture;
 pub(crate) mod new_plant;
 mod plant;
-mod own;
+mod user_profiles;
 mod program;
 mod raw_pattern;
 pub(crate) mod reader;
@@ -71,8 +71,8 @@ pub(crate) use self::units::{is_known as is_known_unit, of as unit_of};
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search, list, text_of},
-    own::OwnProfiles,
     set_file::{read_set, text_of_set},
+    user_profiles::OwnProfiles,
 };
 pub use crate::plant::line_check::{BAUD_RANGE, BAUDS};
 use crate::plant::{def::PlantDef, keyword::keyword_enum};

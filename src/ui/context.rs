@@ -54,7 +54,7 @@ impl<'a> ViewContext<'a> {
         self.phase % 4 < 2
     }
     /// The time that no setting of a clock moves: for what is asked again after a while.
-    pub fn steady(&self) -> Timestamp {
+    pub fn monotonic_now(&self) -> Timestamp {
         self.present().checked_sub(self.snapshot.stepped).unwrap_or(self.present())
     }
     /// What time it really is.

@@ -6,7 +6,7 @@ mod paint;
 mod preferences;
 mod question;
 mod screen;
-mod wire;
+mod frame_backend;
 #[cfg(test)]
 mod tests;
 

@@ -56,7 +56,7 @@ pub struct LastFrame {
     /// Something has come from the station since.
     news: bool,
     /// The selection was moved over rows that are not those of the frame: what a key means is unknown.
-    astray: bool,
+    selection_unseen: bool,
 }
 
 impl Model {
@@ -91,7 +91,7 @@ impl Model {
             rows: self.tabs.shown().fingerprint(&self.cx()),
             alarm,
             news: false,
-            astray: false,
+            selection_unseen: false,
         }
     }
 
@@ -104,10 +104,12 @@ impl Model {
         let now = self.tabs.shown().fingerprint(&self.cx());
         let Some(last_frame) = self.last_frame.as_mut().filter(|last_frame| last_frame.news) else { return true };
         if moves {
-            last_frame.astray |= last_frame.tab != self.tabs.shown || last_frame.rows.all != now.all;
+            last_frame.selection_unseen |= last_frame.tab != self.tabs.shown || last_frame.rows.all != now.all;
             return true;
         }
-        let seen = !last_frame.astray && last_frame.tab == self.tabs.shown && last_frame.rows.selected == now.selected;
+        let seen = !last_frame.selection_unseen
+            && last_frame.tab == self.tabs.shown
+            && last_frame.rows.selected == now.selected;
         if !seen {
             self.note = Some(changed().into());
         }
@@ -133,7 +135,7 @@ impl Model {
     fn alarm_seen(&self) -> Result<Option<&ActiveAlarm>, &'static str> {
         let now = self.alarm_to_acknowledge();
         let Some(last_frame) = self.last_frame else { return Ok(now) };
-        if last_frame.astray {
+        if last_frame.selection_unseen {
             return Err(changed());
         }
         let Some((id, annunciated_at)) = last_frame.alarm else {

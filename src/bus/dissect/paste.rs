@@ -5,8 +5,8 @@ use std::ops::Range;
 use super::{Direction, Dissection, Readings, dissect, envelope};
 use crate::{
     bus::{
-        cut::{self, Cut},
         frame,
+        frame_boundaries::{self, Cut},
         pdu::{self, Length},
         request_lint::check_request,
     },
@@ -151,7 +151,7 @@ fn runs(framing: Framing, bytes: &[u8], asked: Option<&[u8]>, is_given: bool) ->
     let (mut runs, mut at, mut noise) = (Vec::new(), 0, 0);
     let mut asked = asked.map(<[u8]>::to_vec);
     let end_noise = |runs: &mut Vec<Run>, range: Range<usize>| {
-        let frames = cut::of_unknown_functions(&bytes[range.clone()]).filter(|_| framing == Framing::Rtu);
+        let frames = frame_boundaries::of_unknown_functions(&bytes[range.clone()]).filter(|_| framing == Framing::Rtu);
         let mut from = range.start;
         for length in frames.iter().flatten() {
             runs.push(Run { range: from..from + length, is_frame: true });
@@ -171,7 +171,7 @@ fn runs(framing: Framing, bytes: &[u8], asked: Option<&[u8]>, is_given: bool) ->
             }
             false => is_given,
         };
-        match cut::cut(framing, &bytes[at..], asked.as_deref(), true) {
+        match frame_boundaries::cut(framing, &bytes[at..], asked.as_deref(), true) {
             Cut::Frame(length) if framing != Framing::Mbap || message(length).as_ref().is_some_and(known) => {
                 end_noise(&mut runs, noise..at);
                 runs.push(Run { range: at..at + length, is_frame: true });

@@ -18,7 +18,7 @@ use crossterm::{
 use ratatui::{Frame, Terminal, backend::Backend};
 use tokio::time::Instant;
 
-use super::{question, wire::Wire};
+use super::{frame_backend::FrameBackend, question};
 use crate::ui::graphics::{Picture, Protocol, kitty};
 
 /// The terminal is in raw mode and shows our screen.
@@ -33,7 +33,7 @@ thread_local! {
 
 /// A raised terminal. Dropping it restores what was there before.
 pub struct Screen {
-    terminal: Terminal<Wire>,
+    terminal: Terminal<FrameBackend>,
     /// The terminal reports the mouse.
     mouse: bool,
     /// When it was asked about pictures, if it was.
@@ -67,7 +67,7 @@ impl Screen {
             event::EnableBracketedPaste
         );
         let screen =
-            raised.and_then(|()| Ok(Screen { terminal: Terminal::new(Wire::new()?)?, mouse: false, asked_at }));
+            raised.and_then(|()| Ok(Screen { terminal: Terminal::new(FrameBackend::new()?)?, mouse: false, asked_at }));
         if screen.is_err() {
             restore();
         }

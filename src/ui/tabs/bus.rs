@@ -32,7 +32,7 @@ use crate::{
     },
 };
 use registers::below;
-use test::Tried;
+use test::TestKind;
 
 /// The day of a line grows by the minute.
 const ASK_EVERY: SignedDuration = SignedDuration::from_secs(60);

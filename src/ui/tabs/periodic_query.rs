@@ -72,9 +72,9 @@ impl PeriodicQuery {
         }
         self.wanted |= past != self.past;
         self.past = past;
-        self.due(cx.steady(), every, timeout).then(|| {
+        self.due(cx.monotonic_now(), every, timeout).then(|| {
             *number = number.wrapping_add(1);
-            self.asked(*number, cx.steady());
+            self.asked(*number, cx.monotonic_now());
             UiAction::query(tab, *number, query)
         })
     }
@@ -95,7 +95,7 @@ impl PeriodicQuery {
     }
 
     fn noticed(&self, cx: &ViewContext) -> Option<SignedDuration> {
-        self.waiting(cx.steady()).filter(|waiting| real(cx, NOTICED_S) <= *waiting)
+        self.waiting(cx.monotonic_now()).filter(|waiting| real(cx, NOTICED_S) <= *waiting)
     }
 
     /// What is said while an answer is waited for; `None` for as long as it is not noticed.
@@ -178,7 +178,7 @@ impl<T: FromAnswer> Answered<T> {
 
     /// Takes the answer to query `number` if it is waited for.
     pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        if self.query.answered(number, cx.steady()).is_none() {
+        if self.query.answered(number, cx.monotonic_now()).is_none() {
             return;
         }
         match answer {

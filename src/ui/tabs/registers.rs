@@ -178,7 +178,7 @@ impl TabView for Registers {
         self.name_by_plant(cx.snapshot);
         let mut actions = self.watch_time(cx);
         self.follow_graph(cx);
-        let now = cx.steady();
+        let now = cx.monotonic_now();
         let wanted = self
             .on_way
             .is_some_and(|(_, at, span)| span != self.span(cx) || (LOST_AFTER + self.period) < now.duration_since(at));
@@ -226,7 +226,7 @@ impl TabView for Registers {
         let began = reading.began;
         let early = self.due.filter(|due| began + self.period / 2 < *due && *due <= began + self.period);
         let mut actions = self.watch_reading(&reading, early.is_none());
-        self.took = cx.steady().duration_since(began);
+        self.took = cx.monotonic_now().duration_since(began);
         self.last = Some(reading);
         if self.paused {
             return actions;

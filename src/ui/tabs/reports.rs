@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use self::{
     batches::{BatchReports, Batches},
     export::Export,
-    made::Made,
+    made::AutomaticReportsPage,
     rows::Rows,
 };
 use super::Outgoing;
@@ -104,7 +104,7 @@ pub struct Reports {
     /// The batches, while they are shown in place of a report.
     batches: Batches,
     batches_shown: bool,
-    made: Made,
+    made: AutomaticReportsPage,
     rows: Rows,
     dialect: CsvDialect,
     format: &'static dyn ReportFormat,
@@ -131,7 +131,7 @@ impl TabView for Reports {
             curve: Answered::default(),
             batches: Batches::new(BatchReports),
             batches_shown: false,
-            made: Made::default(),
+            made: AutomaticReportsPage::default(),
             rows: Rows::default(),
             dialect: snapshot.def.report.csv,
             format: report::FORMATS[0],

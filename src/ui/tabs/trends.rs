@@ -176,7 +176,7 @@ impl TabView for Trends {
         self.response.on_answer(cx, number, &answer);
         self.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, &answer));
         let exported = self.accept_export(cx, number, &answer);
-        if let Some(asked) = self.curves.answered(number, cx.steady()) {
+        if let Some(asked) = self.curves.answered(number, cx.monotonic_now()) {
             self.trouble = answer.as_ref().err().map(HistoryError::to_string);
             if let Ok(Answer::Series(series)) = answer {
                 // Asked at a steady time, about times in UTC.

@@ -65,14 +65,14 @@ const FRAMES: &[Key] = &[
 const TEST: &[Key] = &[
     Key::new(code(KeyCode::Enter), "start", "start the selected test", |bus, cx| bus.try_out(cx, bus.test.selected()))
         .needs(Role::Technician),
-    Key::new(char('t'), "", "enter bytes and send them", |bus, cx| bus.try_out(cx, Tried::Bytes)),
-    Key::new(char('f'), "", "build a request from its fields", |bus, cx| bus.try_out(cx, Tried::Request)),
-    Key::new(char('b'), "", "loopback", |bus, cx| bus.try_out(cx, Tried::Loopback)),
-    Key::new(char('p'), "", "loopback plug", |bus, cx| bus.try_out(cx, Tried::Plug)),
-    Key::new(char('g'), "", "raise or lower RTS or DTR for a time", |bus, cx| bus.try_out(cx, Tried::Signal)),
-    Key::new(char('i'), "", "identify a device", |bus, cx| bus.try_out(cx, Tried::Identify)),
-    Key::new(char('s'), "", "scan for units", |bus, cx| bus.try_out(cx, Tried::Scan)),
-    Key::new(char('m'), "", "map of the addresses that a unit answers at", |bus, cx| bus.try_out(cx, Tried::Sweep)),
+    Key::new(char('t'), "", "enter bytes and send them", |bus, cx| bus.try_out(cx, TestKind::Bytes)),
+    Key::new(char('f'), "", "build a request from its fields", |bus, cx| bus.try_out(cx, TestKind::Request)),
+    Key::new(char('b'), "", "loopback", |bus, cx| bus.try_out(cx, TestKind::Loopback)),
+    Key::new(char('p'), "", "loopback plug", |bus, cx| bus.try_out(cx, TestKind::Plug)),
+    Key::new(char('g'), "", "raise or lower RTS or DTR for a time", |bus, cx| bus.try_out(cx, TestKind::Signal)),
+    Key::new(char('i'), "", "identify a device", |bus, cx| bus.try_out(cx, TestKind::Identify)),
+    Key::new(char('s'), "", "scan for units", |bus, cx| bus.try_out(cx, TestKind::Scan)),
+    Key::new(char('m'), "", "map of the addresses that a unit answers at", |bus, cx| bus.try_out(cx, TestKind::Sweep)),
     Key::new(char('r'), "again", "repeat the last test", |bus, cx| bus.on_line(cx, |_, at| test::again(cx, at)))
         .needs(Role::Technician),
     Key::new(char('x'), "stop", "stop the running test", |bus, cx| bus.on_line(cx, |_, at| test::stop(at)))
@@ -139,7 +139,7 @@ impl Bus {
     }
 
     /// Prepares a test.
-    fn try_out(&mut self, cx: &ViewContext, tried: Tried) -> Vec<UiAction> {
-        self.on_line(cx, |bus, at| bus.test.open(cx, at, tried))
+    fn try_out(&mut self, cx: &ViewContext, kind: TestKind) -> Vec<UiAction> {
+        self.on_line(cx, |bus, at| bus.test.open(cx, at, kind))
     }
 }

@@ -15,7 +15,7 @@ use ratatui::Frame as Screen;
 use super::{
     Bus, LineView, Page, Window,
     line::ms,
-    test::{self, TRANSACTION, Tried},
+    test::{self, TRANSACTION, TestKind},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -44,7 +44,7 @@ const CHARS: usize = 400;
 #[derive(Debug, Clone, PartialEq)]
 pub struct RequestForm {
     line: LineId,
-    tried: Tried,
+    kind: TestKind,
     form: Form,
     problem: Option<String>,
 }
@@ -66,20 +66,20 @@ fn typed(label: &'static str, text: &str, range: &str) -> Field {
 
 impl RequestForm {
     /// With what suits most.
-    pub fn new(cx: &ViewContext, at: &LineView, tried: Tried) -> RequestForm {
+    pub fn new(cx: &ViewContext, at: &LineView, kind: TestKind) -> RequestForm {
         let unit = cx.def().devices.iter().find(|device| device.line == at.id).map_or(1, |device| device.unit);
         let unit = typed(t!("unit"), &unit.to_string(), "");
-        let fields = match tried {
-            Tried::Sweep => sweep::fields(unit),
-            Tried::Signal => signal::fields(),
-            Tried::Bytes | Tried::Request => {
+        let fields = match kind {
+            TestKind::Sweep => sweep::fields(unit),
+            TestKind::Signal => signal::fields(),
+            TestKind::Bytes | TestKind::Request => {
                 let function = Field::choice(t!("function"), FUNCTIONS.map(dissect::function_words), 0);
                 [vec![unit, function], functions::fields(FUNCTIONS[0], &|_| None)].concat()
             }
-            Tried::Loopback => vec![unit, typed(t!("times"), "10", "1 – 1000")],
-            Tried::Plug => vec![typed(t!("patterns"), "60", "1 – 500")],
-            Tried::Identify => vec![unit],
-            Tried::Scan => {
+            TestKind::Loopback => vec![unit, typed(t!("times"), "10", "1 – 1000")],
+            TestKind::Plug => vec![typed(t!("patterns"), "60", "1 – 500")],
+            TestKind::Identify => vec![unit],
+            TestKind::Scan => {
                 let mut settings = vec![t!("current settings: {transport}", transport = at.settings.transport)];
                 if at.settings.transport.serial().is_some() {
                     settings.push(t!("all baud rates and parities; polling pauses").to_owned());
@@ -89,12 +89,12 @@ impl RequestForm {
                 units.into_iter().chain([Field::choice(t!("settings"), settings, 0), wait]).collect()
             }
         };
-        RequestForm { line: at.id, tried, form: Form::submitting(fields, 0), problem: None }
+        RequestForm { line: at.id, kind, form: Form::submitting(fields, 0), problem: None }
     }
 
     /// Is it for this test of this line?
-    pub fn is(&self, line: LineId, tried: Tried) -> bool {
-        (self.line, self.tried) == (line, tried)
+    pub fn is(&self, line: LineId, kind: TestKind) -> bool {
+        (self.line, self.kind) == (line, kind)
     }
 
     /// A key; what is filled in is kept for the next time.
@@ -115,7 +115,7 @@ impl RequestForm {
             return Window::Form(self).stay();
         }
         self.problem = None;
-        if self.tried == Tried::Request && function != self.form.chosen(FUNCTION) {
+        if self.kind == TestKind::Request && function != self.form.chosen(FUNCTION) {
             let filled: Vec<(&str, String)> =
                 (2..self.form.count()).map(|n| (self.form.label(n), self.form.text(n))).collect();
             let before = |label: &str| filled.iter().find(|(of, _)| *of == label).map(|(_, text)| text.clone());
@@ -148,37 +148,37 @@ impl RequestForm {
         let framing = line.transport.framing();
         let top = if framing == Framing::Mbap { 255 } else { 247 };
         // Unit 0 of a serial line is a broadcast: it can be written to, and answers nothing.
-        let least = if framing == Framing::Mbap || self.tried == Tried::Request { 0 } else { 1 };
+        let least = if framing == Framing::Mbap || self.kind == TestKind::Request { 0 } else { 1 };
         let unit = |n: usize| number(&self.form.text(n), self.form.label(n), least..=top).map(to_u8);
-        Ok(match self.tried {
-            Tried::Bytes | Tried::Request => {
+        Ok(match self.kind {
+            TestKind::Bytes | TestKind::Request => {
                 let entries: Vec<String> = (2..self.form.count()).map(|n| self.entry(n)).collect();
                 let message = functions::message(unit(0)?, FUNCTIONS[self.form.chosen(FUNCTION)], &entries)?;
                 let words = request_text(&message, framing)?;
                 (Diagnostic::Send(frame::wrap(framing, TRANSACTION, &message)), words)
             }
-            Tried::Loopback => {
+            TestKind::Loopback => {
                 let (unit, count) = (unit(0)?, to_u16(number(&self.form.text(1), t!("times"), 1..=1_000)?));
                 let words = t!("sends a word to unit {unit} and expects it back, {count} times", unit, count);
                 (Diagnostic::Loopback { unit, data: 0xA537, count }, vec![words])
             }
-            Tried::Plug if framing == Framing::Mbap => {
+            TestKind::Plug if framing == Framing::Mbap => {
                 return Err(t!("Modbus TCP has no plug: this needs a serial line").to_owned());
             }
-            Tried::Plug => {
+            TestKind::Plug => {
                 let count = to_u16(number(&self.form.text(0), t!("patterns"), 1..=i64::from(PATTERNS_MAX))?);
                 let bits = line.transport.serial().map_or(8, |serial| serial.data_bits);
                 let words = t!("sends {count} patterns of 32 bytes and compares what comes back", count);
                 (Diagnostic::Pattern { bits, count }, vec![words])
             }
-            Tried::Identify => {
+            TestKind::Identify => {
                 let unit = unit(0)?;
                 let words = t!("reads vendor, product and version of unit {unit}, or else its server id", unit);
                 (Diagnostic::Identify { unit }, vec![words])
             }
-            Tried::Scan => self.build_scan(line, unit(0)?, unit(1)?)?,
-            Tried::Sweep => self.build_sweep(unit(0)?)?,
-            Tried::Signal => self.build_signal(line)?,
+            TestKind::Scan => self.build_scan(line, unit(0)?, unit(1)?)?,
+            TestKind::Sweep => self.build_sweep(unit(0)?)?,
+            TestKind::Signal => self.build_signal(line)?,
         })
     }
 
@@ -235,14 +235,14 @@ impl RequestForm {
     }
 
     fn title(&self) -> &'static str {
-        match self.tried {
-            Tried::Bytes | Tried::Request => t!("request by fields"),
-            Tried::Loopback => t!("loopback"),
-            Tried::Plug => t!("loopback plug"),
-            Tried::Identify => t!("identify a device"),
-            Tried::Scan => t!("scan for units"),
-            Tried::Sweep => t!("map of addresses"),
-            Tried::Signal => t!("line signals"),
+        match self.kind {
+            TestKind::Bytes | TestKind::Request => t!("request by fields"),
+            TestKind::Loopback => t!("loopback"),
+            TestKind::Plug => t!("loopback plug"),
+            TestKind::Identify => t!("identify a device"),
+            TestKind::Scan => t!("scan for units"),
+            TestKind::Sweep => t!("map of addresses"),
+            TestKind::Signal => t!("line signals"),
         }
     }
 }

@@ -37,7 +37,7 @@ const ENTRY_MAX: usize = 800;
 
 /// What can be tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tried {
+pub enum TestKind {
     /// Bytes as they are.
     Bytes,
     /// A request by its fields.
@@ -56,31 +56,31 @@ pub enum Tried {
     Sweep,
 }
 
-impl Tried {
-    const ALL: [Tried; 8] = [
-        Tried::Bytes,
-        Tried::Request,
-        Tried::Loopback,
-        Tried::Plug,
-        Tried::Signal,
-        Tried::Identify,
-        Tried::Scan,
-        Tried::Sweep,
+impl TestKind {
+    const ALL: [TestKind; 8] = [
+        TestKind::Bytes,
+        TestKind::Request,
+        TestKind::Loopback,
+        TestKind::Plug,
+        TestKind::Signal,
+        TestKind::Identify,
+        TestKind::Scan,
+        TestKind::Sweep,
     ];
 
     /// Its key, its name and what it is for.
     fn words(self) -> [&'static str; 3] {
         match self {
-            Tried::Bytes => ["t", t!("type bytes"), t!("hex of a request, decoded as you type; its check is added")],
-            Tried::Request => {
+            TestKind::Bytes => ["t", t!("type bytes"), t!("hex of a request, decoded as you type; its check is added")],
+            TestKind::Request => {
                 ["f", t!("request by fields"), t!("unit, function, address (41003 or 0x03EA), count or value")]
             }
-            Tried::Loopback => ["b", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
-            Tried::Plug => ["p", t!("loopback plug"), t!("bytes that a plug returns; wrong, missing, local echo")],
-            Tried::Signal => ["g", t!("line signals"), t!("RTS or DTR by hand, for a time; which inputs follow")],
-            Tried::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
-            Tried::Scan => ["s", t!("scan for units"), t!("units that respond, with these or all serial settings")],
-            Tried::Sweep => ["m", t!("map of addresses"), t!("which of the addresses 0 to 65535 a unit answers at")],
+            TestKind::Loopback => ["b", t!("loopback"), t!("08 / 0x08: echo test of the line, with response times")],
+            TestKind::Plug => ["p", t!("loopback plug"), t!("bytes that a plug returns; wrong, missing, local echo")],
+            TestKind::Signal => ["g", t!("line signals"), t!("RTS or DTR by hand, for a time; which inputs follow")],
+            TestKind::Identify => ["i", t!("identify"), t!("43 / 0x2B: vendor, product, version of a device")],
+            TestKind::Scan => ["s", t!("scan for units"), t!("units that respond, with these or all serial settings")],
+            TestKind::Sweep => ["m", t!("map of addresses"), t!("which of the addresses 0 to 65535 a unit answers at")],
         }
     }
 }
@@ -101,34 +101,34 @@ pub struct Bench {
 
 impl Bench {
     /// The selected test.
-    pub fn selected(&self) -> Tried {
-        Tried::ALL[self.selected.min(Tried::ALL.len() - 1)]
+    pub fn selected(&self) -> TestKind {
+        TestKind::ALL[self.selected.min(TestKind::ALL.len() - 1)]
     }
 
     /// Opens the entry of a test.
-    pub fn open(&mut self, cx: &ViewContext, at: &LineView, tried: Tried) -> Vec<UiAction> {
-        self.selected = Tried::ALL.iter().position(|known| *known == tried).unwrap_or(0);
+    pub fn open(&mut self, cx: &ViewContext, at: &LineView, kind: TestKind) -> Vec<UiAction> {
+        self.selected = TestKind::ALL.iter().position(|known| *known == kind).unwrap_or(0);
         self.first = None;
-        let window = match tried {
-            Tried::Bytes => Window::Send(Send {
+        let window = match kind {
+            TestKind::Bytes => Window::Send(Send {
                 line: at.id,
                 text: Line::long(&self.text, ENTRY_MAX),
                 bare: self.bare,
                 problem: None,
             }),
-            Tried::Request
-            | Tried::Loopback
-            | Tried::Plug
-            | Tried::Signal
-            | Tried::Identify
-            | Tried::Scan
-            | Tried::Sweep => {
-                let last = self.form.take_if(|form| form.is(at.id, tried));
-                Window::Form(last.unwrap_or_else(|| RequestForm::new(cx, at, tried)))
+            TestKind::Request
+            | TestKind::Loopback
+            | TestKind::Plug
+            | TestKind::Signal
+            | TestKind::Identify
+            | TestKind::Scan
+            | TestKind::Sweep => {
+                let last = self.form.take_if(|form| form.is(at.id, kind));
+                Window::Form(last.unwrap_or_else(|| RequestForm::new(cx, at, kind)))
             }
         };
         // What is sent as it was typed may be a write.
-        let diagnostic = match matches!(tried, Tried::Bytes | Tried::Request | Tried::Plug | Tried::Signal) {
+        let diagnostic = match matches!(kind, TestKind::Bytes | TestKind::Request | TestKind::Plug | TestKind::Signal) {
             true => Diagnostic::Send(Vec::new()),
             false => Diagnostic::Identify { unit: 1 },
         };
@@ -138,7 +138,7 @@ impl Bench {
     /// Single rows move the selection; pages scroll the results.
     pub fn scroll(&mut self, cx: &ViewContext, at: &LineView, motion: Motion) {
         if matches!(motion, Motion::Rows(_)) {
-            self.selected = motion.to(self.selected, Tried::ALL.len(), 1);
+            self.selected = motion.to(self.selected, TestKind::ALL.len(), 1);
             return;
         }
         let room = usize::from(cx.area.height).saturating_sub(TOP as usize + 1).max(1);
@@ -153,9 +153,9 @@ impl Bench {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());
         let tests = height.saturating_sub(3).min(TOP - 2);
-        let first = list::first(self.selected, Tried::ALL.len(), usize::from(tests));
-        for (y, (n, tried)) in Tried::ALL.into_iter().enumerate().skip(first).take(usize::from(tests)).enumerate() {
-            let [key, name, what] = tried.words().map(translate);
+        let first = list::first(self.selected, TestKind::ALL.len(), usize::from(tests));
+        for (y, (n, kind)) in TestKind::ALL.into_iter().enumerate().skip(first).take(usize::from(tests)).enumerate() {
+            let [key, name, what] = kind.words().map(translate);
             let y = to_u16(y);
             let chosen = n == self.selected;
             let x = canvas.text(1, y, key, theme.strong());
@@ -192,7 +192,7 @@ fn begin(at: &LineView) -> usize {
 
 /// Rows of the tests with the line below them.
 #[expect(clippy::cast_possible_truncation, reason = "a constant of one digit")]
-const TOP: u16 = Tried::ALL.len() as u16 + 2;
+const TOP: u16 = TestKind::ALL.len() as u16 + 2;
 
 /// Why nothing can be sent on a line; `None` if it is open.
 pub fn closed(at: &LineView) -> Option<String> {

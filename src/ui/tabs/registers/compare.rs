@@ -83,7 +83,7 @@ impl Registers {
 
     /// Reads the same of the other unit right behind this one, unless that is on its way.
     pub(super) fn read_compared(&mut self, cx: &ViewContext) -> Option<UiAction> {
-        let (line, span, now) = (self.line, self.span(cx), cx.steady());
+        let (line, span, now) = (self.line, self.span(cx), cx.monotonic_now());
         let lost = super::LOST_AFTER + self.period;
         let comparison = self.comparison.as_mut()?;
         let Reference::Unit(unit) = comparison.reference else { return None };

@@ -70,7 +70,7 @@ impl Registers {
             let known = self.profiles.recognisable();
             self.recognition = Recognition::Asking { known, at: 0, on_way: None };
         }
-        let now = cx.steady();
+        let now = cx.monotonic_now();
         let Recognition::Asking { known, at, on_way } = &mut self.recognition else { return Vec::new() };
         if on_way.is_some_and(|(_, sent)| now.duration_since(sent) < LOST_AFTER) {
             return Vec::new();

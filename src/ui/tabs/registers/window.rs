@@ -74,7 +74,7 @@ impl Registers {
             return Vec::new();
         }
         self.number = self.number.wrapping_add(1);
-        self.on_way = Some((self.number, cx.steady(), span));
+        self.on_way = Some((self.number, cx.monotonic_now(), span));
         vec![UiAction::query(self.tab, self.number, query)]
     }
 }

@@ -30,7 +30,7 @@ const WIDTH: u16 = 80;
 
 /// State of the page.
 #[derive(Debug, Default)]
-pub struct Made {
+pub struct AutomaticReportsPage {
     /// It is shown in place of a report.
     pub shown: bool,
     pub list: List<AutomaticReports>,
@@ -54,7 +54,7 @@ impl Opened {
     }
 }
 
-impl Made {
+impl AutomaticReportsPage {
     /// The keys of the moment.
     pub fn keys(&self) -> &'static [&'static [Key]] {
         if self.open.is_some() { TEXT } else { LIST }

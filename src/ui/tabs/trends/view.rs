@@ -205,7 +205,7 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
 /// What is wrong with the history, or that it keeps us waiting.
 pub(super) fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
     // Curves that are drawn are refreshed all the time: only a long wait is worth a word.
-    let long = |query: &&PeriodicQuery| query.waiting(cx.steady()).is_some_and(|time| time >= real(cx, 2.0));
+    let long = |query: &&PeriodicQuery| query.waiting(cx.monotonic_now()).is_some_and(|time| time >= real(cx, 2.0));
     let mut waiting =
         [&trends.curves, &trends.hours.query].into_iter().filter(long).filter_map(|query| query.shown_waiting(cx));
     let failed = [&trends.trouble, &trends.hours.trouble].into_iter().chain(trends.events.troubles()).flatten().next();

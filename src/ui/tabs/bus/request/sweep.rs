@@ -30,7 +30,7 @@ pub fn ask_sweep(cx: &ViewContext, line: LineId, unit: u8, table: Table) -> Vec<
 
 impl RequestForm {
     fn sweep(cx: &ViewContext, at: &LineView, unit: u8, table: Table) -> RequestForm {
-        let mut form = RequestForm::new(cx, at, Tried::Sweep);
+        let mut form = RequestForm::new(cx, at, TestKind::Sweep);
         form.form.replace(0, typed(t!("unit"), &unit.to_string(), ""));
         form.form.replace(1, table_field(table));
         form

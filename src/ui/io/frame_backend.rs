@@ -28,7 +28,7 @@ const TEAR_BYTES: usize = 96;
 /// A backend that gathers a frame's bytes, so that they travel in one write and an unchanged frame costs nothing.
 /// It asks the terminal nothing: an answer would arrive among the keys.
 /// A cell is sent with what differs from the one sent before it, also in the frame before: 24-bit colours take most of the bytes.
-pub(super) struct Wire {
+pub(super) struct FrameBackend {
     /// What is sent next.
     pub(super) bytes: Vec<u8>,
     pub(super) size: Size,
@@ -39,9 +39,9 @@ pub(super) struct Wire {
 /// Foreground, background and attributes of a cell.
 type Appearance = (Color, Color, Modifier);
 
-impl Wire {
-    pub(super) fn new() -> io::Result<Wire> {
-        let mut wire = Wire { bytes: Vec::new(), size: Size::default(), style: Appearance::default() };
+impl FrameBackend {
+    pub(super) fn new() -> io::Result<FrameBackend> {
+        let mut wire = FrameBackend { bytes: Vec::new(), size: Size::default(), style: Appearance::default() };
         wire.measure()?;
         Ok(wire)
     }
@@ -92,7 +92,7 @@ fn framed(bytes: &[u8]) -> Vec<u8> {
     if bytes.len() < TEAR_BYTES { bytes.to_vec() } else { [b"\x1b[?2026h".as_slice(), bytes, b"\x1b[?2026l"].concat() }
 }
 
-impl Backend for Wire {
+impl Backend for FrameBackend {
     type Error = io::Error;
 
     fn draw<'a, I>(&mut self, content: I) -> io::Result<()>
@@ -161,11 +161,11 @@ mod tests {
 
     use super::*;
 
-    fn wire() -> Wire {
-        Wire { bytes: Vec::new(), size: Size::new(80, 24), style: Appearance::default() }
+    fn wire() -> FrameBackend {
+        FrameBackend { bytes: Vec::new(), size: Size::new(80, 24), style: Appearance::default() }
     }
 
-    fn sent(wire: &mut Wire, cells: &[(u16, u16, Cell)]) -> String {
+    fn sent(wire: &mut FrameBackend, cells: &[(u16, u16, Cell)]) -> String {
         wire.bytes.clear();
         wire.draw(cells.iter().map(|(x, y, cell)| (*x, *y, cell))).expect("a vector takes every byte");
         String::from_utf8(framed(&wire.bytes)).expect("text")
