@@ -175,6 +175,8 @@ def lose_power(station, dice):
                 shutil.copy(station.shadow / kept, new)
     for path, kept in removed[-1:]:
         if dice.random() < 0.5 and kept != "-" and not os.path.exists(path):
+            # Its folder may have been removed after it.
+            os.makedirs(os.path.dirname(path), exist_ok=True)
             shutil.copy(station.shadow / kept, path)
     for path in created:
         if dice.random() < 0.2 and os.path.exists(path):

@@ -25,7 +25,7 @@ use sightglass::{
         alarm::AlarmState,
         command::{CommandId, CommandKind},
         def::{AlarmId, ProcedureId, TagId},
-        procedure::ProcedureState,
+        procedure::{ProcedureRun, ProcedureState},
         sample::{Quality, Sample},
         station::StationFault,
         tag::Poll,
@@ -132,8 +132,21 @@ impl Life {
             let _ = rustix::process::kill_process(rustix::process::getpid(), rustix::process::Signal::KILL);
         }
         let last = session.snapshots.borrow().clone();
+        if last.history.failing.is_none() && last.history.damaged.is_none() && !self.clock_is_set {
+            // It may be at work again.
+            self.compare_procedures(&last, &def, |_| false);
+        }
         drop((session, watch));
         self.end(station, &last, &def).await;
+    }
+
+    fn compare_procedures(&self, snapshot: &Snapshot, def: &PlantDef, forgets: fn(&ProcedureRun) -> bool) {
+        for name in &self.facts.procedures {
+            let run = def.procedures.iter().zip(&snapshot.procedures).find(|(def, _)| *def.name == **name);
+            if run.is_none_or(|(_, run)| run.as_deref().is_none_or(forgets)) {
+                wrong(format!("procedures: {name} was at work when the station ended, which is forgotten"));
+            }
+        }
     }
 
     /// What lives before this one have said.
@@ -148,11 +161,9 @@ impl Life {
         if self.clock_is_set || snapshot.history.damaged.is_some() {
             return;
         }
-        for name in &self.facts.procedures {
-            let run = def.procedures.iter().zip(&snapshot.procedures).find(|(def, _)| *def.name == **name);
-            if run.is_none_or(|(_, run)| run.as_deref().is_none_or(|run| run.state == ProcedureState::Running)) {
-                wrong(format!("procedures: {name} was at work when the station ended, which is forgotten"));
-            }
+        // What the history holds is known once it is open, which a full disk delays.
+        if snapshot.history.failing.is_none() {
+            self.compare_procedures(&snapshot, def, |run| run.state == ProcedureState::Running);
         }
         let hour = base.as_second() / 3600 * 3600;
         for from in [hour - 3600, hour - 7200] {
