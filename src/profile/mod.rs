@@ -51,6 +51,7 @@ mod signature;
 mod simulate;
 mod set_file;
 mod sets;
+pub(crate) mod sunspec;
 mod size;
 mod tag;
 mod tag_keys;

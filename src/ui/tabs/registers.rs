@@ -71,6 +71,8 @@ pub struct Registers {
     recognition: Recognition,
     /// Of the user.
     pub profiles: OwnProfiles,
+    /// A file that is written once the one before it is: the plant file behind its profile.
+    saved_next: Option<(PathBuf, Vec<u8>)>,
     /// What came of a log, said with the next snapshot.
     said: Option<UiAction>,
     /// A list that was loaded and is not taken yet.
@@ -131,6 +133,7 @@ impl TabView for Registers {
             names_of: BTreeMap::new(),
             recognition: Recognition::default(),
             profiles: OwnProfiles::default(),
+            saved_next: None,
             said: None,
             preview: None,
             pasted: None,
@@ -277,7 +280,7 @@ impl TabView for Registers {
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        vec![save::outcome(result)]
+        self.on_written(result)
     }
 
     fn on_log_failed(&mut self, why: &str) {

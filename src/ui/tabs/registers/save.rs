@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{Asking, Registers, names::Named};
+use super::{Asking, Registers, names::Named, recognise::SUNSPEC};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -28,7 +28,7 @@ impl Registers {
     }
 
     /// Writes the plant file, which was loaded before as a check.
-    pub(super) fn save(&self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+    pub(super) fn save(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let mut path = PathBuf::from(text);
         path.set_extension("toml");
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
@@ -37,12 +37,34 @@ impl Registers {
         }
         let here = path.parent().is_none_or(|folder| folder.as_os_str().is_empty());
         let beside = |def: &Arc<PlantDef>| self.profiles.beside(&def.name);
-        if let Some(profile) = self.recognition.applied().and_then(beside).filter(|_| !here) {
+        let applied = self.recognition.applied();
+        // What was made of the models of the device is not on the disk yet, and goes beside the plant file.
+        let made =
+            applied.filter(|def| def.name == SUNSPEC).and_then(|_| self.profiles.text(SUNSPEC)).map(str::to_owned);
+        if let Some(profile) = applied.and_then(beside).filter(|_| !here && made.is_none()) {
             return Err(t!("{profile} would not be found from there: save the plant file beside it", profile));
         }
-        let plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
-        let bytes = plant.text(&self.profiles)?.into_bytes();
-        Ok(vec![UiAction::Do(Effect::SaveReport { tab: Some(Tab::Registers), path, bytes, new: true })])
+        let mut plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
+        let Some(made) = made else {
+            let bytes = plant.text(&self.profiles)?.into_bytes();
+            return Ok(vec![save_new(path, bytes)]);
+        };
+        let name = format!("{}_{SUNSPEC}", plain_name(&stem).replace('.', "_"));
+        let mut profiles = self.profiles.clone();
+        profiles.add(&name, &made);
+        plant.devices.iter_mut().filter_map(|device| device.profile.as_mut()).for_each(|of| of.0.clone_from(&name));
+        let bytes = plant.text(&profiles)?.into_bytes();
+        let profile = path.with_file_name(format!("{name}.toml"));
+        self.saved_next = Some((path, bytes));
+        Ok(vec![save_new(profile, made.into_bytes())])
+    }
+
+    /// A file was written, or not; behind a profile the plant file that names it.
+    pub(super) fn on_written(&mut self, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        match (self.saved_next.take(), result) {
+            (Some((path, bytes)), Ok(_)) => vec![save_new(path, bytes)],
+            (_, result) => vec![outcome(result)],
+        }
     }
 
     fn new_plant(&self, cx: &ViewContext, stem: &str) -> Option<NewPlant> {
@@ -83,13 +105,18 @@ impl Registers {
     }
 }
 
+/// Writes a file that is not there yet.
+fn save_new(path: PathBuf, bytes: Vec<u8>) -> UiAction {
+    UiAction::Do(Effect::SaveReport { tab: Some(Tab::Registers), path, bytes, new: true })
+}
+
 /// Why nothing is loaded.
 pub fn no_list(why: String) -> UiAction {
     UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![why])))
 }
 
 /// What became of the file.
-pub fn outcome(result: Result<PathBuf, String>) -> UiAction {
+fn outcome(result: Result<PathBuf, String>) -> UiAction {
     let words = match result {
         Ok(path) => vec![
             t!("saved {path}", path = path.display()),
