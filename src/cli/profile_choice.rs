@@ -17,7 +17,7 @@ use crate::{
     bus::recognise::{Miss, Ranked},
     plant::{
         PlantDef,
-        tag::{Access, TagDef},
+        tag::{Access, Poll, TagDef},
     },
     profile::{
         OwnProfiles,
@@ -137,7 +137,9 @@ pub async fn kept_models(def: &PlantDef) -> Result<(Vec<TagDef>, bool), CliError
     }
     let chosen = ask_until("  models to keep", "all", |answer| selection(answer, &names)).await?;
     let kept: BTreeSet<&str> = chosen.iter().filter_map(|at| names.get(*at)).map(String::as_str).collect();
-    let tags = def.tags.iter().filter(|tag| tag.access != Access::Write && kept.contains(tag.group.as_str()));
+    let is_kept =
+        |tag: &&TagDef| tag.access != Access::Write && tag.poll != Poll::Never && kept.contains(tag.group.as_str());
+    let tags = def.tags.iter().filter(is_kept);
     Ok((tags.cloned().collect(), kept.len() == names.len()))
 }
 

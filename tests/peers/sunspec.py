@@ -1,7 +1,7 @@
 """SunSpec devices for the tests, built from the models of pysunspec2, and pysunspec2 as a reader of them.
 
     sunspec.py serve TCPPORT SEED    serves them, says "ready"
-    sunspec.py read TCPPORT UNIT     prints each point that pysunspec2 reads: name, type and value as JSON
+    sunspec.py read TCPPORT UNIT     prints each point that pysunspec2 reads: its name and value as JSON
 
 Units 1 to 3 are an inverter, a meter and a battery; those behind them have every other model. Their registers hold random
 values, valid ones and markers of what is not implemented. Their marker stands at 40000, 0 and 50000 in turn.
@@ -10,6 +10,7 @@ values, valid ones and markers of what is not implemented. Their marker stands a
 import json
 import os
 import random
+import socket
 import socketserver
 import struct
 import sys
@@ -22,8 +23,6 @@ FOLDER = os.path.join(os.path.dirname(mdef.__file__), "models", "json")
 INVERTER = [1, 103, 160, 120, 121, 122, 123, 701, 702, 703, 704, 705, 712]
 METER = [1, 203, 213, 220]
 BATTERY = [1, 802, 803, 713, 714, 64999]
-# Not of one device: models whose pysunspec2 definition is no longer that of the SunSpec models.
-UNLIKE = set(json.loads(os.environ.get("UNLIKE", "[]")))
 SIGNED = {"int16": "h", "int32": "i", "int64": "q"}
 UNSIGNED = {"uint16": "H", "enum16": "H", "bitfield16": "H", "acc16": "H", "uint32": "I", "enum32": "I", "bitfield32": "I",
             "acc32": "I", "ipaddr": "I", "uint64": "Q", "bitfield64": "Q", "acc64": "Q"}
@@ -96,7 +95,7 @@ def devices(seed):
     """Base and registers by unit."""
     chance = random.Random(seed)
     every = sorted(int(name[6:-5]) for name in os.listdir(FOLDER) if name.startswith("model_"))
-    rest = [number for number in every if number not in {*INVERTER, *METER, *BATTERY, *UNLIKE}]
+    rest = [number for number in every if number not in {*INVERTER, *METER, *BATTERY}]
     kinds = [INVERTER, METER, BATTERY, *([1, *rest[at:at + 10]] for at in range(0, len(rest), 10))]
     bases = [40000, 0, 50000]
     found = {}
@@ -108,9 +107,9 @@ def devices(seed):
 
 class Slave(socketserver.BaseRequestHandler):
     def handle(self):
-        while head := self.request.recv(8, 8 and 256):
+        while head := self.request.recv(8, socket.MSG_WAITALL):
             number, _, length, unit, function = struct.unpack(">HHHBB", head)
-            address, count = struct.unpack(">HH", self.request.recv(length - 2))
+            address, count = struct.unpack(">HH", self.request.recv(length - 2, socket.MSG_WAITALL))
             base, registers = self.server.devices.get(unit, (0, b""))
             part = registers[2 * (address - base):2 * (address - base + count)] if base <= address else b""
             if function != 3 or len(part) != 2 * count or 125 < count:
@@ -139,6 +138,26 @@ def points(group, path):
             yield from points(one, f"{path}.{name}.{at}" if isinstance(part, list) else f"{path}.{name}")
 
 
+def rows(name, point):
+    """Rows of a point: name and what an operator should see, a number, a text or None."""
+    kind, seen = point.pdef["type"], point.cvalue
+    if seen is None or (point.sf_required and point.sf_value is None):
+        # A value without its power of ten is none; pysunspec2 gives it as it came.
+        seen = "" if kind == "string" else None
+    elif kind == "string":
+        seen = " ".join(seen[:250].split())
+    elif kind.startswith("enum"):
+        seen = {symbol["value"]: symbol["name"] for symbol in point.pdef.get("symbols", [])}.get(seen, seen)
+    elif kind == "eui48":
+        seen = int(seen.replace(":", ""), 16)
+    if kind == "ipv6addr":
+        digits = seen.replace(":", "")
+        yield {"name": name + ".high", "seen": int(digits[:16], 16)}
+        yield {"name": name + ".low", "seen": int(digits[16:], 16)}
+    else:
+        yield {"name": name, "seen": seen}
+
+
 def read(port, unit):
     device = client.SunSpecModbusClientDeviceTCP(slave_id=unit, ipaddr="127.0.0.1", ipport=port)
     device.scan()
@@ -150,12 +169,7 @@ def read(port, unit):
         seen[name] = seen.get(name, 0) + 1
         path = name if seen[name] == 1 else f"{name}-{seen[name]}"
         for name, point in points(found, path):
-            try:
-                number = point.cvalue
-            except Exception:
-                number = None
-            symbols = {symbol["value"]: symbol["name"] for symbol in point.pdef.get("symbols", [])}
-            yield {"name": name, "type": point.pdef["type"], "value": number, "symbols": symbols, "raw": point.value}
+            yield from rows(name, point)
     device.close()
 
 

@@ -4,6 +4,7 @@
 //! Data types, markers and scale factors: SunSpec device information model specification; the models: `profiles/sunspec`.
 
 mod models;
+mod poll;
 mod text;
 
 pub(crate) use self::text::profile_text;

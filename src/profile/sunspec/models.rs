@@ -42,6 +42,8 @@ pub(crate) struct ModelPoint {
     pub registers: u16,
     /// It may be written.
     pub is_writable: bool,
+    /// Every device has it.
+    pub is_mandatory: bool,
     /// It does not change while the device is in use.
     pub is_static: bool,
     /// The point that holds its power of ten, or that power.
@@ -121,8 +123,9 @@ fn point(line: &'static str) -> ModelPoint {
     let mut cell = || cells.next().unwrap_or_default();
     let (name, (kind, registers), flags) = (cell(), kind_of(cell()), cell());
     let (scale, unit, label) = (cell(), cell(), cell());
-    let (is_writable, is_static) = (flags.contains('w'), flags.contains('s'));
-    ModelPoint { name, kind, registers, is_writable, is_static, scale, unit, label, symbols: Vec::new() }
+    let [is_writable, is_static, is_mandatory] = ['w', 's', 'm'].map(|flag| flags.contains(flag));
+    let symbols = Vec::new();
+    ModelPoint { name, kind, registers, is_writable, is_mandatory, is_static, scale, unit, label, symbols }
 }
 
 /// What a type is here, and how many registers it takes.

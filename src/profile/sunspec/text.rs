@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, fmt::Write};
 use toml_edit::Value;
 
 use super::{
-    COMMON, FoundModel, SunSpecDevice,
+    FoundModel, SunSpecDevice,
     models::{Count, Group, Kind, ModelPoint, model},
+    poll::{NEVER, poll_of},
 };
 use crate::plant::tag::Decimals;
 
@@ -16,11 +17,6 @@ const TAGS_MAX: usize = 4_000;
 const UNKNOWN_MAX: u32 = 250;
 /// Most registers of a text: those of one request.
 const TEXT_REGISTERS_MAX: u16 = 125;
-/// Models of what is measured: read often.
-const MEASURED: [std::ops::RangeInclusive<u16>; 9] =
-    [101..=113, 160..=160, 201..=220, 302..=308, 401..=404, 501..=502, 601..=601, 701..=701, 713..=714];
-const MEASURED_BATTERIES: std::ops::RangeInclusive<u16> = 802..=809;
-
 /// The text of a profile that is all that this device has.
 pub(crate) fn profile_text(device: &SunSpecDevice) -> String {
     let mut rows = Rows::default();
@@ -38,6 +34,7 @@ struct Rows {
     tags: String,
     count: usize,
     left_out: usize,
+    missing: usize,
     unknown: u32,
     /// The tags of events with named bits.
     events: Vec<String>,
@@ -49,14 +46,14 @@ struct Rows {
 
 /// Where a group of a model stands, and what its points need of those around it.
 #[derive(Clone)]
-struct Place<'a> {
-    found: &'a FoundModel,
+pub(super) struct Place<'a> {
+    pub found: &'a FoundModel,
     /// Of all its tags: `mppt`.
     model: &'a str,
     /// `mppt.module.1`.
     path: String,
     /// Powers of ten and counts around it, by name: their tags and addresses.
-    known: BTreeMap<&'static str, (String, u32)>,
+    pub known: BTreeMap<&'static str, (String, u32)>,
 }
 
 impl Rows {
@@ -156,17 +153,19 @@ impl Rows {
             (Err(_), None) => {}
         }
         keys.extend((!point.label.is_empty()).then(|| format!("label = {}", quoted(point.label))));
-        keys.extend((!point.unit.is_empty() && point.kind != Kind::Text).then(|| format!("unit = {}", quoted(point.unit))));
+        keys.extend(
+            (!point.unit.is_empty() && point.kind != Kind::Text).then(|| format!("unit = {}", quoted(point.unit))),
+        );
         keys.extend(self.symbols(point, &name));
-        if point.is_writable && point.kind != Kind::Text {
+        let poll = poll_of(point, address, place);
+        self.missing += usize::from(poll == Some(NEVER));
+        if point.is_writable && point.kind != Kind::Text && poll != Some(NEVER) {
             keys.push("access = \"rw\"".to_owned());
             if self.writable.last().map(String::as_str) != Some(place.model) {
                 self.writable.push(place.model.to_owned());
             }
         }
-        if let Some(poll) = poll_of(point, place) {
-            keys.push(format!("poll = {}", quoted(poll)));
-        }
+        keys.extend(poll.map(|poll| format!("poll = {}", quoted(poll))));
         self.row(place, &name, address, &kind, &keys);
     }
 
@@ -231,6 +230,9 @@ impl Rows {
         if device.is_cut {
             notes += " There may be more: reading ended there.";
         }
+        if 0 < self.missing {
+            notes += &format!(" Not implemented, and not polled: {} values.", self.missing);
+        }
         if 0 < self.left_out {
             notes += &format!(" {} values are left out: there are more than a profile holds.", self.left_out);
         }
@@ -282,20 +284,6 @@ impl Place<'_> {
     fn number(&self, name: &str) -> u32 {
         let word = self.known.get(name).and_then(|(_, address)| self.found.word(*address));
         word.filter(|word| *word != u16::MAX).map_or(0, u32::from)
-    }
-}
-
-/// How often a point is read; `None`: slow.
-fn poll_of(point: &ModelPoint, place: &Place) -> Option<&'static str> {
-    let id = place.found.id;
-    let is_measured = MEASURED.iter().chain([&MEASURED_BATTERIES]).any(|range| range.contains(&id));
-    match point.kind {
-        // It is read with what it scales.
-        Kind::Power => Some("once"),
-        _ if point.is_static || id == COMMON => Some("once"),
-        _ if point.is_writable => Some("60s"),
-        _ if is_measured => Some("fast"),
-        _ => None,
     }
 }
 
