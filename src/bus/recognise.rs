@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::codec;
 use crate::plant::{
     PlantDef,
-    def::{DeviceDef, Probe},
+    def::{DeviceDef, PROBED_NUMBERS_MIN, PROBES_MIN, Probe},
     exact::Exact,
     live::AddressSpan,
     number::{to_i8, to_u16},
@@ -13,10 +13,6 @@ use crate::plant::{
     tag::{Decimals, Point, TagDef},
 };
 
-/// Fewest probes that fit.
-const PROBES_MIN: usize = 3;
-/// Fewest different numbers among those that fit: a unit that answers the same everywhere is nothing.
-const DIFFERENT_MIN: usize = 3;
 /// Share of the probes that must fit.
 const PERCENT_MIN: usize = 80;
 
@@ -38,7 +34,7 @@ impl Fit {
     /// Is it this kind of device?
     pub fn is_enough(self) -> bool {
         let share = PERCENT_MIN * self.of <= 100 * self.fits;
-        share && PROBES_MIN <= self.fits && DIFFERENT_MIN <= self.different
+        share && PROBES_MIN <= self.fits && PROBED_NUMBERS_MIN <= self.different
     }
 }
 

@@ -26,7 +26,8 @@ use crate::{
     profile::{
         OwnProfiles,
         io::atomic,
-        new_plant::{NewAlarm, NewDevice, NewPlant, left_out, of_interest, plain_name, suggested_alarms},
+        new_plant::{NewAlarm, NewDevice, NewPlant, left_out, of_interest, plain_name},
+        suggested_alarms::suggested_alarms,
     },
 };
 
@@ -180,7 +181,7 @@ async fn add_device(
     (made, path): (&mut Vec<String>, &Path),
 ) -> Result<Vec<NewAlarm>, CliError> {
     let FoundUnit { unit, has_register, kind } = found;
-    let profile = profile_choice::ask_profile(*unit, kind, profiles, made, path).await?;
+    let profile = profile_choice::ask_profile(*unit, kind, profiles, made, names_beside(path)).await?;
     let controller = profile.iter().any(|def| def.devices.iter().any(|device| device.faceplate.is_some()));
     let usual = free_name(plant, if controller { "TIC" } else { "D" });
     let name = ask_until("  name", &usual, |name| {
@@ -217,6 +218,13 @@ async fn add_device(
     }
     plant.devices.push(device);
     Ok(alarms)
+}
+
+/// Names for a device profile beside a plant file, of files that are not there.
+fn names_beside(plant: &Path) -> impl Iterator<Item = String> {
+    let stem = plain_name(&plant.file_stem().unwrap_or_default().to_string_lossy()).replace('.', "_");
+    let names = (1..1_000).map(move |n| if n == 1 { format!("{stem}_sunspec") } else { format!("{stem}_sunspec_{n}") });
+    names.filter(|name| !plant.with_file_name(format!("{name}.toml")).exists())
 }
 
 /// `TIC-1`, `TIC-2` …

@@ -1,6 +1,6 @@
 //! `sightglass new` asks which device profile a unit has: its own models, the likeliest, or one that is searched by words.
 
-use std::{collections::BTreeSet, path::Path, sync::Arc};
+use std::{collections::BTreeSet, sync::Arc};
 
 use nucleo_matcher::{
     Config, Matcher, Utf32Str,
@@ -21,7 +21,6 @@ use crate::{
     },
     profile::{
         OwnProfiles,
-        new_plant::plain_name,
         sunspec::{SunSpecDevice, profile_text},
     },
 };
@@ -37,10 +36,10 @@ pub async fn ask_profile(
     kind: &FoundKind,
     profiles: &mut OwnProfiles,
     made: &mut Vec<String>,
-    plant: &Path,
+    names: impl Iterator<Item = String>,
 ) -> Result<Option<Arc<PlantDef>>, CliError> {
     let usual = match kind {
-        FoundKind::SunSpec(device) => sunspec(unit, device, profiles, made, plant),
+        FoundKind::SunSpec(device) => sunspec(unit, device, profiles, made, names),
         FoundKind::Other(ranked) => likeliest(unit, ranked),
     };
     ask_until("  profile, words to search for one, or none", &usual, |answer| chosen(answer, profiles)).await
@@ -52,15 +51,11 @@ fn sunspec(
     device: &SunSpecDevice,
     profiles: &mut OwnProfiles,
     made: &mut Vec<String>,
-    plant: &Path,
+    mut names: impl Iterator<Item = String>,
 ) -> String {
     let [vendor, model, _] = device.identity();
     say(&format!("unit {unit}: {vendor} {model}, {} SunSpec models", device.models.len()));
-    let stem = plain_name(&plant.file_stem().unwrap_or_default().to_string_lossy()).replace('.', "_");
-    let is_free =
-        |name: &String| profiles.text(name).is_none() && !plant.with_file_name(format!("{name}.toml")).exists();
-    let names = std::iter::once(format!("{stem}_sunspec")).chain((2..).map(|n| format!("{stem}_sunspec_{n}")));
-    let name = names.take(1_000).find(is_free).unwrap_or_else(|| "sunspec".to_owned());
+    let name = names.find(|name| profiles.text(name).is_none()).unwrap_or_else(|| "sunspec".to_owned());
     profiles.add(&name, &profile_text(device));
     made.push(name.clone());
     name

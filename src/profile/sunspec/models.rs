@@ -2,7 +2,7 @@
 
 use std::str::Lines;
 
-use crate::{plant::tag::DataType, profile::io};
+use crate::{plant::tag::DataType, profile::sunspec_models};
 
 /// A model, or a part of one that repeats.
 #[derive(Debug, Default, PartialEq)]
@@ -79,7 +79,7 @@ pub(crate) enum Kind {
 
 /// A model by its number; `None` for one that is not known.
 pub(crate) fn model(id: u16) -> Option<Group> {
-    let text = io::sunspec_models();
+    let text = sunspec_models();
     let head = format!("\n= {id} ");
     let (name, body) = text[text.find(&head)? + head.len()..].split_once('\n')?;
     let body = body.split_once("\n= ").map_or(body, |(body, _)| body);
@@ -89,7 +89,7 @@ pub(crate) fn model(id: u16) -> Option<Group> {
 /// The numbers of all models.
 #[cfg(test)]
 pub(crate) fn ids() -> Vec<u16> {
-    let heads = io::sunspec_models().lines().filter_map(|line| line.strip_prefix("= "));
+    let heads = sunspec_models().lines().filter_map(|line| line.strip_prefix("= "));
     heads.filter_map(|head| head.split(' ').next()?.parse().ok()).collect()
 }
 

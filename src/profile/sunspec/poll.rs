@@ -25,13 +25,15 @@ pub(super) fn poll_of(point: &ModelPoint, address: u32, place: &Place) -> Option
     if power == Some(0x8000) || (!point.is_mandatory && is_marked(point, address, place)) {
         return Some(NEVER);
     }
-    match point.kind {
+    if point.kind == Kind::Power {
         // As often as the values; where these are read with another request, they wait for it.
-        Kind::Power => (place.found.length <= ONE_REQUEST).then_some("once"),
-        _ if (point.is_static || id == COMMON) && point.scale.is_empty() => Some("once"),
-        _ if point.is_static || point.is_writable => None,
-        _ => MEASURED.iter().any(|range| range.contains(&id)).then_some("fast"),
+        return (place.found.length <= ONE_REQUEST).then_some("once");
     }
+    if (point.is_static || id == COMMON) && point.scale.is_empty() {
+        return Some("once");
+    }
+    let is_measured = !point.is_static && !point.is_writable && MEASURED.iter().any(|range| range.contains(&id));
+    is_measured.then_some("fast")
 }
 
 /// Does it hold the marker of its type for what is not implemented?

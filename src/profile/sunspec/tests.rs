@@ -10,7 +10,7 @@ use super::{
 use crate::{
     plant::{
         PlantDef,
-        def::Condition,
+        def::{Condition, Subject},
         exact::Exact,
         tag::{Access, DataType, Decimals, TagDef},
     },
@@ -113,7 +113,11 @@ fn a_model_gives_names_places_factors_states_and_alarms() {
         tag(&def, "inverter.WH").is_bad(Exact::whole(0))
             && !tag(&def, "inverter.WH").is_bad(Exact::whole(4_294_967_295))
     );
-    let ground = def.alarms.iter().find(|alarm| alarm.message == "inverter.Evt1: GROUND_FAULT").unwrap();
+    let ground = def
+        .alarms
+        .iter()
+        .find(|alarm| alarm.message == "GROUND_FAULT" && alarm.subject == Subject::Tag(tag(&def, "inverter.Evt1").id))
+        .unwrap();
     assert_eq!(ground.condition, Condition::Bit { bit: 0 });
     assert!(def.alarms.iter().all(|alarm| !alarm.message.contains("RESERVED")));
 }

@@ -183,12 +183,10 @@ impl Rows {
                 if is_event && self.count < TAGS_MAX {
                     let reserved = point.symbols.iter().filter(|(_, symbol)| symbol.contains("RESERVED"));
                     let reserved: Vec<String> = reserved.map(|(bit, _)| bit.to_string()).collect();
+                    let tag = quoted(name);
                     self.events.push(format!(
-                        "[[alarm]]\ntag = {}\neach = \"bit\"\nexcept = [{}]\nid = {}\nmessage = {}\npriority = \"medium\"\n",
-                        quoted(name),
-                        reserved.join(", "),
-                        quoted(name),
-                        quoted(&format!("{name}: {{n}}"))
+                        "[[alarm]]\ntag = {tag}\neach = \"bit\"\nexcept = [{}]\nid = {tag}\npriority = \"medium\"\n",
+                        reserved.join(", ")
                     ));
                 }
                 Some(format!("bits = {{ {rows} }}"))

@@ -31,6 +31,8 @@ pub enum Recognition {
     Walking { walk: Walk, on_way: Option<(u32, Timestamp)> },
     /// The signature at work, of these; number and steady time of its read.
     Asking { known: Vec<Arc<PlantDef>>, at: usize, on_way: Option<(u32, Timestamp)> },
+    /// What this profile needs to show its values, which was chosen by hand; number and steady time of the read.
+    Choosing { def: Arc<PlantDef>, on_way: Option<(u32, Timestamp)>, is_read: bool },
     /// The profile that fits; `None`: no profile fits.
     Done(Option<Recognised>),
 }
@@ -51,13 +53,17 @@ enum How {
     Probes(Fit),
     /// The device has said so many models.
     SunSpec(usize),
+    /// It was chosen by hand.
+    Chosen,
 }
 
 impl Recognition {
     /// Is this its read?
     pub fn awaits(&self, number: u32) -> bool {
         let on_way = match self {
-            Recognition::Walking { on_way, .. } | Recognition::Asking { on_way, .. } => *on_way,
+            Recognition::Walking { on_way, .. }
+            | Recognition::Asking { on_way, .. }
+            | Recognition::Choosing { on_way, .. } => *on_way,
             Recognition::Waiting | Recognition::Done(_) => None,
         };
         on_way.is_some_and(|(own, _)| own == number)
@@ -67,9 +73,11 @@ impl Recognition {
     pub fn applied(&self) -> Option<&Arc<PlantDef>> {
         match self {
             Recognition::Done(Some(Recognised { def, is_taken: true, .. })) => Some(def),
-            Recognition::Waiting | Recognition::Walking { .. } | Recognition::Asking { .. } | Recognition::Done(_) => {
-                None
-            }
+            Recognition::Waiting
+            | Recognition::Walking { .. }
+            | Recognition::Asking { .. }
+            | Recognition::Choosing { .. }
+            | Recognition::Done(_) => None,
         }
     }
 
@@ -84,7 +92,8 @@ impl Recognition {
             Recognition::Asking { known, at, .. } => {
                 t!("recognising, {at} of {count} profiles", at, count = known.len())
             }
-            Recognition::Done(None) => t!("not recognised").to_owned(),
+            Recognition::Choosing { def, .. } => t!("reading what {profile} needs", profile = def.name),
+            Recognition::Done(None) => t!("not recognised: P chooses a profile").to_owned(),
             Recognition::Done(Some(Recognised { def, how, is_taken })) => {
                 let model = def.devices.first().map_or("", |device| device.model.as_str());
                 match (how, is_taken) {
@@ -94,6 +103,7 @@ impl Recognition {
                     (How::Probes(Fit { fits, of, .. }), true) => {
                         t!("names of {model}: {fits} of {of} probes fit", model, fits, of)
                     }
+                    (How::Chosen, _) => t!("names of {model}, as chosen", model),
                     (How::SunSpec(count), _) => t!("{model}: {count} SunSpec models", model, count),
                 }
             }
@@ -115,6 +125,10 @@ impl Registers {
         let (spans, on_way) = match &mut self.recognition {
             Recognition::Walking { walk, on_way } => (walk.next(), on_way),
             Recognition::Asking { known, at, on_way } => (asked_by(known, *at), on_way),
+            Recognition::Choosing { def, on_way, is_read } => {
+                let spans = asked_by(std::slice::from_ref(def), 0);
+                (spans.filter(|spans| !*is_read && !spans.is_empty()), on_way)
+            }
             Recognition::Waiting | Recognition::Done(_) => return Vec::new(),
         };
         if on_way.is_some_and(|(_, sent)| now.duration_since(sent) < LOST_AFTER) {
@@ -139,6 +153,7 @@ impl Registers {
                 *on_way = None;
             }
             Recognition::Asking { at, on_way, .. } => (*at, *on_way) = (*at + 1, None),
+            Recognition::Choosing { on_way, is_read, .. } => (*on_way, *is_read) = (None, true),
             Recognition::Waiting | Recognition::Done(_) => {}
         }
         self.recognise(cx)
@@ -155,8 +170,9 @@ impl Registers {
                         let how = How::SunSpec(count);
                         self.recognition = Recognition::Done(Some(Recognised { def, how, is_taken: false }));
                         // The device itself has said what its registers are.
+                        let is_untouched = (self.first, self.selected) == (0, 0) && self.picking.is_none();
                         self.apply_names(cx);
-                        return self.read_now(cx);
+                        return if is_untouched { self.toggle_values(cx) } else { self.read_now(cx) };
                     }
                     self.ask_signatures(cx)
                 }
@@ -170,8 +186,33 @@ impl Registers {
                 self.recognition = Recognition::Done(best);
                 Vec::new()
             }
+            Recognition::Choosing { def, .. } => {
+                let chosen = Recognised { def: Arc::clone(def), how: How::Chosen, is_taken: false };
+                self.recognition = Recognition::Done(Some(chosen));
+                self.apply_names(cx);
+                self.read_now(cx)
+            }
             Recognition::Waiting | Recognition::Done(_) => Vec::new(),
         }
+    }
+
+    /// Takes a profile that was chosen by hand, in place of the one before.
+    pub(super) fn choose_profile(&mut self, cx: &ViewContext, def: Arc<PlantDef>) -> Vec<UiAction> {
+        let before = self.recognition.applied().cloned();
+        for tag in before.iter().flat_map(|before| &before.tags) {
+            let (table, address) = (tag.point.table, tag.point.address);
+            if self.names.get(table, address).is_some_and(|named| named.name == tag.short) {
+                self.names.remove(table, address);
+            }
+        }
+        self.recognition = Recognition::Choosing { def, on_way: None, is_read: false };
+        self.recognise(cx)
+    }
+
+    /// All profiles, the one that fits best first.
+    pub(super) fn ranked(&self) -> Vec<recognise::Ranked> {
+        let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
+        recognise::ranking(&self.profiles.all(), &words)
     }
 
     fn ask_signatures(&mut self, cx: &ViewContext) -> Vec<UiAction> {
@@ -191,7 +232,7 @@ impl Registers {
                 self.names.put(named);
             }
         }
-        if let Some(first) = def.tags.first() {
+        if let Some(first) = def.tags.first().filter(|_| self.picking.is_none()) {
             (self.table, self.first, self.selected) = (first.point.table, first.point.address, first.point.address);
             self.keep_in_sight(cx);
         }

@@ -8,9 +8,13 @@ use crate::{
     plant::{
         PlantDef,
         def::LineDef,
-        tag::{Decimals, Point, TagDef},
+        exact::Exact,
+        tag::{Access, Decimals, Point, TagDef},
     },
-    profile::new_plant::{NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
+    profile::{
+        new_plant::{NewAlarm, NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
+        suggested_alarms::{plausible_alarms, suggested_alarms},
+    },
     ui::Effect,
 };
 
@@ -74,7 +78,9 @@ impl Registers {
         let mut taken: Vec<String> = Vec::new();
         let tags = self.names.iter().filter(|named| !profile.is_some_and(|profile| is_of(named, &profile.tags)));
         let tags = tags.map(|named| {
-            let tag = tag_of(named, &taken);
+            let is_written = self.writing.has_written(self.unit, named.table, named.address);
+            let access = if is_written { Access::ReadWrite } else { Access::Read };
+            let tag = TagDef { access, ..tag_of(named, &taken) };
             taken.push(tag.short.clone());
             tag
         });
@@ -91,14 +97,31 @@ impl Registers {
             title: def.title.clone(),
             time_zone: def.time_zone.iana_name().unwrap_or("UTC").to_owned(),
             lines: vec![(line, self.replies)],
+            alarms: self.alarms_of(&device, profile),
             devices: vec![device],
-            alarms: Vec::new(),
             shifts: usual_shifts(),
         })
     }
 }
 
 impl Registers {
+    /// Those that the profile suggests, and limits beyond what was read of the rest.
+    fn alarms_of(&self, device: &NewDevice, profile: Option<&Arc<PlantDef>>) -> Vec<NewAlarm> {
+        let of_profile = profile.map(|profile| suggested_alarms(&device.name, &profile.tags)).unwrap_or_default();
+        let seen = |tag: &TagDef| {
+            let (table, address) = (tag.point.table, tag.point.address);
+            let named = self.names.get(table, address)?;
+            let now = self.cells.held(table, address, named.len()).and_then(|words| named.value(&words));
+            let cell = self.cells.get(table, address).filter(|_| named.len() == 1);
+            let before = cell.into_iter().flat_map(|cell| &cell.seen).filter_map(|(_, word)| named.value(&[*word]));
+            let values = before.chain(now).map(Exact::near);
+            values.fold(None, |range: Option<(f64, f64)>, value| {
+                Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
+            })
+        };
+        of_profile.into_iter().chain(plausible_alarms(&device.name, &device.tags, &seen)).collect()
+    }
+
     /// Shows a register list before it is taken; or says why it is none.
     pub(super) fn load_list(&mut self, cx: &ViewContext, text: &str) -> Vec<UiAction> {
         self.preview(cx, text).unwrap_or_else(|why| vec![no_list(why)])
