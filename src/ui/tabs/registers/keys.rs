@@ -26,7 +26,7 @@ const NAMES: &[Key] = &[
         Registers::apply_names,
     ),
     Key::new(
-        char('P'),
+        char('f'),
         "profile",
         "choose a device profile: which fits, and why the others do not",
         Registers::list_profiles,

@@ -93,7 +93,7 @@ impl Recognition {
                 t!("recognising, {at} of {count} profiles", at, count = known.len())
             }
             Recognition::Choosing { def, .. } => t!("reading what {profile} needs", profile = def.name),
-            Recognition::Done(None) => t!("not recognised: P chooses a profile").to_owned(),
+            Recognition::Done(None) => t!("not recognised: f chooses a profile").to_owned(),
             Recognition::Done(Some(Recognised { def, how, is_taken })) => {
                 let model = def.devices.first().map_or("", |device| device.model.as_str());
                 match (how, is_taken) {

@@ -78,7 +78,7 @@ fn an_inverter_is_saved_as_plant_and_profile() {
         };
         effects.into_iter().find_map(one).expect("a file")
     };
-    type_keys(&mut bench.model, "S");
+    type_keys(&mut bench.model, "⎋S");
     let (profile, text) = written(type_keys(&mut bench.model, "roof⏎"));
     assert_eq!(profile.to_str(), Some("roof_sunspec.toml"), "typed text stands in place of what was offered");
     let mut profiles = crate::profile::OwnProfiles::default();
@@ -100,8 +100,8 @@ fn a_profile_is_chosen_by_hand_and_says_why_others_do_not_fit() {
         _ => None,
     };
     let mut bench = Bench::at(unit);
-    assert!(bench.screen(110, 24).contains("not recognised: P chooses a profile"), "{}", bench.screen(110, 24));
-    bench.keys("P");
+    assert!(bench.screen(110, 24).contains("not recognised: f chooses a profile"), "{}", bench.screen(110, 24));
+    bench.keys("f");
     let shown = bench.screen(110, 30);
     assert!(shown.contains("fuji_pxr") && shown.contains(" of 11") && shown.contains("expected"), "{shown}");
     bench.keys("/pxr⏎");
