@@ -8,7 +8,7 @@ use crate::{
         diagnostics::{Diagnostic, Finding},
         exact::Exact,
         live::{AddressSpan, SPANS_MAX, number},
-        number::to_u16,
+        number::{to_f32, to_u16},
         sweep::SweptOutcome,
         tag::{ByteOrder, DataType, Table},
     },
@@ -91,17 +91,18 @@ impl Registers {
             for (n, order) in orders.iter().enumerate().filter(|_| usize::from(kind.registers()) <= words.len()) {
                 let Some(value) = interpret::number(kind, *order, &words).map(Exact::near) else { continue };
                 let Some(decimals) = wanted.decimals_of(value, kind) else { continue };
-                let same = |hit: &&Hit| hit.kind.registers() == kind.registers() && hit.shown == value.to_string();
+                let same = |hit: &&Hit| hit.kind.registers() == kind.registers() && hit.shown == shown(value, kind);
                 // A positive number is the same with a sign, and two equal bytes are the same either way.
                 if found.iter().find(same).is_some() {
                     continue;
                 }
                 let place = base.saturating_sub(if order == &ByteOrder::Badc { 30 } else { 10 * u8_of(n) });
-                let digits = 10 * decimals.abs_diff(wanted.decimals);
+                let is_float = matches!(kind, DataType::F32 | DataType::F64);
+                let digits = if is_float { 0 } else { 10 * decimals.abs_diff(wanted.decimals) };
                 let small = if value.abs() < 10.0 { 30 } else { 0 };
                 let hint = if suggested == Some((kind, *order)) { SUGGESTED } else { 0 };
                 let likelihood = (place.saturating_sub(digits).saturating_sub(small) + hint).max(1);
-                let (order, shown) = (*order, value.to_string());
+                let (order, shown) = (*order, shown(value, kind));
                 found.push(Hit { table, address, kind, order, decimals, likelihood, shown });
             }
         }
@@ -156,8 +157,14 @@ impl Wanted {
         let exact = (0..=most).find(|decimals| near(value / 10f64.powi(i32::from(*decimals))));
         let is_float = matches!(kind, DataType::F32 | DataType::F64);
         let rounded = is_float && value.fract() != 0.0 && (value - self.value).abs() <= digit;
-        exact.or(rounded.then_some(self.decimals)).filter(|decimals| !is_float || *decimals == 0 || rounded)
+        // A float has its point itself.
+        if is_float { (exact == Some(0) || rounded).then_some(0) } else { exact }
     }
+}
+
+/// As short as its type permits.
+fn shown(value: f64, kind: DataType) -> String {
+    if kind == DataType::F32 { to_f32(value).to_string() } else { value.to_string() }
 }
 
 fn u8_of(number: usize) -> u8 {

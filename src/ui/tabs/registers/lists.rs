@@ -16,6 +16,8 @@ use crate::ui::tabs::prelude::*;
 const READ_MAX: usize = 40;
 /// Registers that are read although no row has them, rather than with a request of their own.
 const GAP_MAX: u32 = 8;
+/// Columns of a value: a text or the names of many bits are cut.
+const VALUE_WIDTH: u16 = 28;
 /// Registers of one request.
 const REQUEST_MAX: u32 = 125;
 
@@ -160,7 +162,7 @@ impl Registers {
             id: 0,
             group: group.to_owned(),
             name: name.to_owned(),
-            value: named_text(self, cx, named).0,
+            value: fit(&named_text(self, cx, named).0, VALUE_WIDTH),
             note: self.place_words(span.table, span.address),
             target: Target::Place(span, None),
         }

@@ -118,7 +118,7 @@ fn a_value_is_looked_for_in_every_type_order_and_scale() {
     let mut bench = Bench::new();
     bench.answer(0, |address| match address {
         2 => Some(237),
-        5 => Some(0xCCCD),
+        5 => Some(0x999A),
         6 => Some(0x41BD),
         _ => Some(0),
     });
@@ -127,7 +127,7 @@ fn a_value_is_looked_for_in_every_type_order_and_scale() {
     let row = |word: &str| {
         shown.lines().find(|row| row.contains(word)).unwrap_or_else(|| panic!("{word}: {shown}")).to_owned()
     };
-    // A negative float with swapped words is none of these.
+    assert!(row("float32").contains("float32 CDAB  ") && row("float32").contains("23.7"), "{shown}");
     assert!(row("40003").contains("uint16 ABCD ÷10") && row("40003").contains('%'), "{shown}");
     assert_eq!(shown.matches("uint16 ABCD ÷10").count(), 1, "{shown}");
     bench.keys("⎋/nonsense⏎");
