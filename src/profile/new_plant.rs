@@ -267,7 +267,11 @@ impl NewDevice {
 
 /// What a profile reads often; where it reads nothing by itself, the first that can be read.
 pub fn of_interest(tags: &[TagDef]) -> Vec<TagDef> {
-    let readable = || tags.iter().filter(|tag| tag.access != Access::Write && tag.point.field.is_none());
+    // A power of ten says something with its values only.
+    let powers: Vec<TagId> = tags.iter().filter_map(|tag| tag.decimals.power_source()).collect();
+    let is_readable =
+        |tag: &&TagDef| tag.access != Access::Write && tag.point.field.is_none() && !powers.contains(&tag.id);
+    let readable = || tags.iter().filter(is_readable);
     let fast: Vec<TagDef> = readable().filter(|tag| is_fast(tag)).cloned().collect();
     if fast.is_empty() { readable().take(INTEREST_MAX).cloned().collect() } else { fast }
 }

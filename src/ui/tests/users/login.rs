@@ -37,6 +37,10 @@ fn the_first_user_is_asked_for_only_where_nothing_may_be_seen() {
         let model = with(&Fixture::normal(), first);
         assert_eq!(model.tabs.shown == Tab::Login, expect, "{may_view}");
     }
+    // As a terminal hears it: closed until the station has said what may be seen.
+    let mut model = with(&Fixture::normal(), SessionStatus { needs_first_supervisor: true, ..closed() });
+    change_session(&mut model, |session| session.may_view = true);
+    assert_eq!(model.tabs.shown, Tab::Mimic);
 }
 
 #[test]
