@@ -17,7 +17,7 @@
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
 //! | [`hangup`], [`in_flight`], [`request_gap`], [`other_master`] | what ended a connection; how much a unit takes at once, and how soon; who else asks |
 //! | [`line_stats`] | what is counted |
-//! | [`diagnostics`], [`live`], [`recognise`] | the steps of a diagnostic and of a live read; which device it looks like |
+//! | [`diagnostics`], [`live`], [`recognise`], `sunspec` | the steps of a diagnostic, of a live read and of a walk over models; which device it looks like |
 //! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
 //! | [`meaning`] | what a request means for the tags of the plant |
 //! | [`listen`] | who says what on the line of another master |
@@ -50,6 +50,7 @@ pub mod other_master;
 pub mod diagnostics;
 pub mod live;
 pub mod recognise;
+pub(crate) mod sunspec;
 pub mod line_stats;
 pub mod listen;
 pub mod io;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::codec;
 use crate::plant::{
     PlantDef,
-    def::{DeviceDef, Probe},
+    def::{DeviceDef, PROBED_NUMBERS_MIN, PROBES_MIN, Probe},
     exact::Exact,
     live::AddressSpan,
     number::{to_i8, to_u16},
@@ -13,10 +13,6 @@ use crate::plant::{
     tag::{Decimals, Point, TagDef},
 };
 
-/// Fewest probes that fit.
-const PROBES_MIN: usize = 3;
-/// Fewest different numbers among those that fit: a unit that answers the same everywhere is nothing.
-const DIFFERENT_MIN: usize = 3;
 /// Share of the probes that must fit.
 const PERCENT_MIN: usize = 80;
 
@@ -38,8 +34,75 @@ impl Fit {
     /// Is it this kind of device?
     pub fn is_enough(self) -> bool {
         let share = PERCENT_MIN * self.of <= 100 * self.fits;
-        share && PROBES_MIN <= self.fits && DIFFERENT_MIN <= self.different
+        share && PROBES_MIN <= self.fits && PROBED_NUMBERS_MIN <= self.different
     }
+}
+
+/// A profile, how well a unit fits it, and why it does not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranked {
+    /// Its device is the only one of this plant.
+    pub def: Arc<PlantDef>,
+    /// How well.
+    pub fit: Fit,
+    /// The probes that do not fit.
+    pub misses: Vec<Miss>,
+}
+
+/// A probe that does not fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Miss {
+    /// `PV`.
+    pub tag: String,
+    /// The raw number that was read; `None`: none was.
+    pub read: Option<f64>,
+    /// What fits.
+    pub expected: Expected,
+}
+
+/// What a probe expects.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Expected {
+    /// A raw number in one of these.
+    Ranges(Vec<(f64, f64)>),
+    /// The same bits as those from this tag on.
+    Bits(String),
+}
+
+impl std::fmt::Display for Expected {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let one = |(low, high): &(f64, f64)| if low == high { low.to_string() } else { format!("{low}…{high}") };
+        match self {
+            Expected::Ranges(ranges) => f.write_str(&ranges.iter().map(one).collect::<Vec<_>>().join(", ")),
+            Expected::Bits(tag) => f.write_str(tag),
+        }
+    }
+}
+
+/// All of these profiles, that which fits best first.
+pub fn ranking(known: &[Arc<PlantDef>], words: Words) -> Vec<Ranked> {
+    let ranked = known.iter().filter_map(|def| {
+        let device = def.devices.first()?;
+        Some(Ranked { def: Arc::clone(def), fit: fit(def, device, words), misses: misses(def, device, words) })
+    });
+    let mut ranked: Vec<Ranked> = ranked.collect();
+    let share = |ranked: &Ranked| (1_000 * ranked.fit.fits).checked_div(ranked.fit.of).unwrap_or(0);
+    ranked.sort_by_key(|one| std::cmp::Reverse((one.fit.is_enough(), share(one), one.fit.fits)));
+    ranked
+}
+
+fn misses(def: &PlantDef, device: &DeviceDef, words: Words) -> Vec<Miss> {
+    let missed = device.signature.iter().filter_map(|probe| {
+        let tag = def.tag(probe.tag);
+        let read = raw_of(tag.point, words);
+        let expected = match probe.bits {
+            Some(bit) => Expected::Bits(def.tag(bit).short.clone()),
+            None => Expected::Ranges(probe.ranges.clone()),
+        };
+        let fits = read.is_some_and(|raw| holds(def, probe, raw, words));
+        (!fits).then(|| Miss { tag: tag.short.clone(), read, expected })
+    });
+    missed.collect()
 }
 
 /// What must be read to know how well a unit fits, and what its values need to be shown: registers beside each other

@@ -1,46 +1,36 @@
 //! `sightglass new`: a plant file from answers and from what is found on the lines, checked by loading it.
 
 use std::{
-    collections::BTreeMap,
     path::{Path, PathBuf},
     sync::Arc,
-    time::Duration,
 };
 
 use jiff::{civil::Time, tz::TimeZone};
 
 use super::{
-    CliError, in_runtime, log, menu, open, paths,
+    CliError, in_runtime, log, menu, open, profile_choice,
     prompt::{ask, ask_until, selection},
+    recognition::{FoundUnit, recognise_all},
     say,
-    source::query_station,
     tools::{self, scan},
 };
 use crate::{
-    bus::{
-        io::testing::Bench,
-        recognise::{self, Fit},
-    },
-    history::{Answer, Query},
+    bus::io::testing::Bench,
     plant::{
         PlantDef,
-        def::{DeviceId, LineDef, LineId, TagId},
+        def::{DeviceId, LineDef, TagId},
         diagnostics::{Diagnostic, DiagnosticState, Finding, Scan},
-        live::{AddressSpan, LiveRead, LiveReading, ReplyTimes},
+        live::ReplyTimes,
         tag::{Access, ByteOrder, DataType, Point, Table, TagDef},
     },
     profile::{
         OwnProfiles,
         io::atomic,
-        new_plant::{NewAlarm, NewDevice, NewPlant, left_out, of_interest, plain_name, suggested_alarms},
+        new_plant::{NewAlarm, NewDevice, NewPlant, left_out, of_interest, plain_name},
+        suggested_alarms::suggested_alarms,
     },
-    station::Session,
 };
 
-/// Replies from which the timeout is learned.
-const REPLIES: usize = 20;
-/// A live read of a line that does not even connect is given up.
-const READ_MAX: Duration = Duration::from_secs(30);
 /// More units than this on TCP are one device that answers to every address.
 const UNITS_MANY: usize = 16;
 
@@ -50,14 +40,6 @@ pub struct Args {
     /// The plant file to write; an existing file is never overwritten
     #[arg(value_name = "FILE", default_value = "plant.toml")]
     file: PathBuf,
-}
-
-/// What was found at a unit.
-struct FoundUnit {
-    unit: u8,
-    /// Its first holding register can be read.
-    has_register: bool,
-    fit: Option<(Arc<PlantDef>, Fit)>,
 }
 
 /// Asks, looks, and writes the plant file.
@@ -87,7 +69,7 @@ fn free(text: &str) -> Result<PathBuf, String> {
 
 async fn wizard(path: PathBuf) -> Result<(), CliError> {
     say("Enter takes what stands in [ ]. Nothing is written before the last question; Ctrl-C leaves.");
-    let profiles = open::own_profiles(path.parent().unwrap_or(Path::new("")));
+    let mut profiles = open::own_profiles(path.parent().unwrap_or(Path::new("")));
     let known = profiles.recognisable();
     let title = ask("title", "Plant").await?;
     let here = TimeZone::system().iana_name().unwrap_or("UTC").to_owned();
@@ -98,13 +80,13 @@ async fn wizard(path: PathBuf) -> Result<(), CliError> {
     .await?;
     let (lines, devices, alarms) = (Vec::new(), Vec::new(), Vec::new());
     let mut plant = NewPlant { title, time_zone, lines, devices, alarms, shifts: Vec::new() };
-    let mut suggested = Vec::new();
+    let (mut suggested, mut made) = (Vec::new(), Vec::new());
     while let Some(line) = next_line(plant.lines.len()).await? {
         let name = format!("L{}", plant.lines.len() + 1);
         let line = LineDef { name, ..line };
         let Some((found, replies)) = find_units(&line, &known).await? else { continue };
         for unit in &found {
-            suggested.extend(add_device(&mut plant, unit, &profiles).await?);
+            suggested.extend(add_device(&mut plant, unit, &mut profiles, (&mut made, &path)).await?);
         }
         plant.lines.push((line, replies));
     }
@@ -113,7 +95,7 @@ async fn wizard(path: PathBuf) -> Result<(), CliError> {
     }
     plant.alarms = alarms_of(suggested).await?;
     plant.shifts = ask_until("shifts, or none", "day 06:00, night 18:00", shifts).await?;
-    save(&plant, &profiles, &path).await
+    save(&plant, &profiles, &made, &path).await
 }
 
 /// Asks for a line until its settings are known; `None`: there are no more.
@@ -191,83 +173,15 @@ fn unit_selection(answer: &str, names: &[String]) -> Result<Vec<usize>, String> 
     }
 }
 
-/// Asks every unit what the signatures ask, over a station without history, as `open` does.
-async fn recognise_all(
-    line: &LineDef,
-    units: &[(u8, bool)],
-    known: &[Arc<PlantDef>],
-) -> Result<(Vec<FoundUnit>, ReplyTimes), CliError> {
-    let station = open::bench_station(line.clone(), units.first().map_or(1, |(unit, _)| *unit));
-    let session = station.session(&paths::operator());
-    let (mut found, mut replies) = (Vec::new(), ReplyTimes::default());
-    for (unit, has_register) in units.iter().copied() {
-        let mut words: BTreeMap<(Table, u32), u16> = BTreeMap::new();
-        for def in known {
-            let spans = def.devices.first().map(|device| recognise::spans(def, device)).unwrap_or_default();
-            let reading = read(&session, unit, spans, &mut replies).await?;
-            for part in reading.parts {
-                let cells = part.span.range().zip(part.words.unwrap_or_default());
-                words.extend(cells.map(|(address, word)| ((part.span.table, address), word)));
-            }
-        }
-        let held = |span: AddressSpan| -> Vec<u16> {
-            span.range().map_while(|address| words.get(&(span.table, address)).copied()).collect()
-        };
-        let fit = recognise::best(known, &held).map(|(def, fit)| (Arc::clone(def), fit));
-        found.push(FoundUnit { unit, has_register, fit });
-    }
-    for (unit, _) in units.iter().cycle().take(2 * REPLIES) {
-        if replies.timeout().is_some() {
-            break;
-        }
-        let first = AddressSpan { table: Table::Holding, address: 0, count: 1 };
-        read(&session, *unit, vec![first], &mut replies).await?;
-    }
-    station.stop().await;
-    Ok((found, replies))
-}
-
-async fn read(
-    session: &Session,
-    unit: u8,
-    spans: Vec<AddressSpan>,
-    replies: &mut ReplyTimes,
-) -> Result<LiveReading, CliError> {
-    let read = LiveRead { line: LineId(0), unit, spans, not_before: None, relearn: false };
-    let answer = tokio::time::timeout(READ_MAX, query_station(session, Query::Registers(read))).await;
-    match answer.map_err(|_| CliError::Failed(format!("unit {unit}: the line is not connected any more")))?? {
-        Answer::Registers(reading) => {
-            reading.response_time.into_iter().for_each(|time| replies.see(time));
-            Ok(reading)
-        }
-        _ => Err(super::source::unexpected()),
-    }
-}
-
 /// Asks for profile, name and tags of a unit; gives the alarms that its profile suggests.
 async fn add_device(
     plant: &mut NewPlant,
     found: &FoundUnit,
-    profiles: &OwnProfiles,
+    profiles: &mut OwnProfiles,
+    (made, path): (&mut Vec<String>, &Path),
 ) -> Result<Vec<NewAlarm>, CliError> {
-    let FoundUnit { unit, has_register, fit } = found;
-    let usual = match fit {
-        Some((def, Fit { fits, of, .. })) => {
-            let model = def.devices.first().map_or("", |device| device.model.as_str());
-            say(&format!("unit {unit}: looks like {model}, {fits} of {of} probes fit"));
-            def.name.as_str()
-        }
-        None => {
-            say(&format!("unit {unit}: not recognised"));
-            "none"
-        }
-    };
-    let profile = ask_until("  profile, or none", usual, |name| match (name, profiles.device(name)) {
-        ("none", _) => Ok(None),
-        (_, Some(def)) => Ok(Some(def)),
-        (_, None) => Err(format!("no device profile `{name}`; `sightglass profiles` lists them")),
-    })
-    .await?;
+    let FoundUnit { unit, has_register, kind } = found;
+    let profile = profile_choice::ask_profile(*unit, kind, profiles, made, names_beside(path)).await?;
     let controller = profile.iter().any(|def| def.devices.iter().any(|device| device.faceplate.is_some()));
     let usual = free_name(plant, if controller { "TIC" } else { "D" });
     let name = ask_until("  name", &usual, |name| {
@@ -291,7 +205,8 @@ async fn add_device(
     };
     let mut alarms = Vec::new();
     if let Some(def) = profile {
-        let (kept, all) = kept_tags(&def).await?;
+        let is_made = made.contains(&def.name);
+        let (kept, all) = if is_made { profile_choice::kept_models(&def).await? } else { kept_tags(&def).await? };
         alarms = suggested_alarms(&device.name, &kept);
         device.unpolled = left_out(&def, &kept);
         device.profile = Some((def.name.clone(), if all { of_interest(&kept) } else { kept }));
@@ -303,6 +218,13 @@ async fn add_device(
     }
     plant.devices.push(device);
     Ok(alarms)
+}
+
+/// Names for a device profile beside a plant file, of files that are not there.
+fn names_beside(plant: &Path) -> impl Iterator<Item = String> {
+    let stem = plain_name(&plant.file_stem().unwrap_or_default().to_string_lossy()).replace('.', "_");
+    let names = (1..1_000).map(move |n| if n == 1 { format!("{stem}_sunspec") } else { format!("{stem}_sunspec_{n}") });
+    names.filter(|name| !plant.with_file_name(format!("{name}.toml")).exists())
 }
 
 /// `TIC-1`, `TIC-2` …
@@ -354,12 +276,18 @@ fn shifts(answer: &str) -> Result<Vec<(String, String)>, String> {
 }
 
 /// Writes the text, which was loaded as a check, to a file that was not there.
-async fn save(plant: &NewPlant, profiles: &OwnProfiles, path: &Path) -> Result<(), CliError> {
+async fn save(plant: &NewPlant, profiles: &OwnProfiles, made: &[String], path: &Path) -> Result<(), CliError> {
     let text = plant.text(profiles).map_err(|why| CliError::Failed(format!("nothing was written: {why}")))?;
     let usual = path.display().to_string();
     let path = ask_until("write the plant file", &usual, |answer| {
         let path = free(answer)?;
-        atomic::write_new(&path, text.as_bytes()).map_err(|error| format!("{}: {error}", path.display()))?;
+        let used = |name: &&String| plant.devices.iter().any(|of| of.profile.as_ref().is_some_and(|of| of.0 == **name));
+        for name in made.iter().filter(used) {
+            let beside = path.with_file_name(format!("{name}.toml"));
+            write(&beside, profiles.text(name).unwrap_or_default())?;
+            say(&format!("saved {}: the device profile", beside.display()));
+        }
+        write(&path, &text)?;
         Ok(path)
     })
     .await?;
@@ -368,6 +296,10 @@ async fn save(plant: &NewPlant, profiles: &OwnProfiles, path: &Path) -> Result<(
     say(&format!("saved {path}: lines {lines}, devices {devices}, alarms {alarms}"));
     say(&format!("`sightglass {path}` shows it, `sightglass check {path}` its read plan"));
     Ok(())
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    atomic::write_new(path, text.as_bytes()).map_err(|error| format!("{}: {error}", path.display()))
 }
 
 #[cfg(test)]

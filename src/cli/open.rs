@@ -8,7 +8,7 @@ use super::{
     CliError, TerminalArgs, in_runtime, log, menu,
     open_log::{self, WatchArgs},
     paths, say,
-    tools::{self, PortArgs},
+    tools::{self, PortArgs, scan},
 };
 use crate::{
     bus::io::{clock::Clock, testing::Bench, transport::Connector},
@@ -40,7 +40,9 @@ const USUAL: [(u32, Parity); 14] = [
     (19_200, Parity::Odd),
 ];
 /// Units that a device on TCP or its gateway usually has, the most frequent first.
-const USUAL_UNITS: [(u8, u8); 4] = [(1, 1), (255, 255), (0, 0), (2, 16)];
+const USUAL_UNITS: [(u8, u8); 7] = [(1, 1), (255, 255), (0, 0), (126, 126), (2, 16), (240, 240), (17, 247)];
+/// Units on a serial line and of the usual settings those that they are looked for with, the most frequent first.
+const USUAL_SERIAL_UNITS: [(u8, u8, usize); 3] = [(1, 1, USUAL.len()), (2, 16, USUAL.len()), (17, 247, 4)];
 /// How long an answer may take while settings are tried.
 const TRIAL: Duration = Duration::from_millis(250);
 
@@ -164,26 +166,7 @@ fn bench(line: LineDef, unit: u8) -> PlantDef {
 /// The settings and the unit that answer; what is given is taken as it is.
 pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError> {
     if let Some(serial) = line.transport.serial() {
-        let unit = args.unit.unwrap_or(1);
-        if args.port.is_exact() {
-            return Ok((line, unit));
-        }
-        let serials = USUAL.map(|(baud, parity)| Serial { baud, parity, ..serial });
-        let serials = serials.into_iter().filter(|serial| args.port.fits(*serial)).collect();
-        return match first_answer(&mut Bench::new(&line), &line, (unit, unit), serials).await? {
-            Ok((unit, serial, words)) => {
-                let serial = serial.unwrap_or(serial_of(&line));
-                say(&format!("unit {unit} answers at {serial}: {words}"));
-                Ok((with_serial(line, serial), unit))
-            }
-            Err(came) => Err(CliError::Failed(format!(
-                "{}: unit {unit} answers at none of the usual settings{came}. In the order of likelihood:\n\
-                 another unit address (`sightglass scan {0}`), A and B exchanged, the device without power or not set to \
-                 Modbus RTU,\nno common ground or termination, another master on the line.\n\
-                 `--baud` and `--parity` together open the line without trying",
-                port_of(&line)
-            ))),
-        };
+        return find_serial(line, serial, args).await;
     }
     if let Some(unit) = args.unit {
         return Ok((line, unit));
@@ -203,10 +186,55 @@ pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError>
         }
     }
     Err(CliError::Failed(format!(
-        "{}: the connection opens, but units 0 to 16 and 255 do not answer{came}. In the order of likelihood:\n\
-         another unit address (`sightglass scan {0}`, then `--unit`), no device behind the gateway or not powered,\n\
+        "{}: the connection opens, but units 0 to 247 and 255 do not answer{came}. In the order of likelihood:\n\
+         no device behind the gateway or not powered, other serial settings in the gateway,\n\
          another protocol on this TCP port",
         port_of(&line)
+    )))
+}
+
+/// Settings and unit on a serial line: unit 1 with every usual setting, then the others.
+async fn find_serial(line: LineDef, serial: Serial, args: &Args) -> Result<(LineDef, u8), CliError> {
+    if let (true, Some(unit)) = (args.port.is_exact(), args.unit) {
+        return Ok((line, unit));
+    }
+    let serials = |most: usize| -> Vec<Serial> {
+        if args.port.is_exact() {
+            return vec![serial];
+        }
+        let usual = USUAL.iter().take(most).map(|(baud, parity)| Serial { baud: *baud, parity: *parity, ..serial });
+        usual.filter(|serial| args.port.fits(*serial)).collect()
+    };
+    // With other settings the line rests for the timeout: no longer than what is tried.
+    let trial = LineDef { timeout: line.timeout.min(TRIAL), ..line.clone() };
+    let (mut bench, mut came) = (Bench::new(&trial), String::new());
+    let stages = args.unit.map_or(USUAL_SERIAL_UNITS.to_vec(), |unit| vec![(unit, unit, USUAL.len())]);
+    for (first, last, most) in stages {
+        let scan = Scan { first, last, serials: serials(most), timeout: trial.timeout };
+        let (units, settings) = (
+            if first == last { format!("unit {first}") } else { format!("units {first} to {last}") },
+            scan.serials.len(),
+        );
+        let seconds = scan::time_max(&trial, &scan).1.as_secs_f64().ceil();
+        say(&format!("trying {units} at {settings} settings, at most {seconds} s; Ctrl-C ends it"));
+        match first_answer(&mut bench, &trial, (first, last), scan.serials).await? {
+            Ok((unit, serial, words)) => {
+                let serial = serial.unwrap_or(serial_of(&line));
+                say(&format!("unit {unit} answers at {serial}: {words}"));
+                return Ok((with_serial(line, serial), unit));
+            }
+            Err(other) if came.is_empty() => came = other,
+            Err(_) => {}
+        }
+    }
+    Err(CliError::Failed(format!(
+        "{}: {} at none of the usual settings{came}. In the order of likelihood:\n\
+         A and B exchanged, the device without power or not set to Modbus RTU,\n\
+         no common ground or termination, other settings (`sightglass scan {0} --bauds all --parities all`), another \
+         master on the line.\n\
+         `--baud`, `--parity` and `--unit` together open the line without trying",
+        port_of(&line),
+        args.unit.map_or("no unit answers".to_owned(), |unit| format!("unit {unit} answers"))
     )))
 }
 

@@ -311,6 +311,11 @@ pub struct ActionDef {
     pub role: Option<Role>,
 }
 
+/// Fewest probes of a signature that fit.
+pub const PROBES_MIN: usize = 3;
+/// Fewest different numbers among those that fit: a unit that answers the same everywhere is nothing.
+pub const PROBED_NUMBERS_MIN: usize = 3;
+
 /// What a tag must hold in a device of this kind.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {

@@ -164,6 +164,11 @@ pub(super) fn own_devices(search: &Search) -> BTreeMap<String, Text> {
     files.filter_map(|(path, name)| Some((name, device_file(&path, search)?.1))).collect()
 }
 
+/// The models of SunSpec: see [`super::sunspec`].
+pub(super) fn sunspec_models() -> &'static str {
+    SHIPPED.get_file("sunspec/models.txt").and_then(include_dir::File::contents_utf8).unwrap_or_default()
+}
+
 /// The names of all plants, device profiles and scenarios, with where each comes from.
 pub fn list(search: &Search) -> Vec<Listed> {
     let mut all = Vec::new();

@@ -51,6 +51,8 @@ mod signature;
 mod simulate;
 mod set_file;
 mod sets;
+pub(crate) mod suggested_alarms;
+pub(crate) mod sunspec;
 mod size;
 mod tag;
 mod tag_keys;
@@ -140,6 +142,11 @@ pub fn own_profiles(search: &Search, plant: &Path) -> OwnProfiles {
 /// The text of a device profile of the program.
 fn shipped_device(name: &str) -> Option<plant::Text> {
     io::device(name, &Search::shipped()).ok().flatten()
+}
+
+/// The text of the models of SunSpec: see [`sunspec`].
+fn sunspec_models() -> &'static str {
+    io::sunspec_models()
 }
 
 /// The names of all device profiles of the program.

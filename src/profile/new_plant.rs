@@ -10,7 +10,7 @@ use crate::plant::{
     address::of_modicon,
     def::{LineDef, TagId},
     live::ReplyTimes,
-    tag::{Access, Bound, ByteOrder, Decimals, Poll, TagDef},
+    tag::{Access, ByteOrder, Decimals, Poll, TagDef},
 };
 
 /// Most values on the mimic, pens of the trend and tags of the report.
@@ -124,6 +124,8 @@ impl NewPlant {
         for (name, start) in &self.shifts {
             writeln!(out, "[[shift]]\nname = {}\nstart = {}\n", quoted(name), quoted(start))?;
         }
+        writeln!(out, "# Values are shown without logging in, until this is taken away; to act needs a user.")?;
+        writeln!(out, "[access]\nanonymous_view = true\n")?;
         let tags: Vec<String> = self.shown().filter(|(_, tag)| is_number(tag)).map(|(name, _)| quoted(&name)).collect();
         let tags = tags.get(..REPORTED_MAX).unwrap_or(&tags);
         writeln!(out, "[report]\nfolder = \"reports\"\ntags = [{}]", tags.join(", "))
@@ -265,13 +267,17 @@ impl NewDevice {
 
 /// What a profile reads often; where it reads nothing by itself, the first that can be read.
 pub fn of_interest(tags: &[TagDef]) -> Vec<TagDef> {
-    let readable = || tags.iter().filter(|tag| tag.access != Access::Write && tag.point.field.is_none());
+    // A power of ten says something with its values only.
+    let powers: Vec<TagId> = tags.iter().filter_map(|tag| tag.decimals.power_source()).collect();
+    let is_readable =
+        |tag: &&TagDef| tag.access != Access::Write && tag.point.field.is_none() && !powers.contains(&tag.id);
+    let readable = || tags.iter().filter(is_readable);
     let fast: Vec<TagDef> = readable().filter(|tag| is_fast(tag)).cloned().collect();
     if fast.is_empty() { readable().take(INTEREST_MAX).cloned().collect() } else { fast }
 }
 
 /// Is it read every second? Then it is measured, and no setting.
-fn is_fast(tag: &TagDef) -> bool {
+pub(super) fn is_fast(tag: &TagDef) -> bool {
     matches!(tag.poll, Poll::Every(period) if period <= Duration::from_secs(1))
 }
 
@@ -291,54 +297,6 @@ pub fn left_out(def: &PlantDef, kept: &[TagDef]) -> Vec<String> {
     }
     let rest = def.tags.iter().filter(|tag| tag.poll != Poll::Never && !wanted.contains(&tag.id));
     rest.map(|tag| tag.short.clone()).collect()
-}
-
-/// Why an alarm is suggested.
-#[derive(Clone, Copy)]
-enum Suggestion {
-    /// A fault word is more than 0.
-    Fault,
-    /// The upper end of a measured range.
-    High,
-    /// The lower end.
-    Low,
-}
-
-/// Alarms that a profile suggests for these of its tags: a fault word that is not 0, and the ends of a measured range.
-pub fn suggested_alarms(device: &str, tags: &[TagDef]) -> Vec<NewAlarm> {
-    let faults = tags.iter().filter_map(|tag| tag.quality_from.map(|(fault, _)| fault));
-    let faults: Vec<TagId> = faults.collect();
-    let alarm = |tag: &TagDef, kind: Suggestion, limit, deadband, reason| {
-        let words = if tag.label.is_empty() { &tag.short } else { &tag.label };
-        let (condition, message) = match kind {
-            Suggestion::Fault => ("high", words.clone()),
-            Suggestion::High => ("high", format!("{words} high")),
-            Suggestion::Low => ("low", format!("{words} low")),
-        };
-        let cause = tag.bit_labels.iter().map(|(_, label)| label.as_str()).collect::<Vec<_>>().join(", or ");
-        NewAlarm { tag: format!("{device}.{}", tag.short), condition, limit, deadband, message, reason, cause }
-    };
-    tags.iter()
-        .filter(|tag| tag.access == Access::Read && tag.enum_labels.is_empty() && !tag.is_text())
-        .flat_map(|tag| {
-            let fault = faults
-                .contains(&tag.id)
-                .then(|| alarm(tag, Suggestion::Fault, 0.5, 0.25, "The word is 0 while all is well"));
-            // An output cannot leave 0 to 100 %.
-            let limits = match (tag.min, tag.max) {
-                (Some(Bound::Fixed(min)), Some(Bound::Fixed(max)))
-                    if is_fast(tag) && !tag.unit.is_empty() && tag.unit != "%" =>
-                {
-                    let reason = "The end of the range that the profile gives";
-                    let deadband = (max - min).near() / 100.0;
-                    let low = (min != 0.0).then(|| alarm(tag, Suggestion::Low, min.near(), deadband, reason));
-                    [Some(alarm(tag, Suggestion::High, max.near(), deadband, reason)), low]
-                }
-                _ => [None, None],
-            };
-            fault.into_iter().chain(limits.into_iter().flatten()).collect::<Vec<_>>()
-        })
-        .collect()
 }
 
 /// Two shifts of twelve hours.
@@ -377,6 +335,7 @@ fn tag_text(tag: &TagDef) -> String {
             keys.push(format!("enum = {{ {} }}", labels.collect::<Vec<_>>().join(", ")));
         }
     }
+    keys.extend((tag.access == Access::ReadWrite).then(|| "access = \"rw\"".to_owned()));
     keys.push("poll = \"fast\"".to_owned());
     keys.join(", ")
 }

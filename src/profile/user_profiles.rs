@@ -19,6 +19,17 @@ impl OwnProfiles {
         OwnProfiles { texts: BTreeMap::from([(name.to_owned(), text)]) }
     }
 
+    /// Adds one that is not on the disk yet; it lies beside the plant file once it is.
+    pub fn add(&mut self, name: &str, text: &str) {
+        let text = plant::Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() };
+        self.texts.insert(name.to_owned(), text);
+    }
+
+    /// The text of one of them.
+    pub fn text(&self, name: &str) -> Option<&str> {
+        std::str::from_utf8(&self.texts.get(name)?.bytes).ok()
+    }
+
     /// The file of a profile that only plant files beside it can name.
     pub fn beside(&self, name: &str) -> Option<&str> {
         self.texts.get(name).map(|text| text.file.as_str()).filter(|file| !file.starts_with('/'))
@@ -34,6 +45,11 @@ impl OwnProfiles {
     pub fn recognisable(&self) -> Vec<Arc<PlantDef>> {
         let plants = self.names().into_iter().filter_map(|name| self.device(&name));
         plants.filter(|def| def.devices.iter().any(|device| !device.signature.is_empty())).collect()
+    }
+
+    /// Every profile without errors, each as the only device of a plant of its name.
+    pub fn all(&self) -> Vec<Arc<PlantDef>> {
+        self.names().into_iter().filter_map(|name| self.device(&name)).collect()
     }
 
     /// The device of a profile as the only one of a plant; `None` for a profile that there is not, or with errors.

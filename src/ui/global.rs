@@ -224,8 +224,9 @@ fn silence(model: &mut Model) -> Vec<UiAction> {
 fn dismiss(model: &mut Model) -> Vec<UiAction> {
     model.replay.cancel();
     let failed = model.last_command.take().is_some_and(|pending| pending.is_trouble());
-    if !failed {
-        step_back(model);
+    if !failed && !step_back(model) && model.snapshot.def.is_bench() {
+        // The map of a unit stands on another tab than the registers that asked for it.
+        return revisit(model, false);
     }
     Vec::new()
 }

@@ -110,10 +110,11 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
     });
     let shown = model.tabs.shown;
     let let_in = shown == Tab::Login && now.who.is_some() && user(&before) != user(&now);
-    let opened = shown == Tab::Login && is_closed(&before) && !now.needs_first_supervisor;
+    let opened = shown == Tab::Login && is_closed(&before);
     // The login page has every letter for itself: a locked terminal is for looking.
     let locked = shown == Tab::Login && !before.locked && now.locked;
-    if is_closed(&now) || (now.needs_first_supervisor && !before.needs_first_supervisor) {
+    // Where everything may be seen without a user, the first one is made when someone wants to act.
+    if is_closed(&now) {
         return vec![UiAction::Show(Tab::Login)];
     }
     let offered = Tab::offered(&model.cx()).contains(&shown);

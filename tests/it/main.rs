@@ -10,6 +10,7 @@
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
 //! | `peers` | our master against slaves that we did not write: pymodbus, libmodbus |
+//! | `sunspec` | SunSpec devices of every model, by pysunspec2, against pysunspec2 as a reader |
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `listen` | the line of a master and a slave that we did not write, heard over a tap: frames, values, capture; nothing is sent |
 //! | `listening` | a station that only listens to such a line: its values, its refusals, a master that stops; nothing is sent |
@@ -82,6 +83,7 @@ mod rights;
 mod settings;
 mod shift;
 mod special_files;
+mod sunspec;
 mod support;
 mod tampering;
 mod tasks;

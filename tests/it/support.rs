@@ -227,6 +227,11 @@ pub fn python() -> Option<PathBuf> {
     PYTHON.get_or_init(|| venv("peers-venv", &["pymodbus[serial]==3.16.1", "minimalmodbus==2.1.1"])).clone()
 }
 
+/// The Python with a reader of SunSpec devices.
+pub fn sunspec() -> Option<PathBuf> {
+    venv("sunspec-venv", &["pysunspec2==1.3.7"])
+}
+
 /// The Python with engines that read Parquet. Spark needs Java.
 pub fn engines() -> Option<PathBuf> {
     let packages =

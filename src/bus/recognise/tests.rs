@@ -105,7 +105,7 @@ fn a_power_of_ten_scales_as_its_own_tag_says() {
     let text = "vendor = \"a\"\nmodel = \"b\"\nstatus = \"manual\"\nsource = \"c\"\n\
         tag = [{ name = \"W\", table = \"holding\", address = 0, type = \"int16\", unit = \"W\", decimals_from = \"SF\" },\n\
         { name = \"SF\", table = \"holding\", address = 1, type = \"int16\", scale = -1 }]\n\
-        [signature]\nprobe = [{ tag = \"W\", range = [0, 9] }]\n";
+        [signature]\nprobe = [{ tag = \"W\", range = [0, 9] }, { tag = \"W\", is = [1] }, { tag = \"SF\", is = [2] }]\n";
     let known = OwnProfiles::of_text("sun", text).recognisable();
     let def = known.iter().find(|def| def.name == "sun").expect("it is recognisable");
     let scaled = |exponent: i16| scaling(def, &def.tags[0], &|_| vec![exponent.cast_unsigned()]);

@@ -34,7 +34,7 @@ use super::{CliError, menu, runtime, say, say_error};
 #[derive(Debug, Clone, clap::Args)]
 pub struct PortArgs {
     /// A serial port (/dev/ttyUSB0), or HOST, HOST:TCPPORT or [IPV6]:TCPPORT
-    #[arg(value_name = "PORT")]
+    #[arg(value_name = "PORT", value_parser = port_text)]
     port: String,
     /// rtu, ascii, tcp, rtu-over-tcp or ascii-over-tcp [default: rtu on a serial port, else tcp]
     #[arg(long, value_parser = ["rtu", "ascii", "tcp", "rtu-over-tcp", "ascii-over-tcp"])]
@@ -181,6 +181,19 @@ impl PortArgs {
         self.baud.is_none_or(|baud| baud == serial.baud)
             && self.parity.as_deref().is_none_or(|letter| parity(letter) == serial.parity)
     }
+}
+
+/// A port as it is typed; `tcp:` in front of a host says nothing more, and a protocol alone is no host.
+fn port_text(text: &str) -> Result<String, String> {
+    const PROTOCOLS: [&str; 6] = ["tcp", "udp", "rtu", "ascii", "modbus", "serial"];
+    let expected = "expected a serial port such as /dev/ttyUSB0, or HOST or HOST:TCPPORT such as 10.0.0.7:502";
+    let rest = text.strip_prefix("tcp:").map(|rest| rest.trim_start_matches("//"));
+    let host = rest.unwrap_or(text);
+    let is_number = !host.is_empty() && host.chars().all(|letter| letter.is_ascii_digit());
+    if host.is_empty() || PROTOCOLS.contains(&host) || is_number && !Path::new(text).is_file() {
+        return Err(format!("found `{text}`, {expected}"));
+    }
+    Ok(host.to_owned())
 }
 
 /// `N`, `E`, `O`, `M` or `S`, checked by the arguments.

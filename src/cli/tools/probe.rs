@@ -3,14 +3,16 @@
 use super::{UnitArgs, exchange_lines, run};
 use crate::{
     bus::{interpret, names},
-    cli::{CliError, say},
+    cli::{CliError, in_runtime, recognition, say, say_error},
     plant::{
+        def::LineDef,
         diagnostics::{Diagnostic, Finding},
         event::Fault,
         live::AddressSpan,
         number::to_u16,
         tag::{ByteOrder, Table},
     },
+    profile::sunspec::profile_text,
 };
 
 /// Arguments of `probe`.
@@ -21,11 +23,17 @@ pub struct Args {
     /// Read this: TABLE:ADDRESS[:COUNT] with the wire address (holding:1002:10), or a Modicon number (41003:10)
     #[arg(long, short, value_name = "WHERE", value_parser = |text: &str| text.parse::<AddressSpan>())]
     read: Option<AddressSpan>,
+    /// Find its SunSpec models, and print the device profile that they make
+    #[arg(long, conflicts_with = "read")]
+    sunspec: bool,
 }
 
 /// Reads what is asked for, else the identification.
 pub fn main(args: Args) -> Result<(), CliError> {
     let (line, unit) = args.of.line_and_unit()?;
+    if args.sunspec {
+        return sunspec(&line, unit);
+    }
     say(&format!("unit {} on {}", unit, line.transport));
     let diagnostic = match args.read {
         Some(AddressSpan { table, address, count }) => Diagnostic::Read { unit, table, address, count },
@@ -64,6 +72,18 @@ pub fn main(args: Args) -> Result<(), CliError> {
         (false, Some(fault)) => format!("something answers, but wrongly: {fault}"),
         (false, None) => "the unit does not respond".to_owned(),
     }))
+}
+
+/// The profile on the standard output, what was found on the error output.
+fn sunspec(line: &LineDef, unit: u8) -> Result<(), CliError> {
+    let found = in_runtime(recognition::sunspec(line, unit))?;
+    let Some(device) = found else {
+        return Err(CliError::Failed(format!("unit {unit} has no SunSpec models at 0, 40000 or 50000")));
+    };
+    let [vendor, model, _] = device.identity();
+    say_error(&format!("unit {unit}: {vendor} {model}, {} SunSpec models", device.models.len()));
+    say(&profile_text(&device));
+    Ok(())
 }
 
 /// A row a register: both forms of the address, hex, unsigned, signed, and with its neighbour a float in four orders.

@@ -7,7 +7,7 @@ use crate::{
     bus::io::testing,
     cli::{CliError, say},
     plant::{
-        def::{Framing, Serial},
+        def::{Framing, LineDef, Serial},
         diagnostics::{Diagnostic, Finding, Scan},
         number::to_u32,
     },
@@ -50,18 +50,25 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let (first, last) = args.units;
     // Time for request and answer on the wire of the slowest setting is added by the link.
     let scan = Scan { first, last, serials, timeout: line.timeout.min(Duration::from_secs(60)) };
-    let requests = scan.serials.len().max(1) * (usize::from(last - first) + 1);
-    // Where nothing answers on several connections at once, it is asked again on one.
-    let is_wide = line.transport.framing() == Framing::Mbap && 1 < requests;
-    let at_once = if is_wide { requests.div_ceil(testing::SCAN_CONNECTIONS) } else { 0 };
-    let deaf = if line.transport.serial().is_none() { testing::DEAF_MAX } else { Duration::ZERO };
-    let most = deaf + line.timeout * to_u32(requests + at_once);
+    let (requests, most) = time_max(&line, &scan);
     let seconds = most.as_secs_f64().ceil();
     say(&format!("scan on {}: {requests} requests, about {seconds:.0} s if no unit answers", line.transport));
     let run = run(&line, Diagnostic::Scan(scan), describe)?;
 
     let found = run.findings.iter().any(|finding| matches!(finding, Finding::Unit { .. }));
     if found { Ok(()) } else { Err(CliError::Failed("no unit was found".into())) }
+}
+
+/// Requests of a scan, and how long it takes where no unit answers.
+pub fn time_max(line: &LineDef, scan: &Scan) -> (usize, Duration) {
+    let requests = scan.serials.len().max(1) * (usize::from(scan.last.saturating_sub(scan.first)) + 1);
+    // Where nothing answers on several connections at once, it is asked again on one.
+    let is_wide = line.transport.framing() == Framing::Mbap && 1 < requests;
+    let at_once = if is_wide { requests.div_ceil(testing::SCAN_CONNECTIONS) } else { 0 };
+    let deaf = if line.transport.serial().is_none() { testing::DEAF_MAX } else { Duration::ZERO };
+    // With other settings nothing is asked before the answer to what was asked before can no longer come.
+    let changes = line.timeout * to_u32(scan.serials.len());
+    (requests, deaf + changes + scan.timeout * to_u32(requests + at_once))
 }
 
 /// What a scan has found, in words.
@@ -127,6 +134,19 @@ pub fn units(text: &str) -> Result<(u8, u8), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_time_of_a_scan_counts_the_rest_at_each_setting() {
+        let line = LineDef {
+            timeout: Duration::from_millis(200),
+            ..LineDef::new(crate::plant::id::LineId(0), "L", crate::plant::def::Transport::rtu("/dev/x", Serial::USUAL))
+        };
+        let scan =
+            |last, settings| Scan { first: 1, last, serials: vec![Serial::USUAL; settings], timeout: line.timeout };
+        // Measured: 30 settings took 14.5 s.
+        assert_eq!(time_max(&line, &scan(1, 30)), (30, Duration::from_secs(12)));
+        assert_eq!(time_max(&line, &scan(8, 0)), (8, Duration::from_millis(1_600)));
+    }
 
     #[test]
     fn units_are_one_or_a_range() {

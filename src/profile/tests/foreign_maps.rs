@@ -105,7 +105,7 @@ fn patterns_name_states_probes_and_the_values_of_interlocks() {
     let state = meter(
         "[[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 2000\ntype = \"int16\"\nenum = { 0 = \"off\", 0xFFFF = \"on\" }\n\
          [[tag]]\nname = \"Y\"\ntable = \"holding\"\naddress = 2001\ntype = \"int16\"\n\
-         [signature]\nprobe = [{ tag = \"X\", is = [0xFFFF, 0] }]\n",
+         [signature]\nprobe = [{ tag = \"X\", is = [0xFFFF, 0] }, { tag = \"X\", is = [1] }, { tag = \"X\", is = [2] }]\n",
     );
     assert_eq!(tag(&state, "D1.X").label_of(-1.0), Some("on"));
     let signature = &loaded(&state).devices[0].signature;

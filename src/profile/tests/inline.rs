@@ -62,12 +62,22 @@ fn wrong_inline_tags_name_file_and_line() {
 #[test]
 fn a_probe_of_a_signature_says_what_its_tag_must_hold() {
     let with = |probe: &str| OWN.to_owned() + &format!("signature = {{ probe = [{probe}] }}\n");
-    let plant = load(with("{ tag = \"T\", range = [-5, 9] }, { tag = \"SV\", is = [1, 3] }").as_bytes(), METER, PLC);
+    let plant = load(
+        with("{ tag = \"T\", range = [-5, 9] }, { tag = \"SV\", is = [1, 3] }, { tag = \"T\", is = [7] }").as_bytes(),
+        METER,
+        PLC,
+    );
     let probes = plant.map(|plant| plant.devices[0].signature.clone()).unwrap_or_else(|errors| panic!("{errors}"));
     let ranges: Vec<_> = probes.into_iter().map(|probe| probe.ranges).collect();
-    assert_eq!(ranges, [vec![(-5.0, 9.0)], vec![(1.0, 1.0), (3.0, 3.0)]]);
+    assert_eq!(ranges, [vec![(-5.0, 9.0)], vec![(1.0, 1.0), (3.0, 3.0)], vec![(7.0, 7.0)]]);
     for (probe, expect) in [
         ("{ tag = \"T\" }", "expected one of `is`"),
+        ("{ tag = \"T\", is = [5] }, { tag = \"SV\", is = [6] }", "a signature of 2 probes can never fit"),
+        (
+            "{ tag = \"T\", is = [5] }, { tag = \"SV\", is = [6] }, { tag = \"SV\", is = [5] }",
+            "3 different numbers among its probes",
+        ),
+        ("{ tag = \"T\", range = [40000, 50000] }", "a raw number of int16 is -32768 to 32767"),
         ("{ tag = \"T\", range = [9, 1] }", "is empty"),
         ("{ tag = \"TT\", is = [0] }", "small.toml:22:"),
     ] {

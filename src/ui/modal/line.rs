@@ -20,6 +20,8 @@ pub struct Line {
     room: usize,
     /// Something that was typed or pasted is not in the text; the text is incomplete until it is cleared.
     missed: bool,
+    /// It was there before anything was typed: what is typed stands in its place, another key keeps it.
+    is_offered: bool,
 }
 
 impl Default for Line {
@@ -36,7 +38,11 @@ impl Line {
     /// A text of at most so many characters.
     pub fn long(text: &str, room: usize) -> Line {
         let text: Vec<char> = text.chars().take(room).collect();
-        Line { cursor: text.len(), text, room, missed: false }
+        Line { cursor: text.len(), text, room, missed: false, is_offered: false }
+    }
+    /// A text that is offered: typed text replaces it.
+    pub fn offered(text: &str) -> Line {
+        Line { is_offered: !text.is_empty(), ..Line::new(text) }
     }
     /// What has been entered.
     pub fn text(&self) -> String {
@@ -48,7 +54,8 @@ impl Line {
     }
     /// An editing key; `false` if it is none.
     pub fn on_key(&mut self, event: KeyEvent) -> bool {
-        let known = self.edit(event);
+        let (known, offered) = (self.edit(event), self.is_offered);
+        self.is_offered = offered && !known;
         // Clearing the text resets the mark; a rejected key does not.
         let typed = matches!(event.code, KeyCode::Char(_)) && !event.modifiers.contains(KeyModifiers::CONTROL);
         self.missed &= typed || !self.text.is_empty();
@@ -67,6 +74,7 @@ impl Line {
             // Over a slow line a lone Esc and a digit arrive as Alt with that digit: it is not taken, and that is noted.
             KeyCode::Char(_) if event.modifiers.contains(KeyModifiers::ALT) => self.missed = true,
             KeyCode::Char(c) if !ctrl => self.insert(c),
+            KeyCode::Backspace | KeyCode::Delete if self.is_offered => self.clear(),
             KeyCode::Backspace if self.cursor > 0 => {
                 self.cursor -= 1;
                 self.text.remove(self.cursor);
@@ -89,6 +97,9 @@ impl Line {
     /// Pasted text: control characters (a line end above all) become blanks, so a paste never confirms anything and
     /// two lines never become one number.
     pub fn paste(&mut self, text: &str) {
+        if std::mem::take(&mut self.is_offered) {
+            self.clear();
+        }
         for c in text.trim().chars() {
             self.insert(if c.is_control() { ' ' } else { c });
         }
@@ -109,7 +120,8 @@ impl Line {
         let first = (0..=self.cursor).find(|from| width(&part(*from)) + u16::from(*from > 0) <= room);
         let first = first.unwrap_or(self.cursor);
         let start = if first > 0 { canvas.text(x, y, theme.ellipsis(), theme.strong()) } else { x };
-        let end = canvas.text(start, y, &self.text[first..].iter().collect::<String>(), theme.strong());
+        let style = if self.is_offered { theme.focus() } else { theme.strong() };
+        let end = canvas.text(start, y, &self.text[first..].iter().collect::<String>(), style);
         let at = start + width(&part(first));
         let under = self.text[self.cursor..self.after()].iter().collect::<String>();
         if under.is_empty() {
@@ -131,7 +143,16 @@ impl Line {
         self.cursor + text.graphemes(true).next().map_or(0, |letter| letter.chars().count())
     }
 
+    fn clear(&mut self) {
+        self.text.clear();
+        self.cursor = 0;
+    }
+
     fn insert(&mut self, c: char) {
+        if self.is_offered && !c.is_control() {
+            self.is_offered = false;
+            self.clear();
+        }
         if c.is_control() || self.text.len() >= self.room {
             self.missed = true;
             return;
@@ -144,6 +165,23 @@ impl Line {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn typed_text_replaces_what_was_offered() {
+        let typed = |keys: &[KeyCode]| {
+            let mut line = Line::offered("bench.toml");
+            keys.iter().for_each(|code| drop(line.on_key((*code).into())));
+            line.text()
+        };
+        assert_eq!(typed(&[]), "bench.toml");
+        assert_eq!(typed(&[KeyCode::Char('p'), KeyCode::Char('x')]), "px");
+        assert_eq!(typed(&[KeyCode::End, KeyCode::Char('x')]), "bench.tomlx", "another key keeps it");
+        assert_eq!(typed(&[KeyCode::Left, KeyCode::Backspace]), "bench.toml".replace("ml", "l"));
+        assert_eq!(typed(&[KeyCode::Backspace]), "");
+        let mut pasted = Line::offered("bench.toml");
+        pasted.paste("a.toml");
+        assert_eq!(pasted.text(), "a.toml");
+    }
 
     fn check(keys: &[KeyCode], expect: &str) {
         let mut line = Line::default();

@@ -42,7 +42,7 @@ enum Taker {
 impl Prompt {
     /// A prompt with a text to start from.
     pub fn new(title: impl Into<String>, hint: impl Into<String>, text: &str) -> Prompt {
-        Prompt { title: title.into(), hint: hint.into(), line: Line::new(text), problem: None, taker: Taker::Tab }
+        Prompt { title: title.into(), hint: hint.into(), line: Line::offered(text), problem: None, taker: Taker::Tab }
     }
 
     /// The answer is an instant to replay.
@@ -52,7 +52,7 @@ impl Prompt {
 
     /// The filter of the list of the tab, in force while it is typed.
     pub fn filter(text: &str, hint: &str) -> Prompt {
-        Prompt { taker: Taker::Filter(text.to_owned()), ..Prompt::new(t!("filter"), hint, text) }
+        Prompt { taker: Taker::Filter(text.to_owned()), line: Line::new(text), ..Prompt::new(t!("filter"), hint, "") }
     }
 
     /// Is it typed below what it changes?

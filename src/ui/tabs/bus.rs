@@ -113,11 +113,19 @@ impl TabView for Bus {
     }
 
     fn list(&self, cx: &ViewContext) -> Option<&dyn ListPage> {
-        (self.page(cx) == Page::Plan).then_some(&self.plan as &dyn ListPage)
+        match self.page(cx) {
+            Page::Plan => Some(&self.plan),
+            Page::Registers => self.registers.list(cx),
+            Page::Line | Page::Frames | Page::Test => None,
+        }
     }
 
     fn list_mut(&mut self, cx: &ViewContext) -> Option<&mut dyn ListPage> {
-        if self.page(cx) == Page::Plan { Some(&mut self.plan) } else { None }
+        match self.page(cx) {
+            Page::Plan => Some(&mut self.plan),
+            Page::Registers => self.registers.list_mut(cx),
+            Page::Line | Page::Frames | Page::Test => None,
+        }
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {

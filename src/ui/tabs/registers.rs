@@ -13,6 +13,7 @@ mod keys;
 mod layout;
 mod likely;
 mod list;
+mod lists;
 mod names;
 mod page;
 mod recognise;
@@ -71,6 +72,13 @@ pub struct Registers {
     recognition: Recognition,
     /// Of the user.
     pub profiles: OwnProfiles,
+    /// What is to be chosen from a list, and what is read for it.
+    picking: Option<lists::Picking>,
+    listed_spans: Vec<AddressSpan>,
+    /// The read of a map of addresses, and the number that is looked for in it.
+    hunt: Option<(u32, String)>,
+    /// A file that is written once the one before it is: the plant file behind its profile.
+    saved_next: Option<(PathBuf, Vec<u8>)>,
     /// What came of a log, said with the next snapshot.
     said: Option<UiAction>,
     /// A list that was loaded and is not taken yet.
@@ -108,6 +116,7 @@ enum Asking {
     List,
     Write,
     Compare,
+    Log,
 }
 
 impl TabView for Registers {
@@ -131,6 +140,10 @@ impl TabView for Registers {
             names_of: BTreeMap::new(),
             recognition: Recognition::default(),
             profiles: OwnProfiles::default(),
+            picking: None,
+            listed_spans: Vec::new(),
+            hunt: None,
+            saved_next: None,
             said: None,
             preview: None,
             pasted: None,
@@ -158,8 +171,19 @@ impl TabView for Registers {
         view::copied(self, cx)
     }
 
-    fn back(&mut self, _cx: &ViewContext) -> bool {
-        self.watch.close_graph() || self.preview.take().is_some()
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        if self.list_mut(cx).is_some_and(|list| list.back(cx)) {
+            return true;
+        }
+        self.watch.close_graph() || self.preview.take().is_some() || self.picking.take().is_some()
+    }
+
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
+        self.picking.as_ref().map(|picking| picking as &dyn ListPage)
+    }
+
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
+        self.picking.as_mut().map(|picking| picking as &mut dyn ListPage)
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
@@ -167,9 +191,10 @@ impl TabView for Registers {
             return watch::graph::view(self, cx, frame, area);
         }
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
-        match self.preview {
-            Some(_) => import::preview::view(self, cx, &mut canvas),
-            None => view::view(self, cx, &mut canvas),
+        match (&self.preview, &self.picking) {
+            (Some(_), _) => import::preview::view(self, cx, &mut canvas),
+            (None, Some(picking)) => picking.view(cx, &mut canvas),
+            (None, None) => view::view(self, cx, &mut canvas),
         }
     }
 
@@ -196,11 +221,16 @@ impl TabView for Registers {
 
     fn awaits(&self, number: u32) -> bool {
         self.on_way.is_some_and(|(on_way, ..)| on_way == number)
+            || self.hunt.as_ref().is_some_and(|(hunt, _)| *hunt == number)
             || self.recognition.awaits(number)
             || self.comparison.as_ref().is_some_and(|comparison| comparison.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        if let Some((_, text)) = self.hunt.take_if(|(hunt, _)| *hunt == number) {
+            reading_of(answer).iter().for_each(|reading| self.cells.on_reading(reading));
+            return self.list_of(cx, lists::What::Hits(text));
+        }
         if self.recognition.awaits(number) {
             return self.on_probed(cx, reading_of(answer));
         }
@@ -223,6 +253,7 @@ impl TabView for Registers {
         self.reads += 1;
         reading.response_time.into_iter().for_each(|reply| self.replies.see(reply));
         self.cells.on_reading(&reading);
+        self.follow_list(cx);
         let began = reading.began;
         let early = self.due.filter(|due| began + self.period / 2 < *due && *due <= began + self.period);
         let mut actions = self.watch_reading(&reading, early.is_none());
@@ -249,17 +280,14 @@ impl TabView for Registers {
             Asking::Unit => self.unit_typed(cx, text)?,
             Asking::Compare => self.compare_typed(cx, text)?,
             Asking::Save => return self.save(cx, text),
+            Asking::Log => return self.log_typed(text),
             Asking::List => {
                 return Ok(vec![UiAction::Do(Effect::Load { tab: Tab::Registers, path: PathBuf::from(text) })]);
             }
             Asking::Name => self.name_typed(text)?,
             Asking::Enable => return self.enable_writing(text),
             Asking::Write => return self.write_typed(text),
-            Asking::Value => {
-                let (table, address) = self.find(text)?;
-                (self.table, self.selected) = (table, address);
-                self.keep_in_sight(cx);
-            }
+            Asking::Value => return self.find(cx, text),
         }
         Ok(self.read_now(cx))
     }
@@ -277,7 +305,7 @@ impl TabView for Registers {
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        vec![save::outcome(result)]
+        self.on_written(result)
     }
 
     fn on_log_failed(&mut self, why: &str) {

@@ -18,17 +18,26 @@ const TABLES_KEYS: &[Key] = &[
     ),
     Key::change(code(KeyCode::Left), "", "previous table", |registers, _| registers.next_table(-1)),
 ];
-const NAMES: &[Key] = &[Key::change(
-    code(KeyCode::Enter),
-    "names",
-    "take names, units and scales of the device that it looks like",
-    Registers::apply_names,
-)];
+const NAMES: &[Key] = &[
+    Key::change(
+        code(KeyCode::Enter),
+        "names",
+        "take names, units and scales of the device that it looks like",
+        Registers::apply_names,
+    ),
+    Key::new(
+        char('f'),
+        "profile",
+        "choose a device profile: which fits, and why the others do not",
+        Registers::list_profiles,
+    ),
+];
 const LOOK: &[Key] = &[
     Key::new(char('j'), "go to", "go to an address: 1002, 0x3EA, 41003, input:1000", |registers, _| {
         registers.ask_text(Asking::Address, t!("go to address"), t!("1002, 0x3EA, 41003, or input:1000"))
     }),
-    Key::new(char('/'), "find", "find a value in what was read", |registers, _| {
+    Key::new(char('v'), "values", "list everything that has a name, with its value", Registers::toggle_values),
+    Key::new(char('/'), "find", "find a value: every place, type, order and scale that it may have", |registers, _| {
         let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
         registers.ask_text(Asking::Value, t!("find a value in what was read"), hint)
     }),
@@ -110,12 +119,14 @@ impl KeyTable for Registers {
             (true, true) => Keys::below(&GRAPH).and(Keys::of(&[LOG, BACK])),
             (true, false) => Keys::below(&GRAPH).and(Keys::of(&[BACK])),
             (false, _) if self.preview.is_some() => Keys::of(import::preview::KEYS),
+            (false, _) if self.picking.is_some() => listing::all_keys(Keys::of(&[lists::KEYS])),
             (false, true) => Keys::of(BENCH),
             (false, false) => Keys::of(PLANT),
         }
     }
 
     fn after_key(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.follow_list(cx);
         self.read_now(cx)
     }
 
@@ -126,7 +137,8 @@ impl KeyTable for Registers {
             ("graph", [chords, log].concat())
         });
         let list = ("list", Keys::of(import::preview::KEYS).chords());
-        [("registers", Keys::of(BENCH).chords()), list].into_iter().chain(graph).collect()
+        let picks = ("picks", listing::all_keys(Keys::<Registers>::of(&[lists::KEYS])).chords());
+        [("registers", Keys::of(BENCH).chords()), list, picks].into_iter().chain(graph).collect()
     }
 }
 

@@ -16,10 +16,29 @@ const STEP_MAX: f64 = 0.05;
 const JUMP: u16 = 0x1000;
 /// A value that does not change is a float only if it was entered by a person: with this many digits at most.
 const DIGITS_MAX: usize = 5;
+/// Registers to either side that are looked at.
+const RUN_MAX: usize = 40;
 /// A counter has risen so often before it is called one.
 const RISES_MIN: usize = 3;
 
 impl Cells {
+    /// The likely type that is shown at a register: of two that share a register only one can be.
+    pub fn marked(&self, table: Table, address: u16) -> Option<(DataType, ByteOrder)> {
+        let likely = |address: &u16| self.likely(table, *address).map(|of| (*address, of));
+        let before = (0..address).rev().map_while(|address| likely(&address)).take(RUN_MAX);
+        let behind = (address..=u16::MAX).map_while(|address| likely(&address)).take(RUN_MAX);
+        let mut run: Vec<(u16, (DataType, ByteOrder))> = before.chain(behind).collect();
+        // The usual order is the likelier one.
+        run.sort_by_key(|(address, (_, order))| (*order != ByteOrder::Abcd, *address));
+        let mut chosen: Vec<u16> = Vec::new();
+        for (start, _) in &run {
+            if chosen.iter().all(|other| 1 < start.abs_diff(*other)) {
+                chosen.push(*start);
+            }
+        }
+        run.into_iter().find(|(start, _)| *start == address && chosen.contains(start)).map(|(_, of)| of)
+    }
+
     /// The type that a register and the next are likely of, by what came in the same responses.
     pub fn likely(&self, table: Table, address: u16) -> Option<(DataType, ByteOrder)> {
         let good = |address| self.get(table, address).filter(|cell| cell.fault.is_none() && !table.is_bits());
@@ -105,6 +124,24 @@ mod tests {
         for (what, pairs, expect) in cases {
             assert_eq!(likely(pairs), expect, "{what}");
         }
+    }
+
+    #[test]
+    fn of_two_likely_readings_that_share_a_register_one_is_marked() {
+        // 100 at 10, from 11 on the same with its words swapped; 50 at 12.
+        let words = [0x42C8, 0, 0x4248, 0];
+        let part = crate::plant::live::LivePart {
+            at: jiff::Timestamp::UNIX_EPOCH,
+            span: crate::plant::live::AddressSpan { table: Table::Holding, address: 10, count: 4 },
+            words: Ok(words.to_vec()),
+        };
+        let mut cells = Cells::default();
+        cells.on_reading(&crate::plant::live::LiveReading { parts: vec![part], ..Default::default() });
+        let all = |of: &dyn Fn(u16) -> Option<(DataType, ByteOrder)>| (10..14).map(of).collect::<Vec<_>>();
+        let float = |order| Some((FLOAT, order));
+        let (abcd, cdab) = (float(ByteOrder::Abcd), float(ByteOrder::Cdab));
+        assert_eq!(all(&|address| cells.likely(Table::Holding, address)), [abcd, cdab, abcd, None]);
+        assert_eq!(all(&|address| cells.marked(Table::Holding, address)), [abcd, None, abcd, None]);
     }
 
     #[test]

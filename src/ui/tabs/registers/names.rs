@@ -37,6 +37,10 @@ pub struct Named {
     pub name: String,
     /// Names of the numbers of an enumeration, before scaling; empty for a quantity.
     pub enum_labels: Vec<(i128, String)>,
+    /// Names of the bits of a status word.
+    pub bit_labels: Vec<(u8, String)>,
+    /// Raw numbers that mean "no value".
+    pub bad_if: Vec<Exact>,
 }
 
 impl Named {
@@ -53,6 +57,8 @@ impl Named {
             unit: String::new(),
             name: name.to_owned(),
             enum_labels: Vec::new(),
+            bit_labels: Vec::new(),
+            bad_if: Vec::new(),
         }
     }
 
@@ -66,8 +72,8 @@ impl Named {
         // As a person would write the product.
         let scale = format!("{}e{power}", tag.scale).parse().unwrap_or(tag.scale);
         let decimals = Decimals::shown(decimals);
-        let enum_labels = tag.enum_labels.clone();
-        Named { scale, offset: tag.offset, decimals, unit, enum_labels, ..plain }
+        let (enum_labels, bit_labels, bad_if) = (tag.enum_labels.clone(), tag.bit_labels.clone(), tag.bad_if.clone());
+        Named { scale, offset: tag.offset, decimals, unit, enum_labels, bit_labels, bad_if, ..plain }
     }
 
     /// Registers or bits that it takes.
@@ -77,7 +83,8 @@ impl Named {
 
     /// Its value, of the words from its address on; `None` where there are too few or they hold no number.
     pub fn value(&self, words: &[u16]) -> Option<Exact> {
-        Some(scale::scaled(self.raw(words)?, self.scale, self.offset, 0))
+        let raw = self.raw(words).filter(|raw| !self.bad_if.contains(raw))?;
+        Some(scale::scaled(raw, self.scale, self.offset, 0))
     }
 
     /// `70.0 °C`, `RUN`; `None` as for [`Named::value`].
@@ -88,6 +95,15 @@ impl Named {
         let raw = self.raw(words)?;
         if let Some((_, label)) = self.enum_labels.iter().find(|(number, _)| Exact::whole(*number) == raw) {
             return Some(label.clone());
+        }
+        if self.bad_if.contains(&raw) {
+            return Some(t!("no value").to_owned());
+        }
+        if !self.bit_labels.is_empty() {
+            let word = raw.as_whole().unwrap_or_default();
+            let set = self.bit_labels.iter().filter(|(bit, _)| word >> bit & 1 == 1).map(|(_, label)| label.as_str());
+            let set: Vec<&str> = set.collect();
+            return Some(if set.is_empty() { raw.to_string() } else { set.join(", ") });
         }
         let value = digits(scale::scaled(raw, self.scale, self.offset, 0), Some(self.decimals));
         Some(if self.unit.is_empty() { value } else { format!("{value} {}", self.unit) })

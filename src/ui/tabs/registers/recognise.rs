@@ -1,18 +1,25 @@
-//! Which device it looks like: asks what the signatures of the device profiles ask, once, behind the values that the
-//! window shows, and gives the registers the names of the profile that fits.
+//! Which device it looks like: walks its SunSpec models, or asks what the signatures of the device profiles ask, once, behind
+//! the values that the window shows, and gives the registers the names of the profile that fits.
 
 use std::sync::Arc;
 
 use super::{LOST_AFTER, Registers, names::Named};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    bus::recognise::{self, Fit},
+    bus::{
+        recognise::{self, Fit},
+        sunspec::Walk,
+    },
     plant::{
         PlantDef,
         live::{AddressSpan, LiveRead, LiveReading},
         tag::TagDef,
     },
+    profile::sunspec::profile_text,
 };
+
+/// The name of the profile that was made of the SunSpec models, until it is saved.
+pub const SUNSPEC: &str = "sunspec";
 
 /// How far it is.
 #[derive(Debug, Default)]
@@ -20,23 +27,57 @@ pub enum Recognition {
     /// Before the first value of the window.
     #[default]
     Waiting,
+    /// Its SunSpec models; number and steady time of the read.
+    Walking { walk: Walk, on_way: Option<(u32, Timestamp)> },
     /// The signature at work, of these; number and steady time of its read.
     Asking { known: Vec<Arc<PlantDef>>, at: usize, on_way: Option<(u32, Timestamp)> },
-    /// The profile that fits, and whether its names were taken; `None`: no profile fits.
-    Done(Option<(Arc<PlantDef>, Fit, bool)>),
+    /// What this profile needs to show its values, which was chosen by hand; number and steady time of the read.
+    Choosing { def: Arc<PlantDef>, on_way: Option<(u32, Timestamp)>, is_read: bool },
+    /// The profile that fits; `None`: no profile fits.
+    Done(Option<Recognised>),
+}
+
+/// A profile that fits.
+#[derive(Debug)]
+pub struct Recognised {
+    /// Its device is the only one of this plant.
+    pub def: Arc<PlantDef>,
+    how: How,
+    /// Its names were taken.
+    is_taken: bool,
+}
+
+/// By what.
+#[derive(Debug, Clone, Copy)]
+enum How {
+    Probes(Fit),
+    /// The device has said so many models.
+    SunSpec(usize),
+    /// It was chosen by hand.
+    Chosen,
 }
 
 impl Recognition {
     /// Is this its read?
     pub fn awaits(&self, number: u32) -> bool {
-        matches!(self, Recognition::Asking { on_way: Some((own, _)), .. } if *own == number)
+        let on_way = match self {
+            Recognition::Walking { on_way, .. }
+            | Recognition::Asking { on_way, .. }
+            | Recognition::Choosing { on_way, .. } => *on_way,
+            Recognition::Waiting | Recognition::Done(_) => None,
+        };
+        on_way.is_some_and(|(own, _)| own == number)
     }
 
     /// The profile whose names were taken.
     pub fn applied(&self) -> Option<&Arc<PlantDef>> {
         match self {
-            Recognition::Done(Some((def, _, true))) => Some(def),
-            Recognition::Waiting | Recognition::Asking { .. } | Recognition::Done(_) => None,
+            Recognition::Done(Some(Recognised { def, is_taken: true, .. })) => Some(def),
+            Recognition::Waiting
+            | Recognition::Walking { .. }
+            | Recognition::Asking { .. }
+            | Recognition::Choosing { .. }
+            | Recognition::Done(_) => None,
         }
     }
 
@@ -44,15 +85,26 @@ impl Recognition {
     pub fn words(&self) -> String {
         match self {
             Recognition::Waiting => String::new(),
+            Recognition::Walking { walk, .. } => match walk.count() {
+                0 => t!("looking for SunSpec").to_owned(),
+                count => t!("SunSpec, {count} models so far", count),
+            },
             Recognition::Asking { known, at, .. } => {
                 t!("recognising, {at} of {count} profiles", at, count = known.len())
             }
-            Recognition::Done(None) => t!("not recognised").to_owned(),
-            Recognition::Done(Some((def, Fit { fits, of, .. }, taken))) => {
+            Recognition::Choosing { def, .. } => t!("reading what {profile} needs", profile = def.name),
+            Recognition::Done(None) => t!("not recognised: f chooses a profile").to_owned(),
+            Recognition::Done(Some(Recognised { def, how, is_taken })) => {
                 let model = def.devices.first().map_or("", |device| device.model.as_str());
-                match taken {
-                    false => t!("looks like {model}: {fits} of {of} probes fit", model, fits, of),
-                    true => t!("names of {model}: {fits} of {of} probes fit", model, fits, of),
+                match (how, is_taken) {
+                    (How::Probes(Fit { fits, of, .. }), false) => {
+                        t!("looks like {model}: {fits} of {of} probes fit", model, fits, of)
+                    }
+                    (How::Probes(Fit { fits, of, .. }), true) => {
+                        t!("names of {model}: {fits} of {of} probes fit", model, fits, of)
+                    }
+                    (How::Chosen, _) => t!("names of {model}, as chosen", model),
+                    (How::SunSpec(count), _) => t!("{model}: {count} SunSpec models", model, count),
                 }
             }
         }
@@ -67,49 +119,120 @@ impl Registers {
             return Vec::new();
         }
         if matches!(self.recognition, Recognition::Waiting) {
-            let known = self.profiles.recognisable();
-            self.recognition = Recognition::Asking { known, at: 0, on_way: None };
+            self.recognition = Recognition::Walking { walk: Walk::default(), on_way: None };
         }
         let now = cx.monotonic_now();
-        let Recognition::Asking { known, at, on_way } = &mut self.recognition else { return Vec::new() };
+        let (spans, on_way) = match &mut self.recognition {
+            Recognition::Walking { walk, on_way } => (walk.next(), on_way),
+            Recognition::Asking { known, at, on_way } => (asked_by(known, *at), on_way),
+            Recognition::Choosing { def, on_way, is_read } => {
+                let spans = asked_by(std::slice::from_ref(def), 0);
+                (spans.filter(|spans| !*is_read && !spans.is_empty()), on_way)
+            }
+            Recognition::Waiting | Recognition::Done(_) => return Vec::new(),
+        };
         if on_way.is_some_and(|(_, sent)| now.duration_since(sent) < LOST_AFTER) {
             return Vec::new();
         }
-        let Some(spans) = known.get(*at).and_then(|def| Some(recognise::spans(def, def.devices.first()?))) else {
-            let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
-            let best = recognise::best(known, &words).map(|(def, fit)| (Arc::clone(def), fit, false));
-            self.recognition = Recognition::Done(best);
-            return Vec::new();
-        };
+        let Some(spans) = spans else { return self.conclude(cx) };
         self.number = self.number.wrapping_add(1);
         *on_way = Some((self.number, now));
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
         vec![UiAction::query(self.tab, self.number, Query::Registers(read))]
     }
 
-    /// Takes what a signature has asked. What could not be read does not fit.
+    /// Takes what was asked. What could not be read does not fit.
     pub(super) fn on_probed(&mut self, cx: &ViewContext, reading: Option<LiveReading>) -> Vec<UiAction> {
-        if let Recognition::Asking { at, on_way, .. } = &mut self.recognition {
-            (*at, *on_way) = (*at + 1, None);
-        }
         if let Some(reading) = reading {
             self.cells.on_reading(&reading);
         }
+        let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
+        match &mut self.recognition {
+            Recognition::Walking { walk, on_way } => {
+                walk.on_words(&words);
+                *on_way = None;
+            }
+            Recognition::Asking { at, on_way, .. } => (*at, *on_way) = (*at + 1, None),
+            Recognition::Choosing { on_way, is_read, .. } => (*on_way, *is_read) = (None, true),
+            Recognition::Waiting | Recognition::Done(_) => {}
+        }
+        self.recognise(cx)
+    }
+
+    /// All was read: what it says.
+    fn conclude(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        match &self.recognition {
+            Recognition::Walking { walk, .. } => match walk.found() {
+                Some(found) => {
+                    let (text, count) = (profile_text(found), found.models.len());
+                    self.profiles.add(SUNSPEC, &text);
+                    if let Some(def) = self.profiles.device(SUNSPEC) {
+                        let how = How::SunSpec(count);
+                        self.recognition = Recognition::Done(Some(Recognised { def, how, is_taken: false }));
+                        // The device itself has said what its registers are.
+                        let is_untouched = (self.first, self.selected) == (0, 0) && self.picking.is_none();
+                        self.apply_names(cx);
+                        return if is_untouched { self.toggle_values(cx) } else { self.read_now(cx) };
+                    }
+                    self.ask_signatures(cx)
+                }
+                None => self.ask_signatures(cx),
+            },
+            Recognition::Asking { known, .. } => {
+                let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
+                let best = recognise::best(known, &words);
+                let best =
+                    best.map(|(def, fit)| Recognised { def: Arc::clone(def), how: How::Probes(fit), is_taken: false });
+                self.recognition = Recognition::Done(best);
+                Vec::new()
+            }
+            Recognition::Choosing { def, .. } => {
+                let chosen = Recognised { def: Arc::clone(def), how: How::Chosen, is_taken: false };
+                self.recognition = Recognition::Done(Some(chosen));
+                self.apply_names(cx);
+                self.read_now(cx)
+            }
+            Recognition::Waiting | Recognition::Done(_) => Vec::new(),
+        }
+    }
+
+    /// Takes a profile that was chosen by hand, in place of the one before.
+    pub(super) fn choose_profile(&mut self, cx: &ViewContext, def: Arc<PlantDef>) -> Vec<UiAction> {
+        let before = self.recognition.applied().cloned();
+        for tag in before.iter().flat_map(|before| &before.tags) {
+            let (table, address) = (tag.point.table, tag.point.address);
+            if self.names.get(table, address).is_some_and(|named| named.name == tag.short) {
+                self.names.remove(table, address);
+            }
+        }
+        self.recognition = Recognition::Choosing { def, on_way: None, is_read: false };
+        self.recognise(cx)
+    }
+
+    /// All profiles, the one that fits best first.
+    pub(super) fn ranked(&self) -> Vec<recognise::Ranked> {
+        let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
+        recognise::ranking(&self.profiles.all(), &words)
+    }
+
+    fn ask_signatures(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let known = self.profiles.recognisable();
+        self.recognition = Recognition::Asking { known, at: 0, on_way: None };
         self.recognise(cx)
     }
 
     /// The names, units and scales of the profile that fits; names that are there already stay.
     pub(super) fn apply_names(&mut self, cx: &ViewContext) {
-        let Recognition::Done(Some((def, _, taken))) = &mut self.recognition else { return };
-        *taken = true;
-        let def = Arc::clone(def);
+        let Recognition::Done(Some(recognised)) = &mut self.recognition else { return };
+        recognised.is_taken = true;
+        let def = Arc::clone(&recognised.def);
         for tag in def.tags.iter().filter(|tag| tag.point.field.is_none() && tag.calculation.is_none()) {
             if self.names.get(tag.point.table, tag.point.address).is_none() {
                 let named = self.named(&def, tag);
                 self.names.put(named);
             }
         }
-        if let Some(first) = def.tags.first() {
+        if let Some(first) = def.tags.first().filter(|_| self.picking.is_none()) {
             (self.table, self.first, self.selected) = (first.point.table, first.point.address, first.point.address);
             self.keep_in_sight(cx);
         }
@@ -119,4 +242,10 @@ impl Registers {
         let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
         Named::of_tag(tag, recognise::scaling(def, tag, &words))
     }
+}
+
+/// What a signature asks; `None` behind the last.
+fn asked_by(known: &[Arc<PlantDef>], at: usize) -> Option<Vec<AddressSpan>> {
+    let def = known.get(at)?;
+    Some(recognise::spans(def, def.devices.first()?))
 }

@@ -2,15 +2,19 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{Asking, Registers, names::Named};
+use super::{Asking, Registers, names::Named, recognise::SUNSPEC};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         PlantDef,
         def::LineDef,
-        tag::{Decimals, Point, TagDef},
+        exact::Exact,
+        tag::{Access, Decimals, Point, TagDef},
     },
-    profile::new_plant::{NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
+    profile::{
+        new_plant::{NewAlarm, NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
+        suggested_alarms::{plausible_alarms, suggested_alarms},
+    },
     ui::Effect,
 };
 
@@ -28,7 +32,7 @@ impl Registers {
     }
 
     /// Writes the plant file, which was loaded before as a check.
-    pub(super) fn save(&self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+    pub(super) fn save(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let mut path = PathBuf::from(text);
         path.set_extension("toml");
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
@@ -37,12 +41,34 @@ impl Registers {
         }
         let here = path.parent().is_none_or(|folder| folder.as_os_str().is_empty());
         let beside = |def: &Arc<PlantDef>| self.profiles.beside(&def.name);
-        if let Some(profile) = self.recognition.applied().and_then(beside).filter(|_| !here) {
+        let applied = self.recognition.applied();
+        // What was made of the models of the device is not on the disk yet, and goes beside the plant file.
+        let made =
+            applied.filter(|def| def.name == SUNSPEC).and_then(|_| self.profiles.text(SUNSPEC)).map(str::to_owned);
+        if let Some(profile) = applied.and_then(beside).filter(|_| !here && made.is_none()) {
             return Err(t!("{profile} would not be found from there: save the plant file beside it", profile));
         }
-        let plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
-        let bytes = plant.text(&self.profiles)?.into_bytes();
-        Ok(vec![UiAction::Do(Effect::SaveReport { tab: Some(Tab::Registers), path, bytes, new: true })])
+        let mut plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
+        let Some(made) = made else {
+            let bytes = plant.text(&self.profiles)?.into_bytes();
+            return Ok(vec![save_new(path, bytes)]);
+        };
+        let name = format!("{}_{SUNSPEC}", plain_name(&stem).replace('.', "_"));
+        let mut profiles = self.profiles.clone();
+        profiles.add(&name, &made);
+        plant.devices.iter_mut().filter_map(|device| device.profile.as_mut()).for_each(|of| of.0.clone_from(&name));
+        let bytes = plant.text(&profiles)?.into_bytes();
+        let profile = path.with_file_name(format!("{name}.toml"));
+        self.saved_next = Some((path, bytes));
+        Ok(vec![save_new(profile, made.into_bytes())])
+    }
+
+    /// A file was written, or not; behind a profile the plant file that names it.
+    pub(super) fn on_written(&mut self, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        match (self.saved_next.take(), result) {
+            (Some((path, bytes)), Ok(_)) => vec![save_new(path, bytes)],
+            (_, result) => vec![outcome(result)],
+        }
     }
 
     fn new_plant(&self, cx: &ViewContext, stem: &str) -> Option<NewPlant> {
@@ -52,7 +78,9 @@ impl Registers {
         let mut taken: Vec<String> = Vec::new();
         let tags = self.names.iter().filter(|named| !profile.is_some_and(|profile| is_of(named, &profile.tags)));
         let tags = tags.map(|named| {
-            let tag = tag_of(named, &taken);
+            let is_written = self.writing.has_written(self.unit, named.table, named.address);
+            let access = if is_written { Access::ReadWrite } else { Access::Read };
+            let tag = TagDef { access, ..tag_of(named, &taken) };
             taken.push(tag.short.clone());
             tag
         });
@@ -69,18 +97,40 @@ impl Registers {
             title: def.title.clone(),
             time_zone: def.time_zone.iana_name().unwrap_or("UTC").to_owned(),
             lines: vec![(line, self.replies)],
+            alarms: self.alarms_of(&device, profile),
             devices: vec![device],
-            alarms: Vec::new(),
             shifts: usual_shifts(),
         })
     }
 }
 
 impl Registers {
+    /// Those that the profile suggests, and limits beyond what was read of the rest.
+    fn alarms_of(&self, device: &NewDevice, profile: Option<&Arc<PlantDef>>) -> Vec<NewAlarm> {
+        let of_profile = profile.map(|profile| suggested_alarms(&device.name, &profile.tags)).unwrap_or_default();
+        let seen = |tag: &TagDef| {
+            let (table, address) = (tag.point.table, tag.point.address);
+            let named = self.names.get(table, address)?;
+            let now = self.cells.held(table, address, named.len()).and_then(|words| named.value(&words));
+            let cell = self.cells.get(table, address).filter(|_| named.len() == 1);
+            let before = cell.into_iter().flat_map(|cell| &cell.seen).filter_map(|(_, word)| named.value(&[*word]));
+            let values = before.chain(now).map(Exact::near);
+            values.fold(None, |range: Option<(f64, f64)>, value| {
+                Some(range.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
+            })
+        };
+        of_profile.into_iter().chain(plausible_alarms(&device.name, &device.tags, &seen)).collect()
+    }
+
     /// Shows a register list before it is taken; or says why it is none.
     pub(super) fn load_list(&mut self, cx: &ViewContext, text: &str) -> Vec<UiAction> {
         self.preview(cx, text).unwrap_or_else(|why| vec![no_list(why)])
     }
+}
+
+/// Writes a file that is not there yet.
+fn save_new(path: PathBuf, bytes: Vec<u8>) -> UiAction {
+    UiAction::Do(Effect::SaveReport { tab: Some(Tab::Registers), path, bytes, new: true })
 }
 
 /// Why nothing is loaded.
@@ -89,7 +139,7 @@ pub fn no_list(why: String) -> UiAction {
 }
 
 /// What became of the file.
-pub fn outcome(result: Result<PathBuf, String>) -> UiAction {
+fn outcome(result: Result<PathBuf, String>) -> UiAction {
     let words = match result {
         Ok(path) => vec![
             t!("saved {path}", path = path.display()),

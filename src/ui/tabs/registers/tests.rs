@@ -2,6 +2,7 @@
 
 mod compare;
 mod keep;
+mod lists;
 mod map;
 mod watch;
 
@@ -239,6 +240,8 @@ fn a_value_is_found_raw_scaled_and_as_a_float() {
     for (typed, address) in [("700", 1002), ("70.0", 1002), ("0x2BC", 1002), ("104.69", 1012)] {
         bench.model.tabs.registers.selected = 1000;
         bench.keys(&format!("/{typed}⏎"));
+        assert!(bench.screen(120, 40).contains(&format!("where {typed} may be")), "{}", bench.screen(120, 40));
+        bench.keys("⏎");
         assert_eq!((bench.model.tabs.registers.selected, &bench.model.modal), (address, &None), "{typed}");
     }
     bench.keys("/4711⏎");

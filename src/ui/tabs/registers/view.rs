@@ -40,13 +40,6 @@ pub fn rows(tab: &Registers, height: u16) -> usize {
     usize::from(height.saturating_sub(HEAD + below)).max(1)
 }
 
-/// What words may mean as numbers, in this byte order.
-pub fn meanings(words: &[u16], order: ByteOrder) -> Vec<f64> {
-    let kinds = [DataType::U16, DataType::I16, DataType::U32, DataType::I32, DataType::F32, DataType::Bcd16];
-    let number = |kind| interpret::number(kind, order, words).map(Exact::near);
-    kinds.into_iter().filter_map(number).collect()
-}
-
 /// Draws the tab.
 pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     heading(tab, cx, canvas);
@@ -250,7 +243,7 @@ fn row(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas, y: u16, address: 
         let (value, _) = named_text(tab, cx, named);
         let (x, room) = name_column(&at, canvas.width());
         canvas.text(x, y, &pad(&format!("{}  {value}", named.name), room), style);
-    } else if let Some((kind, order)) = tab.cells.likely(tab.table, address)
+    } else if let Some((kind, order)) = tab.cells.marked(tab.table, address)
         && at.hint < canvas.width()
     {
         let order = order.word();

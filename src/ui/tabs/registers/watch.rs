@@ -241,7 +241,17 @@ impl Registers {
         if self.watch.items.is_empty() {
             return notice(t!("Nothing is watched yet: p puts the selected register on the list.").to_owned());
         }
-        self.begin_log(PathBuf::from(draw::local(cx, cx.now, "registers-%Y%m%d-%H%M%S.csv")))
+        self.asking = Asking::Log;
+        let usual = draw::local(cx, cx.now, "registers-%Y%m%d-%H%M%S.csv");
+        let hint = t!("a new CSV file; an existing file is never overwritten");
+        vec![UiAction::Open(Modal::Prompt(Prompt::new(t!("log what is watched"), hint, &usual)))]
+    }
+
+    pub(super) fn log_typed(&mut self, text: &str) -> Result<Vec<UiAction>, String> {
+        match text {
+            "" => Err(t!("expected the name of a file such as log.csv").to_owned()),
+            _ => Ok(self.begin_log(PathBuf::from(text))),
+        }
     }
 
     /// Begins a log of the list in a new file.

@@ -7,7 +7,7 @@ use crate::{
     access::right::needs_for_query,
     plant::{
         command::Refusal,
-        live::{AddressSpan, LiveRead},
+        live::{AddressSpan, LiveRead, SPANS_MAX},
         number::to_u32,
     },
     ui::{rights, tabs::prelude::*},
@@ -66,7 +66,8 @@ impl Registers {
         let span = self.span(cx);
         let relearn = std::mem::take(&mut self.relearn);
         let spans = std::iter::once(span).chain(self.watched_spans(span));
-        let spans = spans.chain(self.preview.iter().flat_map(Preview::spans)).collect();
+        let spans = spans.chain(self.preview.iter().flat_map(Preview::spans));
+        let spans = spans.chain(self.listed_spans.iter().copied()).take(SPANS_MAX).collect();
         let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
         let silent = cx.def().listens_on(self.line).then(|| Refusal::OnlyListens.to_string());
         if let Some(why) = silent.or_else(|| rights::lacks(cx, needs_for_query(&query))) {

@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod tests;
 
+use super::AddressSpan;
 use super::{
     Registers,
     names::{Named, Names},
@@ -83,6 +84,17 @@ impl Writing {
         };
         let unknown = Outcome::Refused(Refusal::Exception(ExceptionCode::ILLEGAL_FUNCTION));
         self.list.iter().rev().find(same).is_some_and(|last| last.write.multiple != (last.outcome == unknown))
+    }
+
+    /// Was it written here, with success?
+    pub fn has_written(&self, unit: u8, table: Table, address: u16) -> bool {
+        self.list.iter().any(|ListedWrite { write, outcome, .. }| {
+            let range =
+                AddressSpan { table: write.table, address: write.address, count: to_u16(write.words.len()) }.range();
+            *outcome == Outcome::Verified
+                && (write.unit, write.table) == (unit, table)
+                && range.contains(&u32::from(address))
+        })
     }
 
     /// All of them, the latest first.

@@ -31,6 +31,19 @@ fn before_a_login_every_other_tab_is_closed_and_alarms_are_seen() {
 }
 
 #[test]
+fn the_first_user_is_asked_for_only_where_nothing_may_be_seen() {
+    for (may_view, expect) in [(true, false), (false, true)] {
+        let first = SessionStatus { needs_first_supervisor: true, may_view, ..closed() };
+        let model = with(&Fixture::normal(), first);
+        assert_eq!(model.tabs.shown == Tab::Login, expect, "{may_view}");
+    }
+    // As a terminal hears it: closed until the station has said what may be seen.
+    let mut model = with(&Fixture::normal(), SessionStatus { needs_first_supervisor: true, ..closed() });
+    change_session(&mut model, |session| session.may_view = true);
+    assert_eq!(model.tabs.shown, Tab::Mimic);
+}
+
+#[test]
 fn an_anonymous_view_shows_the_process_and_takes_no_action() {
     let mut model = with(&Fixture::normal(), SessionStatus { may_view: true, ..closed() });
     assert_eq!(model.tabs.shown, Tab::Mimic);

@@ -14,4 +14,6 @@ fn a_map_of_the_shown_table_is_asked_for_and_shown() {
     assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(LineId(0), Diagnostic::Sweep(wanted))));
     let shown = bench.screen(80, 24);
     assert!(shown.contains("‹Test›"), "its page shows the map as it grows: {shown}");
+    bench.keys("⎋");
+    assert_eq!(bench.model.tabs.shown, Tab::Registers, "Esc leads back to where it was asked for");
 }

@@ -30,7 +30,7 @@ fn a_log_has_a_row_for_every_read_and_no_old_value() {
     bench.keys("⎋j1002⏎");
     bench.answer(0, device);
     bench.keys("eSV int16 0.1 °C⏎p");
-    bench.keys("R");
+    bench.keys("R⏎");
     bench.answer(1, device);
     bench.answer(2, |address| if address == 1002 { Some(701) } else { device(address) });
     let (id, read) = bench.asked.pop().expect("a query");
@@ -55,7 +55,7 @@ fn a_read_for_a_key_adds_no_row_and_keeps_the_rhythm() {
     let mut bench = Bench::new();
     bench.keys("j1002⏎");
     bench.answer(0, device);
-    bench.keys("eSV int16 0.1 °C⏎pR");
+    bench.keys("eSV int16 0.1 °C⏎pR⏎");
     bench.answer(1, device);
     for _ in 0..3 {
         bench.keys("j1010⏎");
@@ -72,7 +72,7 @@ fn a_log_says_when_its_values_became_old() {
     let mut bench = Bench::new();
     bench.keys("j1002⏎");
     bench.answer(0, device);
-    bench.keys("pR");
+    bench.keys("pR⏎");
     bench.answer(1, device);
     bench.snapshot(2, LineState::Connected);
     assert_eq!(bench.rows.len(), 2, "a heading and a value: {:?}", bench.rows);
@@ -91,7 +91,7 @@ fn a_log_that_cannot_be_written_ends_and_says_why() {
     let mut bench = Bench::new();
     bench.keys("j1002⏎");
     bench.answer(0, device);
-    bench.keys("pR");
+    bench.keys("pR⏎");
     bench.send(Msg::Saved(Some(Tab::Registers), Err("bench.toml: exists".to_owned())));
     assert!(bench.screen(120, 40).contains("nothing was saved"), "another file than the log");
     bench.keys("⎋");

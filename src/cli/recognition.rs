@@ -1,0 +1,138 @@
+//! What the units of a line are: their SunSpec models, or the device profile whose signature they fit, over a station without
+//! history, as `open` does.
+
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
+
+use super::{CliError, open, paths, source};
+use crate::{
+    bus::{
+        recognise::{self, Ranked},
+        sunspec::Walk,
+    },
+    history::{Answer, Query},
+    plant::{
+        PlantDef,
+        def::{LineDef, LineId},
+        live::{AddressSpan, LiveRead, LiveReading, ReplyTimes},
+        tag::Table,
+    },
+    profile::sunspec::SunSpecDevice,
+    station::Session,
+};
+
+/// Replies from which the timeout is learned.
+const REPLIES: usize = 20;
+/// A live read of a line that does not even connect is given up.
+const READ_MAX: Duration = Duration::from_secs(30);
+/// The models of a device are all found with so many reads, or their number is false.
+const WALK_MAX: usize = 400;
+
+/// What was found at a unit.
+pub struct FoundUnit {
+    /// Its address.
+    pub unit: u8,
+    /// Its first holding register can be read.
+    pub has_register: bool,
+    /// The device that it is.
+    pub kind: FoundKind,
+}
+
+/// What a unit is.
+pub enum FoundKind {
+    /// A device that says itself what it has.
+    SunSpec(SunSpecDevice),
+    /// It is none, and may be one of these, the likeliest first.
+    Other(Vec<Ranked>),
+}
+
+/// Asks every unit, and then as long as it takes to learn the timeout of the line.
+pub async fn recognise_all(
+    line: &LineDef,
+    units: &[(u8, bool)],
+    known: &[Arc<PlantDef>],
+) -> Result<(Vec<FoundUnit>, ReplyTimes), CliError> {
+    let station = open::bench_station(line.clone(), units.first().map_or(1, |(unit, _)| *unit));
+    let session = station.session(&paths::operator());
+    let (mut found, mut replies) = (Vec::new(), ReplyTimes::default());
+    for (unit, has_register) in units.iter().copied() {
+        let mut asked = Asked { session: &session, unit, words: BTreeMap::new(), replies: &mut replies };
+        let kind = match asked.walk().await? {
+            Some(device) => FoundKind::SunSpec(device),
+            None => asked.rank(known).await?,
+        };
+        found.push(FoundUnit { unit, has_register, kind });
+    }
+    for (unit, _) in units.iter().cycle().take(2 * REPLIES) {
+        if replies.timeout().is_some() {
+            break;
+        }
+        let first = AddressSpan { table: Table::Holding, address: 0, count: 1 };
+        Asked { session: &session, unit: *unit, words: BTreeMap::new(), replies: &mut replies }
+            .read(vec![first])
+            .await?;
+    }
+    station.stop().await;
+    Ok((found, replies))
+}
+
+/// The SunSpec models of a unit; `None` where it has none.
+pub async fn sunspec(line: &LineDef, unit: u8) -> Result<Option<SunSpecDevice>, CliError> {
+    let station = open::bench_station(line.clone(), unit);
+    let session = station.session(&paths::operator());
+    let mut replies = ReplyTimes::default();
+    let found = Asked { session: &session, unit, words: BTreeMap::new(), replies: &mut replies }.walk().await;
+    station.stop().await;
+    found
+}
+
+/// A unit that is asked, and what it has said.
+struct Asked<'a> {
+    session: &'a Session,
+    unit: u8,
+    words: BTreeMap<(Table, u32), u16>,
+    replies: &'a mut ReplyTimes,
+}
+
+impl Asked<'_> {
+    async fn walk(&mut self) -> Result<Option<SunSpecDevice>, CliError> {
+        let mut walk = Walk::default();
+        let mut requests = 0;
+        while let Some(spans) = walk.next() {
+            if requests == WALK_MAX {
+                walk.cut();
+                break;
+            }
+            requests += 1;
+            self.read(spans).await?;
+            walk.on_words(&|span| self.held(span));
+        }
+        Ok(walk.found().cloned())
+    }
+
+    async fn rank(&mut self, known: &[Arc<PlantDef>]) -> Result<FoundKind, CliError> {
+        for def in known {
+            let spans = def.devices.first().map(|device| recognise::spans(def, device)).unwrap_or_default();
+            self.read(spans).await?;
+        }
+        Ok(FoundKind::Other(recognise::ranking(known, &|span| self.held(span))))
+    }
+
+    /// Good words from an address on, as many as were read.
+    fn held(&self, span: AddressSpan) -> Vec<u16> {
+        span.range().map_while(|address| self.words.get(&(span.table, address)).copied()).collect()
+    }
+
+    async fn read(&mut self, spans: Vec<AddressSpan>) -> Result<(), CliError> {
+        let read = LiveRead { line: LineId(0), unit: self.unit, spans, not_before: None, relearn: false };
+        let answer = tokio::time::timeout(READ_MAX, source::query_station(self.session, Query::Registers(read))).await;
+        let lost = || CliError::Failed(format!("unit {}: the line is not connected any more", self.unit));
+        let Answer::Registers(reading) = answer.map_err(|_| lost())?? else { return Err(source::unexpected()) };
+        let LiveReading { response_time, parts, .. } = reading;
+        response_time.into_iter().for_each(|time| self.replies.see(time));
+        for part in parts {
+            let cells = part.span.range().zip(part.words.unwrap_or_default());
+            self.words.extend(cells.map(|(address, word)| ((part.span.table, address), word)));
+        }
+        Ok(())
+    }
+}

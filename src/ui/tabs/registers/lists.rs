@@ -1,0 +1,264 @@
+//! What can be chosen from a list: every value that has a name, a device profile, a place that holds what is looked for.
+
+use std::sync::Arc;
+
+use super::{Registers, find, names::Named, view::named_text};
+use crate::bus::recognise;
+use crate::plant::{
+    PlantDef,
+    address::AddressBase,
+    live::{AddressSpan, LiveRead, SPANS_MAX},
+    tag::{ByteOrder, Table},
+};
+use crate::ui::tabs::prelude::*;
+
+/// Rows around the selected one that are read, to either side.
+const READ_MAX: usize = 40;
+/// Registers that are read although no row has them, rather than with a request of their own.
+const GAP_MAX: u32 = 8;
+/// Columns of a value: a text or the names of many bits are cut.
+const VALUE_WIDTH: u16 = 28;
+/// Registers of one request.
+const REQUEST_MAX: u32 = 125;
+
+/// The page.
+pub type Picking = List<Picks>;
+
+/// What is listed.
+#[derive(Debug)]
+pub struct Picks {
+    what: What,
+    rows: Vec<Pick>,
+}
+
+/// Of what.
+#[derive(Debug, Clone, PartialEq)]
+pub enum What {
+    /// Everything that has a name.
+    Values,
+    /// Device profiles, the likeliest first.
+    Profiles,
+    /// Where a number may be, as it was typed.
+    Hits(String),
+}
+
+/// A row.
+#[derive(Debug, Clone)]
+pub struct Pick {
+    id: usize,
+    group: String,
+    name: String,
+    value: String,
+    note: String,
+    target: Target,
+}
+
+/// What a row leads to.
+#[derive(Debug, Clone)]
+pub enum Target {
+    /// Registers, and the order to see them in.
+    Place(AddressSpan, Option<ByteOrder>),
+    /// A profile.
+    Profile(Arc<PlantDef>),
+}
+
+impl Listing for Picks {
+    type Answer = ();
+    type Row = Pick;
+    type Id = usize;
+
+    fn heading<'a>(&self, _cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
+        match &self.what {
+            What::Values => Heading::new(t!("values with names"), t!("nothing has a name yet")),
+            What::Profiles => Heading::new(t!("device profiles, the likeliest first"), t!("no profile")),
+            What::Hits(text) => {
+                Heading::new(t!("where {text} may be", text), t!("in none of the registers read so far"))
+            }
+        }
+    }
+
+    fn rows<'a>(&'a self, _cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, Pick>> {
+        self.rows.iter().map(Cow::Borrowed).collect()
+    }
+
+    fn id(row: &Pick) -> usize {
+        row.id
+    }
+
+    fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<Pick>> {
+        let [group, name, value, note] = match self.what {
+            What::Values => [t!("group"), t!("name"), t!("now"), t!("address")],
+            What::Profiles => [t!("model"), t!("profile"), t!("probes fit"), t!("why not")],
+            What::Hits(_) => [t!("address"), t!("type"), t!("likelihood"), t!("as")],
+        };
+        vec![
+            Column::words(group, |_, row: &Pick| row.group.clone()),
+            Column::words(name, |_, row: &Pick| row.name.clone()),
+            Column::number(value, |_, row: &Pick| row.value.clone()),
+            rest(10, note, |_, row: &Pick, room| fit(&row.note, room)),
+        ]
+    }
+}
+
+/// A row of the tables here.
+type Key = keys::Key<Registers>;
+
+/// Its own keys; those of every list come with it.
+pub const KEYS: &[Key] = &[
+    Key::new(code(KeyCode::Enter), "choose", "go there, or take the names of this profile", Registers::choose),
+    Key::elsewhere(code(KeyCode::Esc), "back", "back to the registers"),
+];
+
+impl Registers {
+    /// Shows everything that has a name, or goes back.
+    pub(super) fn toggle_values(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.list_of(cx, What::Values)
+    }
+
+    /// Shows the device profiles.
+    pub(super) fn list_profiles(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        self.list_of(cx, What::Profiles)
+    }
+
+    pub(super) fn list_of(&mut self, cx: &ViewContext, what: What) -> Vec<UiAction> {
+        let rows = self.picks(cx, &what);
+        self.picking = Some(List::new(Picks { what, rows }));
+        self.follow_list(cx);
+        self.read_now(cx)
+    }
+
+    /// What is listed now, and what must be read for it.
+    pub(super) fn follow_list(&mut self, cx: &ViewContext) {
+        let Some(picking) = &self.picking else { return self.listed_spans.clear() };
+        let what = picking.of.what.clone();
+        if what == What::Values {
+            let rows = self.picks(cx, &what);
+            self.picking.iter_mut().for_each(|picking| picking.of.rows.clone_from(&rows));
+        }
+        let Some(picking) = self.picking.as_ref().filter(|_| what == What::Values) else {
+            return self.listed_spans.clear();
+        };
+        let (rows, selected) = (picking.rows(cx), picking.selected(cx).map(|row| row.id));
+        let at = rows.iter().position(|row| Some(row.id) == selected).unwrap_or(0);
+        let near = rows.iter().skip(at.saturating_sub(READ_MAX)).take(2 * READ_MAX);
+        let spans = near.filter_map(|row| if let Target::Place(span, _) = row.target { Some(span) } else { None });
+        self.listed_spans = joined(spans.collect());
+    }
+
+    fn picks(&self, cx: &ViewContext, what: &What) -> Vec<Pick> {
+        let mut rows = match what {
+            What::Values => self.names.iter().map(|named| self.value_row(cx, named)).collect(),
+            What::Profiles => self.profile_rows(),
+            What::Hits(text) => self.hit_rows(text),
+        };
+        rows.iter_mut().enumerate().for_each(|(n, row)| row.id = n);
+        rows
+    }
+
+    fn value_row(&self, cx: &ViewContext, named: &Named) -> Pick {
+        let (group, name) = named.name.split_once('.').unwrap_or(("", &named.name));
+        let span = AddressSpan { table: named.table, address: named.address, count: named.len() };
+        Pick {
+            id: 0,
+            group: group.to_owned(),
+            name: name.to_owned(),
+            value: fit(&named_text(self, cx, named).0, VALUE_WIDTH),
+            note: self.place_words(span.table, span.address),
+            target: Target::Place(span, None),
+        }
+    }
+
+    fn profile_rows(&self) -> Vec<Pick> {
+        let row = |ranked: recognise::Ranked| {
+            let recognise::Ranked { def, fit, misses } = ranked;
+            let note = match misses.first() {
+                _ if fit.of == 0 => t!("it has no signature").to_owned(),
+                None => String::new(),
+                Some(recognise::Miss { tag, read: Some(read), expected }) => {
+                    t!("{tag} is {read}, expected {expected}", tag, read, expected)
+                }
+                Some(recognise::Miss { tag, read: None, .. }) => t!("{tag} cannot be read", tag),
+            };
+            let value = if fit.of == 0 { "–".to_owned() } else { t!("{fits} of {of}", fits = fit.fits, of = fit.of) };
+            let group = def.devices.first().map(|device| device.model.clone()).unwrap_or_default();
+            Pick { id: 0, group, name: def.name.clone(), value, note, target: Target::Profile(def) }
+        };
+        self.ranked().into_iter().map(row).collect()
+    }
+
+    fn hit_rows(&self, text: &str) -> Vec<Pick> {
+        let row = |hit: find::Hit| {
+            let span = AddressSpan { table: hit.table, address: hit.address, count: hit.kind.registers() };
+            let scale =
+                if hit.decimals == 0 { String::new() } else { format!(" ÷{}", 10u32.pow(hit.decimals.into())) };
+            Pick {
+                id: 0,
+                group: self.place_words(hit.table, hit.address),
+                name: format!("{} {}{scale}", hit.kind, hit.order.word()),
+                value: format!("{} %", hit.likelihood),
+                note: hit.shown,
+                target: Target::Place(span, Some(hit.order)),
+            }
+        };
+        self.hits(text).into_iter().map(row).collect()
+    }
+
+    fn place_words(&self, table: Table, address: u16) -> String {
+        match self.base {
+            AddressBase::Modicon => table.modicon(address),
+            AddressBase::Zero => format!("{} {address}", translate(table.word())),
+            AddressBase::One => format!("{} {}", translate(table.word()), u32::from(address) + 1),
+        }
+    }
+
+    /// Lists every place that may hold a number; first what a map has found is read.
+    pub(super) fn find(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+        find::check(text)?;
+        let spans = self.swept(cx);
+        if spans.is_empty() {
+            return Ok(self.list_of(cx, What::Hits(text.to_owned())));
+        }
+        self.number = self.number.wrapping_add(1);
+        self.hunt = Some((self.number, text.to_owned()));
+        let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
+        Ok(vec![UiAction::query(self.tab, self.number, Query::Registers(read))])
+    }
+
+    /// Does what the selected row leads to.
+    fn choose(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let chosen = self.picking.as_ref().and_then(|picking| picking.selected(cx)).map(|row| row.target.clone());
+        self.picking = None;
+        match chosen {
+            Some(Target::Place(span, order)) => self.go_to(cx, span, order),
+            Some(Target::Profile(def)) => return self.choose_profile(cx, def),
+            None => {}
+        }
+        self.read_now(cx)
+    }
+
+    pub(super) fn go_to(&mut self, cx: &ViewContext, span: AddressSpan, order: Option<ByteOrder>) {
+        (self.table, self.selected) = (span.table, span.address);
+        self.order = order.unwrap_or(self.order);
+        self.keep_in_sight(cx);
+    }
+}
+
+/// As few spans as these registers need, in the order of their addresses.
+fn joined(mut spans: Vec<AddressSpan>) -> Vec<AddressSpan> {
+    spans.sort_unstable();
+    let mut all: Vec<AddressSpan> = Vec::new();
+    for span in spans {
+        let joins = |last: &AddressSpan| {
+            let whole = span.range().end.max(last.range().end) - last.range().start;
+            last.table == span.table && span.range().start <= last.range().end + GAP_MAX && whole <= REQUEST_MAX
+        };
+        match all.last_mut() {
+            Some(last) if joins(last) => {
+                last.count = to_u16(span.range().end.max(last.range().end) - last.range().start)
+            }
+            _ => all.push(span),
+        }
+    }
+    all.truncate(SPANS_MAX / 2);
+    all
+}
