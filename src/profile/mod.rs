@@ -30,6 +30,7 @@ mod expr;
 mod interlock;
 mod history;
 pub(crate) mod io;
+mod library;
 pub mod line;
 mod lint;
 pub(crate) mod names;
@@ -71,6 +72,7 @@ pub(crate) use self::units::{is_known as is_known_unit, of as unit_of};
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search, list, text_of},
+    library::{Card, cards, find_cards},
     own::OwnProfiles,
     set_file::{read_set, text_of_set},
 };
@@ -154,6 +156,8 @@ pub struct Listed {
     pub kind: Kind,
     /// `fuji_pxr`.
     pub name: String,
+    /// The folder of its kind of device, as `controllers`; empty where it lies in none.
+    pub folder: String,
     /// The file it comes from; `None` if it is shipped in the program.
     pub from: Option<PathBuf>,
 }
