@@ -6,7 +6,7 @@ use nucleo_matcher::{
 };
 use serde::Deserialize;
 
-use super::{Kind, Listed, Search, io, list};
+use super::{Listed, plant::Text};
 
 /// A device profile at a glance.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -50,16 +50,14 @@ struct Repeat {
     tag: Vec<Row>,
 }
 
-/// All device profiles, the kinds of device one after the other; one that cannot be read has only its name.
-pub fn cards(search: &Search) -> Vec<Card> {
-    let devices = list(search).into_iter().filter(|listed| listed.kind == Kind::Device);
-    let mut cards: Vec<Card> = devices.map(|listed| card(listed, search)).collect();
+/// The cards of device profiles, the kinds of device one after the other; one without a text has only its name.
+pub(super) fn cards(texts: impl Iterator<Item = (Listed, Option<Text>)>) -> Vec<Card> {
+    let mut cards: Vec<Card> = texts.map(|(listed, text)| card(listed, text)).collect();
     cards.sort_by(|a, b| (&a.listed.folder, &a.listed.name).cmp(&(&b.listed.folder, &b.listed.name)));
     cards
 }
 
-fn card(listed: Listed, search: &Search) -> Card {
-    let text = io::device(&listed.name, search).ok().flatten();
+fn card(listed: Listed, text: Option<Text>) -> Card {
     let text = text.map(|text| String::from_utf8_lossy(&text.bytes).into_owned()).unwrap_or_default();
     let File { vendor, model, status, source, tag, repeat } = toml::from_str(&text).unwrap_or_default();
     let repeated = repeat.iter().flat_map(Repeat::tags);

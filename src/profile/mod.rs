@@ -72,7 +72,7 @@ pub(crate) use self::units::{is_known as is_known_unit, of as unit_of};
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search, list, text_of},
-    library::{Card, cards, find_cards},
+    library::{Card, find_cards},
     own::OwnProfiles,
     set_file::{read_set, text_of_set},
 };
@@ -147,6 +147,15 @@ fn shipped_device(name: &str) -> Option<plant::Text> {
 /// The names of all device profiles of the program.
 fn shipped_devices() -> impl Iterator<Item = String> {
     io::list(&Search::shipped()).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name)
+}
+
+/// All device profiles at a glance, the kinds of device one after the other.
+pub fn cards(search: &Search) -> Vec<Card> {
+    let devices = list(search).into_iter().filter(|listed| listed.kind == Kind::Device);
+    library::cards(devices.map(|listed| {
+        let text = io::device(&listed.name, search).ok().flatten();
+        (listed, text)
+    }))
 }
 
 /// A plant or device profile that could be loaded by its name.
