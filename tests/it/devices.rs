@@ -82,6 +82,7 @@ const DEVICES: &[&str] = &[
 async fn shipped_devices_are_simulated_and_survive_every_fault() {
     for name in DEVICES {
         let mut def = load(name);
+        assert!(!def.tags.is_empty(), "{name} has tags");
         for tag in def.tags.iter_mut().filter(|tag| tag.access != Access::Write && tag.poll == Poll::Never) {
             tag.poll = Poll::Every(Duration::from_secs(10));
         }
