@@ -1,17 +1,20 @@
-//! Makes the prebuilt DuckDB library present before the link, checks it, and lets the binary find it when it starts.
+//! Packs the profiles into one archive, which the program unpacks from; makes the prebuilt DuckDB library present before the
+//! link, checks it, and lets the binary find it when it starts.
 //!
-//! It is what `DUCKDB_LIB_DIR` already holds, or comes from the npm package that ships it. Either way its SHA-256 must be the
+//! The library is what `DUCKDB_LIB_DIR` already holds, or comes from the npm package that ships it. Either way its SHA-256 must be the
 //! one that is known here, or the one that `DUCKDB_LIB_SHA256` states.
-//! With the feature `bundled` DuckDB is compiled from source and nothing of this happens.
+//! With the feature `bundled` DuckDB is compiled from source and nothing of this happens to a library.
 
 use std::{
     env, fs,
+    io::Write,
     os::unix::fs::symlink,
     path::{Path, PathBuf},
     process::Command,
 };
 
 use sha2::{Digest, Sha256};
+use zip::{ZipWriter, result::ZipResult, write::SimpleFileOptions};
 
 const VERSION: &str = "1.5.6";
 const LIBRARY: &str = "libduckdb.so";
@@ -23,6 +26,10 @@ const NPM_X64: (&str, &str) =
 fn main() {
     println!("cargo:rerun-if-env-changed=DUCKDB_LIB_DIR");
     println!("cargo:rerun-if-env-changed=DUCKDB_LIB_SHA256");
+    println!("cargo:rerun-if-changed=profiles");
+    if let Err(why) = pack_profiles() {
+        panic!("the profiles cannot be packed: {why}");
+    }
     if env::var_os("CARGO_FEATURE_BUNDLED").is_some() {
         return;
     }
@@ -46,6 +53,31 @@ fn main() {
             folder.display()
         );
     }
+}
+
+/// A profile is text that packs to a fifth; the same files always make the same archive.
+fn pack_profiles() -> ZipResult<()> {
+    let root = Path::new("profiles");
+    let mut archive = ZipWriter::new(fs::File::create(out_dir().join("profiles.zip"))?);
+    let mut files = Vec::new();
+    let mut folders = vec![root.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder)? {
+            let path = entry?.path();
+            match path.extension() {
+                _ if path.is_dir() => folders.push(path),
+                Some(ending) if ending == "toml" || ending == "txt" => files.push(path),
+                _ => {}
+            }
+        }
+    }
+    files.sort();
+    for file in &files {
+        let inside = file.strip_prefix(root).unwrap_or(file).to_string_lossy();
+        archive.start_file(inside, SimpleFileOptions::default().last_modified_time(zip::DateTime::default()))?;
+        archive.write_all(&fs::read(file)?)?;
+    }
+    archive.finish().map(drop)
 }
 
 fn lib_dir() -> PathBuf {

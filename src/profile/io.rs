@@ -3,20 +3,17 @@
 pub mod atomic;
 pub mod regular;
 mod save;
+mod shipped;
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
+    sync::LazyLock,
 };
-
-use include_dir::{Dir, include_dir};
 
 use super::{Kind, Listed, diagnostic::Errors, plant::Text};
 
 pub use save::PlantFile;
-
-/// The profiles that come with the program: a new device is one more file here and no Rust.
-static SHIPPED: Dir = include_dir!("$CARGO_MANIFEST_DIR/profiles");
 
 /// A profile is some kilobytes; whatever is larger than this is something else.
 const BYTES_MAX: u64 = 4 << 20;
@@ -32,7 +29,8 @@ pub fn config_folder() -> Option<PathBuf> {
 
 /// Configuration folders that are looked into before the shipped profiles, the first one first.
 ///
-/// In each, a device profile is `devices/NAME.toml` or `NAME.toml`, a plant is `plants/NAME.toml`.
+/// In each, a device profile is `devices/NAME.toml`, `NAME.toml` or `devices/FOLDER/NAME.toml`, a plant is
+/// `plants/NAME.toml`.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Search {
     folders: Vec<PathBuf>,
@@ -101,11 +99,11 @@ fn find(kind: Kind, argument: &Path, search: &Search) -> Result<FoundPlant, Erro
         return Ok(FoundPlant { name, text: Text { file, bytes }, path: Some(path) });
     }
     let inside = match &by_name {
-        Some(file) => SHIPPED.get_file(format!("{folder}/{file}")),
-        None => argument.strip_prefix("profiles").ok().and_then(|inside| SHIPPED.get_file(inside)),
+        Some(_) => shipped::named(folder, &name),
+        None => argument.strip_prefix("profiles").ok().and_then(|inside| shipped::at(inside.to_str()?)),
     };
     match inside {
-        Some(file) => Ok(FoundPlant { name, text: shipped_text(file), path: None }),
+        Some(text) => Ok(FoundPlant { name, text, path: None }),
         None => Err(missing(kind, argument, &name, search)),
     }
 }
@@ -127,12 +125,12 @@ pub(super) fn device(name: &str, search: &Search) -> Result<Option<Text>, String
     if !plain(name) {
         return Ok(None);
     }
-    match path_of("devices", name, search) {
+    match path_of(name, &places(Kind::Device, search)) {
         Some(path) => {
             let bytes = read(&path).map_err(|why| format!("{}: {why}", path.display()))?;
             Ok(Some(Text { file: path.display().to_string(), bytes }))
         }
-        None => Ok(SHIPPED.get_file(format!("devices/{name}.toml")).map(shipped_text)),
+        None => Ok(shipped::named("devices", name)),
     }
 }
 
@@ -153,32 +151,41 @@ pub(super) fn device_file(argument: &Path, search: &Search) -> Option<(String, T
 
 /// The device profiles on disk by name, each from the first folder that has it; what cannot be read is left out.
 pub(super) fn own_devices(search: &Search) -> BTreeMap<String, Text> {
-    let folders = search.folders.iter().flat_map(|folder| [folder.join("devices"), folder.clone()]);
-    let entries = folders.filter_map(|folder| {
-        // The empty path is the folder that the program was started in.
-        let folder = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder };
-        folder.read_dir().ok()
-    });
-    let names = entries.flatten().flatten().filter_map(|entry| stem(&entry.path()));
-    let files = names.filter_map(|name| Some((path_of("devices", &name, search)?, name)));
+    let places = places(Kind::Device, search);
+    let files = names_in(&places).into_iter().filter_map(|name| Some((path_of(&name, &places)?, name)));
     files.filter_map(|(path, name)| Some((name, device_file(&path, search)?.1))).collect()
 }
 
 /// The models of SunSpec: see [`super::sunspec`].
 pub(super) fn sunspec_models() -> &'static str {
-    SHIPPED.get_file("sunspec/models.txt").and_then(include_dir::File::contents_utf8).unwrap_or_default()
+    static MODELS: LazyLock<String> = LazyLock::new(|| {
+        let text = shipped::at("sunspec/models.txt").expect("it is packed");
+        String::from_utf8(text.bytes).expect("it is text")
+    });
+    &MODELS
 }
 
 /// The names of all plants, device profiles and scenarios, with where each comes from.
 pub fn list(search: &Search) -> Vec<Listed> {
     let mut all = Vec::new();
-    for (kind, folder) in Kind::ALL.map(|kind| (kind, folder_of(kind))) {
-        let shipped = SHIPPED.get_dir(folder).into_iter().flat_map(Dir::files).filter_map(|file| stem(file.path()));
-        let entries = search.folders.iter().filter_map(|path| path.join(folder).read_dir().ok()).flatten().flatten();
-        let mut names: Vec<String> = entries.filter_map(|entry| stem(&entry.path())).chain(shipped).collect();
-        names.sort();
-        names.dedup();
-        all.extend(names.into_iter().map(|name| Listed { kind, from: path_of(folder, &name, search), name }));
+    for kind in Kind::ALL {
+        let places = places(kind, search);
+        // Whatever lies in the folder itself may be something else than a profile.
+        let listed: Vec<PathBuf> = places.iter().filter(|place| !search.folders.contains(place)).cloned().collect();
+        let shipped: BTreeMap<&str, &str> = shipped::names(folder_of(kind)).collect();
+        let mut names = names_in(&listed);
+        names.extend(shipped.keys().map(|name| String::from(*name)));
+        for name in names {
+            let from = path_of(&name, &places);
+            let folder = match &from {
+                Some(path) => {
+                    path.parent().filter(|folder| folder.parent().is_some_and(|above| listed.contains(&above.into())))
+                }
+                None => shipped.get(name.as_str()).map(Path::new),
+            };
+            let folder = folder.and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned();
+            all.push(Listed { kind, folder, from, name });
+        }
     }
     all
 }
@@ -208,20 +215,43 @@ fn folder_of(kind: Kind) -> &'static str {
     }
 }
 
-/// Where the file of a name lies on disk; a device profile may also lie in the folder itself.
-fn path_of(folder: &str, name: &str, search: &Search) -> Option<PathBuf> {
+/// The folders on disk that files of a kind lie in, the first one first.
+fn places(kind: Kind, search: &Search) -> Vec<PathBuf> {
+    let of = |base: &PathBuf| {
+        let own = base.join(folder_of(kind));
+        let others = match kind {
+            Kind::Device => [vec![base.clone()], folders_in(&own)].concat(),
+            Kind::Plant | Kind::Scenario => Vec::new(),
+        };
+        [vec![own], others].concat()
+    };
+    search.folders.iter().flat_map(of).collect()
+}
+
+fn folders_in(folder: &Path) -> Vec<PathBuf> {
+    let mut folders: Vec<PathBuf> = entries(folder).filter(|path| path.is_dir()).collect();
+    folders.sort();
+    folders
+}
+
+fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> {
+    // The empty path is the folder that the program was started in.
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    folder.read_dir().into_iter().flatten().flatten().map(|entry| entry.path())
+}
+
+fn names_in(places: &[PathBuf]) -> BTreeSet<String> {
+    places.iter().flat_map(|place| entries(place)).filter_map(|path| stem(&path)).collect()
+}
+
+/// Where the file of a name lies on disk.
+fn path_of(name: &str, places: &[PathBuf]) -> Option<PathBuf> {
     let file = format!("{name}.toml");
-    let places =
-        |base: &PathBuf| [Some(base.join(folder).join(&file)), (folder == "devices").then(|| base.join(&file))];
-    search.folders.iter().flat_map(places).flatten().find(|path| path.is_file())
+    places.iter().map(|place| place.join(&file)).find(|path| path.is_file())
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, String> {
     regular::read(path, BYTES_MAX).map_err(|error| error.to_string())
-}
-
-fn shipped_text(file: &include_dir::File) -> Text {
-    Text { file: format!("profiles/{}", file.path().display()), bytes: file.contents().to_vec() }
 }
 
 fn stem(path: &Path) -> Option<String> {

@@ -30,6 +30,7 @@ mod expr;
 mod interlock;
 mod history;
 pub(crate) mod io;
+mod library;
 pub mod line;
 mod lint;
 pub(crate) mod names;
@@ -73,6 +74,7 @@ pub(crate) use self::units::{is_known as is_known_unit, of as unit_of};
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search, list, text_of},
+    library::{Card, find_cards},
     set_file::{read_set, text_of_set},
     user_profiles::OwnProfiles,
 };
@@ -154,6 +156,15 @@ fn shipped_devices() -> impl Iterator<Item = String> {
     io::list(&Search::shipped()).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name)
 }
 
+/// All device profiles at a glance, the kinds of device one after the other.
+pub fn cards(search: &Search) -> Vec<Card> {
+    let devices = list(search).into_iter().filter(|listed| listed.kind == Kind::Device);
+    library::cards(devices.map(|listed| {
+        let text = io::device(&listed.name, search).ok().flatten();
+        (listed, text)
+    }))
+}
+
 /// A plant or device profile that could be loaded by its name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Listed {
@@ -161,6 +172,8 @@ pub struct Listed {
     pub kind: Kind,
     /// `fuji_pxr`.
     pub name: String,
+    /// The folder of its kind of device, as `controllers`; empty where it lies in none.
+    pub folder: String,
     /// The file it comes from; `None` if it is shipped in the program.
     pub from: Option<PathBuf>,
 }

@@ -384,7 +384,9 @@ fn profile(
             Rc::new(file)
         }),
         Ok(None) => {
-            problems.unknown("profile", name, library.names.iter().map(String::as_str));
+            let problem = problems.add(name.at, format!("unknown profile `{}`", name.value)).label("no such profile");
+            let known = library.names.iter().map(String::as_str);
+            problem.help("`sightglass profiles --search TEXT` finds one").suggest(&name.value, known);
             None
         }
         Err(why) => {

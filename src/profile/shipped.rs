@@ -30,20 +30,133 @@ fn the_alarms_of_every_shipped_plant_are_complete_and_of_use() {
     }
 }
 
-#[test]
-fn every_shipped_device_loads_without_a_problem() {
-    let folder = tempfile::tempdir().unwrap();
-    for device in list(&Search::shipped()).iter().filter(|listed| listed.kind == Kind::Device) {
-        let path = folder.path().join("p.toml");
-        let text = format!(
-            "title = 'a'\ntime_zone = 'UTC'\n[[line]]\nname = 'L'\nmode = 'rtu'\nport = 'p'\nbaud = 9600\nparity = 'N'\n\
-             [[device]]\nname = 'D'\nprofile = '{}'\nline = 'L'\nunit = 1\n",
-            device.name
-        );
-        std::fs::write(&path, text).unwrap();
-        let plant = load(&path, &Search::shipped()).unwrap_or_else(|errors| panic!("{}:\n{errors}", device.name));
-        assert!(plant.tags.iter().all(|tag| !tag.source.is_empty()), "{}: a row without a source", device.name);
+/// All devices of the library, each once, in one plant.
+fn library() -> Arc<PlantDef> {
+    let mut text = "title = 'a'\ntime_zone = 'UTC'\n[[line]]\nname = 'L'\nmode = 'tcp'\nhost = 'plc'\n".to_owned();
+    for (unit, card) in cards(&Search::shipped()).iter().enumerate() {
+        let name = &card.listed.name;
+        text += &format!("[[device]]\nname = '{name}'\nprofile = '{name}'\nline = 'L'\nunit = {unit}\n");
     }
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("p.toml"), text).unwrap();
+    load(&folder.path().join("p.toml"), &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+/// What each quantity of the table of names in profiles/README.md is shown in, whichever device it comes from.
+const UNITS: &[(&str, &str)] = &[
+    ("V", "V"),
+    ("I", "A"),
+    ("P", "W"),
+    ("Q", "var"),
+    ("S", "VA"),
+    ("PF", ""),
+    ("PHI", "°"),
+    ("F", "Hz"),
+    ("E", "kWh"),
+    ("EQ", "kvarh"),
+    ("ES", "kVAh"),
+    ("SOC", "%"),
+    ("SOH", "%"),
+    ("RH", "%"),
+    ("CO2", "ppm"),
+];
+
+/// The unit of the quantity that a name begins with, or has behind what it is of: `BAT.V`, `PV1.P`, `E.IN.TODAY`.
+fn unit_of_quantity(name: &str) -> Option<&'static str> {
+    const OF: &[&str] = &["GRID", "LOAD", "EPS", "GEN", "BAT", "PV", "METER", "INV", "BMS", "LOSS", "BUS"];
+    const TAIL: &[&str] = &[
+        "L1", "L2", "L3", "L12", "L23", "L31", "N", "LN", "LL", "MEAN", "SUM", "IN", "OUT", "YIELD", "TODAY", "MONTH",
+        "YEAR", "MAX", "MIN", "DEMAND", "T1", "T2", "T3", "T4",
+    ];
+    let mut parts: Vec<&str> = name.split('.').collect();
+    if parts.len() > 1 && OF.contains(&parts[0].trim_end_matches(|c: char| c.is_ascii_digit())) {
+        parts.remove(0);
+    }
+    let (_, unit) = UNITS.iter().find(|(quantity, _)| *quantity == parts[0])?;
+    parts[1..].iter().all(|part| TAIL.contains(part)).then_some(*unit)
+}
+
+#[test]
+fn every_shipped_device_loads_and_a_quantity_has_one_unit() {
+    let plant = library();
+    let cards = cards(&Search::shipped());
+    assert!(cards.len() >= 150, "{}", cards.len());
+    let mut counted = 0;
+    for (device, card) in plant.devices.iter().zip(&cards) {
+        let tags: Vec<_> = plant.tags_of(device.id).collect();
+        assert_eq!(tags.len(), card.tags.len(), "{}: a card counts the tags", device.name);
+        assert!(tags.iter().all(|tag| !tag.source.is_empty()), "{}: a row without a source", device.name);
+        // The P and I of a controller are its tuning.
+        for tag in tags.iter().filter(|_| card.listed.folder != "controllers") {
+            if let Some(unit) = unit_of_quantity(&tag.short).filter(|_| tag.enum_labels.is_empty()) {
+                assert_eq!(tag.unit, unit, "{}", tag.name);
+                counted += 1;
+            }
+        }
+    }
+    assert!(counted > 1_500, "{counted}");
+}
+
+#[test]
+fn every_shipped_device_says_whose_facts_it_has() {
+    let open = ["(MIT)", "(BSD-3-Clause)", "(Apache-2.0)"];
+    let seen = ["manual", "maker's", "thesis", "article", "drivers"];
+    for Card { listed, vendor, model, status, source, .. } in cards(&Search::shipped()) {
+        assert!(![vendor, model, status].iter().any(String::is_empty), "{}", listed.name);
+        let foreign = ["register list of", "register model of", "library"].iter().any(|word| source.contains(word));
+        let licensed = open.iter().any(|licence| source.contains(licence));
+        assert!(licensed || !foreign && seen.iter().any(|word| source.contains(word)), "{}: {source}", listed.name);
+    }
+}
+
+#[test]
+fn a_search_finds_by_maker_model_kind_and_tag() {
+    let check = |words: &str, first: &str| {
+        let found = find_cards(cards(&Search::shipped()), words);
+        assert_eq!(found.first().map(|card| card.listed.name.as_str()), Some(first), "{words}");
+        found
+    };
+    check("sdm630", "eastron_sdm630");
+    check("koyo dl06", "koyo_dl06");
+    check("fuji pxr", "fuji_pxr");
+    check("gensets oil", "dse_52xx");
+    let found = check("siemens meters", "siemens_pac2200");
+    assert!(found.len() < 10, "{}", found.len());
+    assert!(find_cards(cards(&Search::shipped()), "qqxqq").is_empty());
+}
+
+#[test]
+fn an_unknown_profile_is_looked_for_near_and_by_a_search() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = |profile: &str, expect: &str| {
+        let text = format!(
+            "title = 'a'\ntime_zone = 'UTC'\n[[line]]\nname = 'L'\nmode = 'tcp'\nhost = 'plc'\n\
+             [[device]]\nname = 'D'\nprofile = '{profile}'\nline = 'L'\nunit = 1\n"
+        );
+        std::fs::write(folder.path().join("p.toml"), text).unwrap();
+        let errors = load(&folder.path().join("p.toml"), &Search::shipped()).unwrap_err().to_string();
+        assert!(errors.contains(expect), "{errors}");
+    };
+    check("eastron_sdm360", "did you mean `eastron_sdm630`?");
+    check("something_else_than_all", "sightglass profiles --search");
+}
+
+#[test]
+fn a_profile_on_disk_may_lie_in_a_folder_of_its_kind() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = folder.path().join("devices/meters");
+    std::fs::create_dir_all(&own).unwrap();
+    let text = text_of("eastron_sdm630", &Search::shipped()).unwrap().replace("SDM630", "OURS");
+    std::fs::write(own.join("ours.toml"), &text).unwrap();
+    std::fs::write(own.join("eastron_sdm630.toml"), text).unwrap();
+    let search = Search::folders(vec![folder.path().into()]);
+    let all = cards(&search);
+    for name in ["ours", "eastron_sdm630"] {
+        let card = all.iter().find(|card| card.listed.name == name).unwrap();
+        assert_eq!((card.model.as_str(), card.listed.folder.as_str()), ("OURS", "meters"), "{name}");
+        assert_eq!(card.listed.from, Some(own.join(format!("{name}.toml"))));
+    }
+    assert_eq!(all.len(), cards(&Search::shipped()).len() + 1, "one more name");
 }
 
 #[test]

@@ -43,7 +43,9 @@ impl OwnProfiles {
 
     /// The profiles that say by what their device is recognised, each as the only device of a plant of its name.
     pub fn recognisable(&self) -> Vec<Arc<PlantDef>> {
-        let plants = self.names().into_iter().filter_map(|name| self.device(&name));
+        // Of a whole library few say it: the others are not even checked.
+        let says = |name: &String| self.find(name).is_some_and(|text| text.bytes.windows(9).any(|b| b == b"signature"));
+        let plants = self.names().into_iter().filter(says).filter_map(|name| self.device(&name));
         plants.filter(|def| def.devices.iter().any(|device| !device.signature.is_empty())).collect()
     }
 

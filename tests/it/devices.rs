@@ -49,34 +49,44 @@ const FAULTY: Duration = Duration::from_secs(120);
 /// minutes, until no late answer can be taken for another one.
 const CURED_MAX: Duration = Duration::from_secs(900);
 
-fn shipped(kind: Kind) -> Vec<(String, PlantDef)> {
-    let names = profile::list(&Search::shipped()).into_iter().filter(|listed| listed.kind == kind);
-    let load = |name: String| {
-        let plant = profile::check(Path::new(&name), &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"));
-        (name, (*plant.plant).clone())
-    };
-    names.map(|listed| load(listed.name)).collect()
+fn load(name: &str) -> PlantDef {
+    let plant = profile::check(Path::new(name), &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"));
+    (*plant.plant).clone()
 }
 
 #[tokio::test(start_paused = true)]
 async fn every_shipped_plant_is_simulated_and_survives_every_fault() {
-    let plants = shipped(Kind::Plant);
+    let listed = profile::list(&Search::shipped()).into_iter();
+    let plants: Vec<String> = listed.filter(|listed| listed.kind == Kind::Plant).map(|listed| listed.name).collect();
     assert!(plants.len() >= 3, "the shipped plants were found");
-    for (name, def) in plants {
-        survive(&name, def).await;
+    for name in plants {
+        survive(&name, load(&name)).await;
     }
 }
 
+/// Devices of the library that are read in different ways; the others differ from them in their numbers.
+const DEVICES: &[&str] = &[
+    "delta_dtb",
+    "delta_vfd_el",
+    "eastron_sdm120",
+    "eastron_sdm230",
+    "eastron_sdm630",
+    "fuji_pxr",
+    "koyo_dl06",
+    "nectec_urtu_rtd",
+    "taie_fy",
+];
+
 /// Each device in a plant of its own, with every row of its map polled, also those that plants seldom need.
 #[tokio::test(start_paused = true)]
-async fn every_shipped_device_is_simulated_and_survives_every_fault() {
-    let devices = shipped(Kind::Device);
-    assert!(devices.len() >= 7, "the shipped devices were found");
-    for (name, mut def) in devices {
+async fn shipped_devices_are_simulated_and_survive_every_fault() {
+    for name in DEVICES {
+        let mut def = load(name);
+        assert!(!def.tags.is_empty(), "{name} has tags");
         for tag in def.tags.iter_mut().filter(|tag| tag.access != Access::Write && tag.poll == Poll::Never) {
             tag.poll = Poll::Every(Duration::from_secs(10));
         }
-        survive(&name, def).await;
+        survive(name, def).await;
     }
 }
 
