@@ -144,6 +144,7 @@ pub mod text;
 pub mod plant;
 pub mod profile;
 pub mod bus;
+pub mod register_map;
 pub mod sim;
 pub mod report;
 pub mod history;

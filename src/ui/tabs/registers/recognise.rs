@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{LOST_AFTER, Registers, names::Named};
+use super::{LOST_AFTER, Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     bus::recognise::{self, Fit},
@@ -12,6 +12,7 @@ use crate::{
         live::{AddressSpan, LiveRead, LiveReading},
         tag::TagDef,
     },
+    register_map::named::Named,
 };
 
 /// How far it is.

@@ -2,15 +2,16 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{Asking, Registers, names::Named};
+use super::{Asking, Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         PlantDef,
         def::LineDef,
-        tag::{Decimals, Point, TagDef},
+        tag::{Decimals, TagDef},
     },
     profile::new_plant::{NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
+    register_map::named::Named,
     ui::Effect,
 };
 
@@ -78,8 +79,8 @@ impl Registers {
 
 impl Registers {
     /// Shows a register list before it is taken; or says why it is none.
-    pub(super) fn load_list(&mut self, cx: &ViewContext, text: &str) -> Vec<UiAction> {
-        self.preview(cx, text).unwrap_or_else(|why| vec![no_list(why)])
+    pub(super) fn load_list(&mut self, cx: &ViewContext, bytes: &[u8]) -> Vec<UiAction> {
+        self.preview(cx, bytes).unwrap_or_else(|why| vec![no_list(why)])
     }
 }
 
@@ -113,24 +114,10 @@ fn is_of(named: &Named, tags: &[TagDef]) -> bool {
 fn tag_of(named: &Named, taken: &[String]) -> TagDef {
     let plain = plain_name(&named.name);
     let short = if taken.contains(&plain) { format!("{plain}_{}", named.address) } else { plain };
-    tag(named, &short)
+    named.tag(&short)
 }
 
-/// What is named, as a tag that is called so.
-pub fn tag(named: &Named, name: &str) -> TagDef {
-    let point = Point { table: named.table, address: named.address, kind: named.kind, order: named.order, field: None };
-    TagDef {
-        short: name.to_owned(),
-        scale: named.scale,
-        offset: named.offset,
-        decimals: Decimals::Fixed(named.decimals),
-        unit: named.unit.clone(),
-        enum_labels: named.enum_labels.clone(),
-        ..TagDef::new(TagId(0), DeviceId(0), name, point)
-    }
-}
-
-/// The decimals of a tag that [`tag`] has made.
+/// The decimals of a tag that [`Named::tag`] has made.
 pub fn decimals(tag: &TagDef) -> u8 {
     if let Decimals::Fixed(decimals) = tag.decimals { decimals } else { 0 }
 }

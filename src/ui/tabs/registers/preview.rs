@@ -1,17 +1,18 @@
 //! A list before anything of it is taken: its first rows with what they hold now, what its columns mean, and what is left out.
 
-use super::super::{
-    Registers,
-    list::{Column, List, ListContext, Unclear},
-    next,
-    view::named_text,
-};
-use crate::plant::{
-    address::{AddressBase, TABLES},
-    live::AddressSpan,
-    tag::{ByteOrder, Table},
-};
+use super::{Registers, next, view::named_text};
 use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::{
+        address::{AddressBase, TABLES},
+        live::AddressSpan,
+        tag::{ByteOrder, Table},
+    },
+    register_map::{
+        self,
+        list::{Column, List, ListContext, Unclear},
+    },
+};
 
 /// Rows above the list: what can be taken, addresses, columns, heading.
 const HEAD: u16 = 4;
@@ -21,7 +22,7 @@ const READ_MAX: usize = 24;
 /// A list that was loaded and is not taken yet.
 #[derive(Debug)]
 pub struct Preview {
-    text: String,
+    bytes: Vec<u8>,
     context: ListContext,
     list: List,
     /// The selected column.
@@ -61,13 +62,13 @@ const CANCEL: &[Key] = &[Key::elsewhere(code(KeyCode::Esc), "cancel", "take noth
 pub const KEYS: &[&[keys::Key<Registers>]] = &[&SCROLL, LIST, CANCEL];
 
 impl Preview {
-    fn new(text: String, context: ListContext) -> Preview {
-        let list = super::parse(&text, &context);
-        Preview { text, context, list, column: 0, top: 0 }
+    fn new(bytes: Vec<u8>, context: ListContext) -> Preview {
+        let list = register_map::read(&bytes, &context);
+        Preview { bytes, context, list, column: 0, top: 0 }
     }
 
     fn read_again(&mut self) {
-        self.list = super::parse(&self.text, &self.context);
+        self.list = register_map::read(&self.bytes, &self.context);
     }
 
     /// Rows and lines that are left out.
@@ -101,11 +102,11 @@ impl Preview {
 
 impl Registers {
     /// Shows what a list has before it is taken; `Err` says why it is none.
-    pub fn preview(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+    pub fn preview(&mut self, cx: &ViewContext, bytes: &[u8]) -> Result<Vec<UiAction>, String> {
         let base = Some(self.base).filter(|base| *base != AddressBase::Modicon);
         let (table, order, unit) = (self.table, self.order, self.unit);
-        let context = ListContext { table, base, order, unit, means: Default::default() };
-        let preview = Preview::new(text.to_owned(), context);
+        let context = ListContext { table, base, order, unit: Some(unit), ..ListContext::default() };
+        let preview = Preview::new(bytes.to_vec(), context);
         if let Some(why) = preview.list.refused {
             return Err(why);
         }

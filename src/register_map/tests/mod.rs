@@ -1,0 +1,3 @@
+//! Small files of each form, with what is taken of them and what is not.
+
+mod older;
