@@ -30,6 +30,8 @@ pub struct ListContext {
     pub format: Option<Format>,
     /// Table of an address that names none.
     pub table: Table,
+    /// It is said so: a Modicon number of another table is none.
+    pub is_table_stated: bool,
     /// How plain numbers count; `None`: that is not said.
     pub base: Option<AddressBase>,
     /// Order of what takes several registers.
@@ -38,6 +40,8 @@ pub struct ListContext {
     pub unit: Option<u8>,
     /// Where the first register of a map without addresses of its own stands.
     pub start: Option<u16>,
+    /// Which of several models is meant, in a file that has a value for each, from 0.
+    pub variant: Option<usize>,
     /// What columns mean other than it seems.
     pub means: BTreeMap<usize, Option<Column>>,
 }
@@ -47,10 +51,12 @@ impl Default for ListContext {
         ListContext {
             format: None,
             table: Table::Holding,
+            is_table_stated: false,
             base: None,
             order: ByteOrder::Abcd,
             unit: None,
             start: None,
+            variant: None,
             means: BTreeMap::new(),
         }
     }
@@ -72,9 +78,11 @@ pub struct List {
     /// What it is.
     pub format: Option<Format>,
     /// Maker and model, where the file names them.
-    pub about: Option<String>,
+    pub about: [String; 2],
     /// Connection in the file and unit of the rows that are taken.
     pub station: Option<(usize, u8)>,
+    /// What is assumed, or is odd about the file, beside its rows.
+    pub warnings: Vec<String>,
     /// What is not kept of rows that are taken: how often, and in which line first.
     pub notes: BTreeMap<String, (usize, usize)>,
 }
@@ -133,6 +141,7 @@ impl List {
             let at = format!("{place}{}", t!("line {number}", number = named.line));
             self.push(&at, Ok(named));
         }
+        self.warnings.extend(other.warnings);
         self.problems.extend(other.problems.into_iter().map(|problem| format!("{place}{problem}")));
         self.unclear = self.unclear.take().or(other.unclear);
         self.station = self.station.or(other.station);
@@ -196,11 +205,12 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
             Err(why) => return List::refused(why),
         },
     };
+    let stated = Some(context.table).filter(|_| context.is_table_stated);
     let written: Vec<(&str, Option<Table>)> =
-        rows.iter().filter_map(|row| Some((first_of(row.address.as_ref()?), row.table))).collect();
+        rows.iter().filter_map(|row| Some((first_of(row.address.as_ref()?), row.table.or(stated)))).collect();
     let (base, unclear) = base_of(&written, context);
     list.unclear = unclear;
-    let assumed = Assumed { table: context.table, base, order: context.order };
+    let assumed = Assumed { table: context.table, is_stated: context.is_table_stated, base, order: context.order };
     for row in rows {
         let named = row.named(assumed).map(|named| Named { line: row.line, ..named });
         list.push_of(context, row.device.map(|unit| (0, unit)), row.line, named);

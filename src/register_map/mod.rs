@@ -135,7 +135,7 @@ fn of_workbook(bytes: &[u8], context: &ListContext) -> List {
     for (name, rows) in sheets {
         let list = list::of_cells(&cells::without_rules(rows), true, context);
         match list.refused {
-            Some(why) if many => all.problems.push(t!("sheet {name}: {why}", name, why)),
+            Some(why) if many => all.warnings.push(t!("sheet {name}: {why}", name, why)),
             Some(why) => refused = Some(why),
             None => all.append(list, &if many { format!("{name}: ") } else { String::new() }),
         }

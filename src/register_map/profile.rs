@@ -47,7 +47,7 @@ pub fn written(list: &List, name: &str, source: &str) -> Result<Written, String>
         if rows.is_empty() {
             break;
         }
-        let (text, lines) = text(list, &rows, source);
+        let (text, lines) = text(list, &rows, name, source);
         let errors = match profile::check_text(name, &text) {
             Ok(checked) => return Ok(Written { text, checked, problems }),
             Err(errors) => errors,
@@ -115,7 +115,7 @@ fn row(named: &Named, taken: &mut BTreeSet<String>) -> Row {
 }
 
 /// The text, and the line in which each row begins.
-fn text(list: &List, rows: &[Row], source: &str) -> (String, Vec<usize>) {
+fn text(list: &List, rows: &[Row], name: &str, source: &str) -> (String, Vec<usize>) {
     let mut out = String::new();
     let mut lines = Vec::new();
     // Writing into a string does not fail.
@@ -124,9 +124,9 @@ fn text(list: &List, rows: &[Row], source: &str) -> (String, Vec<usize>) {
         "# Imported by `sightglass profile import` from {source}: compare it with the manual of the device before it is relied on.\n\
          # `sightglass check FILE` checks it after a change, `sightglass help format` explains each key.\n"
     );
-    let about = list.about.as_deref().unwrap_or_default();
-    if !about.is_empty() {
-        let _ = writeln!(out, "model = {}", quoted(about));
+    let [vendor, model] = &list.about;
+    for (key, text, usual) in [("vendor", vendor, "unknown"), ("model", model, name)] {
+        let _ = writeln!(out, "{key} = {}", quoted(if text.is_empty() { usual } else { text }));
     }
     let _ = writeln!(
         out,

@@ -42,9 +42,9 @@ pub struct Args {
     /// Write a plant file as well, with this device on a serial line
     #[arg(long, value_name = "FILE.toml")]
     plant: Option<PathBuf>,
-    /// Table of the addresses that name none: coil, discrete, input, holding
-    #[arg(long, default_value = "holding", value_parser = super::words::<Table>)]
-    table: Table,
+    /// Table of the addresses that name none: coil, discrete, input, holding [default: holding, or that of a Modicon number]
+    #[arg(long, value_parser = super::words::<Table>)]
+    table: Option<Table>,
     /// How plain numbers count: modicon (40001 is the first), 0 (as sent), 1 (from 1) [default: as the file shows; else it is asked]
     #[arg(long, value_parser = base_of)]
     base: Option<AddressBase>,
@@ -57,6 +57,9 @@ pub struct Args {
     /// Register of the first point of a SunSpec model, its ID [default: 40070; of the common model 40002]
     #[arg(long, value_name = "ADDRESS")]
     start: Option<u16>,
+    /// Which model is meant, in a file of solarman that has values for several, from 0
+    #[arg(long, value_name = "N")]
+    variant: Option<usize>,
     /// Overwrite existing files
     #[arg(long)]
     force: bool,
@@ -77,11 +80,13 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     let (title, bytes) = if is_input { ("standard input".to_owned(), from_input()?) } else { from_file(&args.file)? };
     let context = ListContext {
         format: args.format,
-        table: args.table,
+        table: args.table.unwrap_or(Table::Holding),
+        is_table_stated: args.table.is_some(),
         base: args.base,
         order: args.order,
         unit: args.unit,
         start: args.start,
+        variant: args.variant,
         ..ListContext::default()
     };
     let list = register_map::read(&bytes, &context);
@@ -165,6 +170,7 @@ fn say_rows(title: &str, list: &List, written: Option<&Written>) {
     let all = list.named.len() + list.problems.len();
     let format = list.format.map_or("", Format::word);
     say(&format!("{title}: {format}, {taken} of {all} rows"));
+    list.warnings.iter().for_each(|warning| say(&format!("  {warning}")));
     let problems: Vec<&String> = list.problems.iter().chain(lost).collect();
     problems.iter().take(SAID_MAX).for_each(|problem| say(&format!("  {problem}")));
     if SAID_MAX < problems.len() {

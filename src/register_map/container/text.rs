@@ -5,8 +5,15 @@ use std::borrow::Cow;
 use crate::t;
 
 /// Control characters that no text has; form feeds and the old end of a file stand in some.
-fn is_binary(sign: char) -> bool {
+fn is_strange(sign: char) -> bool {
     sign.is_control() && !matches!(sign, '\t' | '\n' | '\r' | '\u{0B}' | '\u{0C}' | '\u{1A}' | '\u{85}')
+}
+
+/// A stray control character makes no text a picture; a zero does, and many of them do.
+fn is_binary(text: &str) -> bool {
+    let first = || text.chars().take(1 << 16);
+    let strange = first().filter(|sign| is_strange(*sign)).count();
+    first().any(|sign| sign == '\0') || first().count() < 20 * strange
 }
 
 /// UTF-8, UTF-16 by its mark or its zeros, else Latin-1; `Err` where it is no text.
@@ -19,7 +26,7 @@ pub fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
         [0, second, ..] if *second != 0 => utf16(bytes, u16::from_be_bytes)?,
         _ => utf8(bytes),
     };
-    match text.chars().take(1 << 16).any(is_binary) {
+    match is_binary(&text) {
         true => Err(not_text()),
         false => Ok(text),
     }

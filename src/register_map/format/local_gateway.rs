@@ -60,8 +60,8 @@ const SECTIONS: [(&str, Table); 4] = [
 pub fn read(tree: &Tree, _: &ListContext) -> List {
     let mut list = List::of_tree(tree);
     let device = tree.root.get("device");
-    let words = ["manufacturer", "model"].map(|key| device.and_then(|device| device.word(key)).unwrap_or_default());
-    list.about = Some(words.join(" ").trim().to_owned()).filter(|about| !about.is_empty());
+    let word = |key: &str| device.and_then(|device| device.word(key)).unwrap_or_default().to_owned();
+    list.about = ["manufacturer", "model"].map(word);
     for (section, table) in SECTIONS {
         for (key, item) in tree.root.get(section).map_or(&[][..], Node::entries) {
             let named = entity(table, key, item).map(|named| Named { line: item.line, ..named });

@@ -78,7 +78,7 @@ impl List {
         let twice = |(line, key): &(usize, String)| {
             t!("line {line}: `{key}` stands twice: the last one counts", line = *line, key)
         };
-        List { problems: tree.twice.iter().map(twice).collect(), ..List::default() }
+        List { warnings: tree.twice.iter().map(twice).collect(), ..List::default() }
     }
 
     /// Notes the keys of a row that are neither used nor without meaning here.

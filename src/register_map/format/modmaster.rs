@@ -37,7 +37,7 @@ pub fn read(text: &str, context: &ListContext) -> List {
     let mut list = List { unclear, ..List::default() };
     for row in &rows {
         let place = t!("line {number}", number = row.position().map_or(0, csv::Position::line));
-        let of = AddressContext { table: context.table, is_stated: false, base };
+        let of = AddressContext { table: context.table, is_stated: context.is_table_stated, base };
         list.push(&place, exported(|name| cell(row, name), of));
     }
     list

@@ -10,7 +10,7 @@ use crate::{
     },
     profile::unit_of,
     register_map::{
-        container::node::{Node, Tree},
+        container::node::{Node, Tree, Value},
         list::{List, ListContext},
         named::Named,
     },
@@ -77,19 +77,27 @@ type Tables = Vec<(i64, i64, Table)>;
 pub fn read(tree: &Tree, context: &ListContext) -> List {
     let mut list = List::of_tree(tree);
     let info = tree.root.get("info");
-    let words = ["manufacturer", "model"].map(|key| info.and_then(|info| info.word(key)).unwrap_or_default());
-    list.about = Some(words.join(" ").trim().to_owned()).filter(|about| !about.is_empty());
+    let word = |key: &str| info.and_then(|info| info.word(key)).unwrap_or_default().to_owned();
+    list.about = ["manufacturer", "model"].map(word);
     let request = |node: &Node| {
         let code = node.get("code").or(node.get("mb_functioncode"))?.whole()?;
         Some((node.get("start")?.whole()?, node.get("end")?.whole()?, table_of(code)?))
     };
-    let tables: Tables = tree.root.all("requests").iter().filter_map(request).collect();
+    // Requests of fine control only say what is read together.
+    let requests = if tree.root.entries().iter().any(|(key, _)| key == "requests_fine_control") {
+        &[]
+    } else {
+        tree.root.all("requests")
+    };
+    let tables: Tables = requests.iter().filter_map(request).collect();
     let usual = tree.root.get("default").and_then(code_of).unwrap_or(Table::Holding);
     for group in tree.root.all("parameters") {
         let name = group.word("group").unwrap_or_default();
         let own = code_of(group).unwrap_or(usual);
         for item in group.all("items") {
-            let named = item_of(item, own, &tables, code_of(item).is_some());
+            let chosen = of_variant(item, context.variant);
+            let is_stated = code_of(item).is_some();
+            let named = chosen.as_ref().map_err(Clone::clone).and_then(|item| item_of(item, own, &tables, is_stated));
             let poll = item.get("update_interval").or(group.get("update_interval")).and_then(Node::whole);
             let poll =
                 poll.and_then(|seconds| u64::try_from(seconds).ok()).filter(|seconds| (1..=86_400).contains(seconds));
@@ -104,6 +112,29 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
         }
     }
     list
+}
+
+/// Lists of lists of registers, and lists of factors, have a place for each model.
+fn of_variant(item: &Node, variant: Option<usize>) -> Result<Node, String> {
+    let Value::Map(entries) = &item.value else { return Ok(item.clone()) };
+    let is_many = |key: &str, node: &Node| match (key, &node.value) {
+        ("registers", Value::List(items)) => items.iter().any(|item| matches!(item.value, Value::List(_))),
+        ("scale" | "offset" | "divide" | "mask" | "uom", Value::List(_)) => true,
+        _ => false,
+    };
+    let mut chosen = entries.clone();
+    for (key, node) in chosen.iter_mut().filter(|(key, node)| is_many(key, node)) {
+        let count = node.items().len();
+        let n = variant.ok_or_else(|| {
+            let option = "--variant";
+            t!("`{key}` differs between {count} models: which is meant? ({option} 0, 1 …)", key, count, option)
+        })?;
+        *node = node.items().get(n).cloned().ok_or_else(|| unsaid(key))?;
+        if node.items().is_empty() {
+            return Err(t!("this model does not have it").to_owned());
+        }
+    }
+    Ok(Node { line: item.line, value: Value::Map(chosen) })
 }
 
 fn table_of(code: i64) -> Option<Table> {

@@ -39,10 +39,10 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
     let Some(group) = tree.root.get("group") else { return List::refused(missing("group")) };
     let id = tree.root.get("id").and_then(Node::whole).unwrap_or(0);
     let start = context.start.unwrap_or(if id == 1 { COMMON } else { FIRST });
-    list.about = Some(format!("SunSpec {id} {}", group.word("label").unwrap_or_default()));
+    list.about = ["SunSpec".to_owned(), format!("{id} {}", group.word("label").unwrap_or_default())];
     if context.start.is_none() {
         let (from, note) = (start, "--start");
-        list.problems.push(t!(
+        list.warnings.push(t!(
             "the model is taken from register {from}: a device may have it elsewhere ({note})",
             from,
             note
@@ -81,7 +81,7 @@ impl Reader<'_> {
             let times = count.as_deref().map_or(Some(1), |count| count.parse::<u32>().ok());
             let (count, times) = (count.unwrap_or_default(), times.filter(|times| (1..=200).contains(times)));
             if times.is_none() {
-                self.list.problems.push(t!(
+                self.list.warnings.push(t!(
                     "line {line}: how often `{name}` stands there ({count}) only the device knows: it is taken once",
                     line = inner.line,
                     name,
@@ -94,7 +94,7 @@ impl Reader<'_> {
             }
             // Where the next group stands depends on how many these are.
             if times.is_none() && !std::ptr::eq(inner, group.all("groups").last().unwrap_or(inner)) {
-                self.list.problems.push(t!(
+                self.list.warnings.push(t!(
                     "line {line}: what follows `{name}` has no fixed place",
                     line = inner.line,
                     name

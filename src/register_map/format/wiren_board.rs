@@ -72,7 +72,7 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
         None if root.get("channels").is_some() => vec![root],
         None => of_ports.collect(),
     };
-    list.about = root.word("title").or(root.word("device_type")).map(str::to_owned);
+    list.about = [String::new(), root.word("title").or(root.word("device_type")).unwrap_or_default().to_owned()];
     for (n, device) in devices.iter().enumerate() {
         let unit = device.get("slave_id").and_then(Node::whole).and_then(|unit| u8::try_from(unit).ok());
         let station = (1 < devices.len()).then(|| (n, unit.unwrap_or(0))).or(unit.map(|unit| (n, unit)));

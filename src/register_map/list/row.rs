@@ -58,6 +58,8 @@ struct More {
 pub struct Assumed {
     /// Table of a plain number.
     pub table: Table,
+    /// It is said so.
+    pub is_stated: bool,
     /// How one counts.
     pub base: AddressBase,
     /// Order of what takes several registers.
@@ -186,7 +188,8 @@ impl Row {
 
     /// Table and address, as assumed where the row does not say more.
     fn place(&self, assumed: Assumed) -> Option<(Table, u16)> {
-        let (table, is_stated) = (self.table.unwrap_or(assumed.table), self.table.is_some());
+        let table = self.table.unwrap_or(assumed.table);
+        let is_stated = self.table.is_some() || assumed.is_stated;
         AddressContext { table, is_stated, base: assumed.base }.parse(first_of(self.address.as_ref()?))
     }
 

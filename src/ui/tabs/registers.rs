@@ -104,6 +104,7 @@ enum Asking {
     Enable,
     Name,
     Save,
+    Profile,
     List,
     Write,
     Compare,
@@ -248,6 +249,7 @@ impl TabView for Registers {
             Asking::Unit => self.unit_typed(cx, text)?,
             Asking::Compare => self.compare_typed(cx, text)?,
             Asking::Save => return self.save(cx, text),
+            Asking::Profile => return self.save_profile(text),
             Asking::List => {
                 return Ok(vec![UiAction::Do(Effect::Load { tab: Tab::Registers, path: PathBuf::from(text) })]);
             }
@@ -276,7 +278,7 @@ impl TabView for Registers {
     }
 
     fn on_saved(&mut self, _cx: &ViewContext, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        vec![save::outcome(result)]
+        vec![save::outcome(result, self.asking == Asking::Profile)]
     }
 
     fn on_log_failed(&mut self, why: &str) {

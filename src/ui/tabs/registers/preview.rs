@@ -11,6 +11,7 @@ use crate::{
     register_map::{
         self,
         list::{Column, List, ListContext, Unclear},
+        named::Named,
     },
 };
 
@@ -56,10 +57,12 @@ const LIST: &[Key] = &[
         registers.change_list(|preview| preview.context.order = next(&ByteOrder::ALL, preview.context.order))
     }),
 ];
+const KEEP: &[Key] =
+    &[Key::new(char('S'), "profile", "save all of it as a device profile", |registers, _| registers.keep_list())];
 const CANCEL: &[Key] = &[Key::elsewhere(code(KeyCode::Esc), "cancel", "take nothing of this list")];
 
 /// All keys.
-pub const KEYS: &[&[keys::Key<Registers>]] = &[&SCROLL, LIST, CANCEL];
+pub const KEYS: &[&[keys::Key<Registers>]] = &[&SCROLL, LIST, KEEP, CANCEL];
 
 impl Preview {
     fn new(bytes: Vec<u8>, context: ListContext) -> Preview {
@@ -81,6 +84,11 @@ impl Preview {
         let shown = self.list.named.iter().skip(self.top).take(READ_MAX);
         let span = shown.map(|named| AddressSpan { table: named.table, address: named.address, count: named.len() });
         span.filter(|span| span.range().end <= 0x1_0000)
+    }
+
+    /// What was read.
+    pub fn list(&self) -> &List {
+        &self.list
     }
 
     fn change_meaning(&mut self) {
@@ -106,7 +114,11 @@ impl Registers {
         let base = Some(self.base).filter(|base| *base != AddressBase::Modicon);
         let (table, order, unit) = (self.table, self.order, self.unit);
         let context = ListContext { table, base, order, unit: Some(unit), ..ListContext::default() };
-        let preview = Preview::new(bytes.to_vec(), context);
+        let preview = Preview::new(bytes.to_vec(), context.clone());
+        // A file of another unit is read for what it is of.
+        let is_other = preview.list.named.is_empty() && preview.list.refused.is_none();
+        let preview =
+            if is_other { Preview::new(bytes.to_vec(), ListContext { unit: None, ..context }) } else { preview };
         if let Some(why) = preview.list.refused {
             return Err(why);
         }
@@ -127,13 +139,26 @@ impl Registers {
         preview.top = motion.to(preview.top, preview.count(), room);
     }
 
-    /// Takes the names, in place of those that were there.
+    /// Asks for the file of a profile.
+    fn keep_list(&mut self) -> Vec<UiAction> {
+        match &self.preview {
+            Some(preview) if preview.list.unclear.is_some() => vec![unclear()],
+            _ => self.ask_profile(),
+        }
+    }
+
+    /// Takes the names, in place of those that were there. Of several at one address the first has the row of the window.
     fn take_list(&mut self) -> Vec<UiAction> {
         let Some(preview) = self.preview.take_if(|preview| preview.list.unclear.is_none()) else {
-            let words = t!("Its addresses can be read in two ways: say first which with b.").to_owned();
-            return vec![UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![words])))];
+            return vec![unclear()];
         };
-        let list = preview.list;
+        let mut list = preview.list;
+        let mut places = std::collections::BTreeSet::new();
+        let is_first = |named: &Named| places.insert((named.table, named.address));
+        let (named, others) = list.named.into_iter().partition(is_first);
+        list.named = named;
+        let only = |named: Named| t!("{name}: only a profile has several at one address", name = named.name);
+        list.problems.extend(Vec::into_iter(others).map(only));
         let taken = t!("{count} names taken", count = list.named.len());
         if let Some(first) = list.named.first() {
             (self.table, self.first, self.selected) = (first.table, first.address, first.address);
@@ -141,9 +166,14 @@ impl Registers {
         list.named.into_iter().for_each(|named| self.names.put(named));
         vec![UiAction::Open(Modal::Notice(Notice::list(
             t!("load a register list"),
-            std::iter::once(taken).chain(list.problems).collect(),
+            std::iter::once(taken).chain(list.warnings).chain(list.problems).collect(),
         )))]
     }
+}
+
+fn unclear() -> UiAction {
+    let words = t!("Its addresses can be read in two ways: say first which with b.").to_owned();
+    UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![words])))
 }
 
 /// `holding 79`.

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{Asking, Registers};
+use super::{Asking, Registers, preview};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -11,7 +11,7 @@ use crate::{
         tag::{Decimals, TagDef},
     },
     profile::new_plant::{NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
-    register_map::named::Named,
+    register_map::{self, named::Named},
     ui::Effect,
 };
 
@@ -84,14 +84,49 @@ impl Registers {
     }
 }
 
+impl Registers {
+    /// Asks for the file of a profile of the list that is shown.
+    pub(super) fn ask_profile(&mut self) -> Vec<UiAction> {
+        self.asking = Asking::Profile;
+        let hint = t!("a new device profile; an existing file is never overwritten");
+        vec![UiAction::Open(Modal::Prompt(Prompt::new(t!("save as device profile"), hint, "device.toml")))]
+    }
+
+    /// Writes all of the list as a device profile, which was checked before; says what was left out.
+    pub(super) fn save_profile(&mut self, text: &str) -> Result<Vec<UiAction>, String> {
+        let mut path = PathBuf::from(text);
+        path.set_extension("toml");
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        if stem.is_empty() || text.is_empty() {
+            return Err(t!("expected the name of a file such as bench.toml").to_owned());
+        }
+        let list =
+            self.preview.as_ref().map(preview::Preview::list).ok_or_else(|| t!("there is nothing in it").to_owned())?;
+        let written = register_map::profile::written(list, &plain_name(&stem), t!("a list"))?;
+        let save = Effect::SaveReport { tab: Some(Tab::Registers), path, bytes: written.text.into_bytes(), new: true };
+        let mut actions = vec![UiAction::Do(save)];
+        if !written.problems.is_empty() {
+            actions.push(UiAction::Open(Modal::Notice(Notice::list(t!("save as device profile"), written.problems))));
+        }
+        Ok(actions)
+    }
+}
+
 /// Why nothing is loaded.
 pub fn no_list(why: String) -> UiAction {
     UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![why])))
 }
 
 /// What became of the file.
-pub fn outcome(result: Result<PathBuf, String>) -> UiAction {
+pub fn outcome(result: Result<PathBuf, String>, is_profile: bool) -> UiAction {
     let words = match result {
+        Ok(path) if is_profile => vec![
+            t!("saved {path}", path = path.display()),
+            t!(
+                "sightglass check {file} says what is in it; a plant file beside it names it as profile.",
+                file = path.display()
+            ),
+        ],
         Ok(path) => vec![
             t!("saved {path}", path = path.display()),
             t!(

@@ -189,11 +189,25 @@ fn the_meaning_of_a_column_is_changed_by_a_key() {
 }
 
 #[test]
+fn a_configuration_of_another_program_is_saved_as_a_profile() {
+    let mut bench = Bench::at_unit(|_, _| None);
+    let text = "modbus:\n  - sensors:\n    - { name: Flow rate, slave: 3, address: 5, scale: 0.1 }\n    - { name: Own, slave: 3, address: 6, structure: \">h\", data_type: custom }\n";
+    bench.send(Msg::Loaded(Tab::Registers, Ok(text.into())));
+    let shown = bench.screen(120, 24);
+    assert!(shown.contains("1 registers can be taken, 1 lines cannot") && shown.contains("S profile"), "{shown}");
+    let effects = type_keys(&mut bench.model, &format!("S{}meter⏎", "\u{8}".repeat(11)));
+    let [Effect::SaveReport { path, bytes, new: true, .. }] = &effects[..] else { panic!("{effects:?}") };
+    let saved = String::from_utf8_lossy(bytes).into_owned();
+    assert_eq!(path.to_str(), Some("meter.toml"));
+    assert!(saved.contains("name = \"Flow_rate\"") && saved.contains("label = \"Flow rate\""), "{saved}");
+}
+
+#[test]
 fn a_file_that_is_no_list_is_refused_with_what_can_be_read() {
     let mut bench = Bench::at_unit(|_, _| None);
     for (text, name) in [
-        ("{ \"group\": { \"points\": [] } }", "a model of SunSpec"),
-        ("modbus:\n  - name: hub\n    type: tcp\n", "Home Assistant"),
+        ("{ \"group\": { \"points\": [] } }", "there is nothing in it"),
+        ("a: 1\nb: 2\nc:\n  - d: 3\n", "it is YAML"),
         ("Mode\tCode\nWait\t0\nOn\t1\n", "no column of addresses"),
     ] {
         bench.send(Msg::Loaded(Tab::Registers, Ok(text.into())));
