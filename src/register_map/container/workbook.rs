@@ -1,13 +1,13 @@
 //! The sheets of an Excel workbook, as rows of cells.
 
-use std::io::{self, Cursor, Read};
+use std::io::{Cursor, Read};
 
 use calamine::{DataRef, Reader, Xlsx};
 
 use crate::{register_map::list::cells::Cells, t};
 
 /// Most bytes of a workbook once it is unpacked.
-const UNPACKED_MAX: u64 = 96 << 20;
+const UNPACKED_MAX: usize = 96 << 20;
 /// Most rows and columns of a sheet that are read.
 const ROWS_MAX: u32 = 20_000;
 const COLUMNS_MAX: u32 = 256;
@@ -38,11 +38,19 @@ pub fn sheets(bytes: &[u8]) -> Result<Vec<(String, Vec<Cells>)>, String> {
 fn check_size(bytes: &[u8]) -> Result<(), String> {
     let broken = |error: &dyn std::fmt::Display| t!("it is no Excel workbook (.xlsx): {error}", error);
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|error| broken(&error))?;
-    let mut left = UNPACKED_MAX;
+    let (mut size, mut buffer) = (0, vec![0; 1 << 16]);
     for n in 0..archive.len() {
-        let entry = archive.by_index(n).map_err(|error| broken(&error))?;
-        let size = io::copy(&mut entry.take(left + 1), &mut io::sink()).map_err(|error| broken(&error))?;
-        left = left.checked_sub(size).ok_or_else(|| t!("it is nested too deeply, or too large").to_owned())?;
+        let mut entry = archive.by_index(n).map_err(|error| broken(&error))?;
+        loop {
+            let read = entry.read(&mut buffer).map_err(|error| broken(&error))?;
+            if read == 0 {
+                break;
+            }
+            size += read;
+            if UNPACKED_MAX < size {
+                return Err(t!("it is nested too deeply, or too large").to_owned());
+            }
+        }
     }
     Ok(())
 }

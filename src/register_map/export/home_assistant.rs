@@ -78,7 +78,21 @@ fn register(tag: &TagDef, keys: &mut Vec<String>) -> Result<(), &'static str> {
         DataType::F32 => "float32",
         DataType::F64 => "float64",
         DataType::Text(_) | DataType::TextToNul(_) => "string",
-        _ => return Err("its type"),
+        DataType::Bool
+        | DataType::Bcd16
+        | DataType::Bcd32
+        | DataType::I8
+        | DataType::U8
+        | DataType::I24
+        | DataType::U24
+        | DataType::I48
+        | DataType::U48
+        | DataType::Sm16
+        | DataType::Sm32
+        | DataType::Mod10k(_)
+        | DataType::SignedMod10k(_)
+        | DataType::Chars(_)
+        | DataType::Clock(_) => return Err("its type"),
     };
     keys.push(format!("data_type: {kind}"));
     let swap = match point.order {

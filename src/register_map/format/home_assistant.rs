@@ -45,6 +45,8 @@ const SENSOR: &[&str] = &[
     "virtual_count",
     "structure",
 ];
+/// What an entity may be; sensors first.
+const SECTIONS: [&str; 7] = ["sensors", "binary_sensors", "switches", "lights", "fans", "covers", "climates"];
 /// Most registers of an array.
 const ARRAY_MAX: i64 = 1_000;
 
@@ -55,10 +57,10 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
     // A file that is included has the sensors of one hub, without their key.
     let is_sensors = hubs.items().iter().all(|item| item.get("address").is_some());
     if is_sensors {
-        hubs.items().iter().for_each(|item| row(&mut list, context, 0, "sensors", item));
+        hubs.items().iter().for_each(|item| row(&mut list, context, 0, SECTIONS[0], item));
     }
     for (n, hub) in hubs.items().iter().enumerate().filter(|_| !is_sensors) {
-        for section in ["sensors", "binary_sensors", "switches", "lights", "fans", "covers", "climates"] {
+        for section in SECTIONS {
             let items = hub.all(section);
             if let [Node { line, value: Value::Scalar(_) }] = items {
                 list.problems.push(t!("line {line}: `{section}` is in another file", line = *line, section));
@@ -73,8 +75,9 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
 fn row(list: &mut List, context: &ListContext, hub: usize, section: &str, item: &Node) {
     let unit = item.get("slave").or(item.get("device_address")).and_then(Node::whole);
     let station = unit.and_then(|unit| Some((hub, u8::try_from(unit).ok()?))).or((0 < hub).then_some((hub, 0)));
+    let is_sensor = section == SECTIONS[0];
     let rows = match section {
-        "sensors" => sensors(item),
+        _ if is_sensor => sensors(item),
         "binary_sensors" => entities::binary_sensors(item),
         "covers" => entities::cover(item).map(|one| vec![one]),
         "climates" => entities::climate(item),
@@ -89,7 +92,7 @@ fn row(list: &mut List, context: &ListContext, hub: usize, section: &str, item: 
         list.push_of(context, station, item.line, named);
     }
     if taken < list.named.len() {
-        list.note_keys(item, &[PLAIN, if section == "sensors" { SENSOR } else { entities::KEPT }]);
+        list.note_keys(item, &[PLAIN, if is_sensor { SENSOR } else { entities::KEPT }]);
     }
 }
 

@@ -210,7 +210,7 @@ parameters:
 
 #[test]
 fn a_template_of_wiren_board_is_read_without_its_setup() {
-    let text = r#"{ // of nobody
+    let text = r#"{ // of a maker
  "title": "Relay", "device_type": "relay", "device": { "word_order": "little_endian",
   "channels": [
    { "name": "Temp", "reg_type": "input", "address": 4, "type": "temperature", "format": "s16", "scale": 0.1, "error_value": "0x7FFF" },
