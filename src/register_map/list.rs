@@ -135,6 +135,14 @@ impl List {
         self.push(&t!("line {number}", number = line), named);
     }
 
+    /// Says once that the file has more rows than are read.
+    fn warn_cut(&mut self) {
+        let words = t!("only the first {count} rows are read", count = cells::ROWS_MAX);
+        if !self.warnings.contains(&words) {
+            self.warnings.push(words);
+        }
+    }
+
     /// Adds another list; its places have this in front.
     pub fn append(&mut self, other: List, place: &str) {
         for named in other.named {
@@ -157,6 +165,11 @@ impl List {
 
     /// Adds what a row gave.
     pub fn push(&mut self, place: &str, named: Result<Named, String>) {
+        // Each row is compared with all others.
+        if cells::ROWS_MAX <= self.named.len() {
+            self.warn_cut();
+            return;
+        }
         let free = named.and_then(|named| match self.named.iter().find_map(|old| conflict(old, &named)) {
             Some(why) => Err(format!("{}: {why}", named.name)),
             None => Ok(named),
@@ -195,6 +208,9 @@ pub fn parse(text: &str, context: &ListContext) -> List {
 /// Reads rows of cells, which a separator or the cells of a table keep apart.
 pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> List {
     let mut list = List::default();
+    if cells::ROWS_MAX <= all.len() {
+        list.warn_cut();
+    }
     let rows = match all.iter().position(|row| is_heading(&row.cells)) {
         Some(first) => {
             let above = all[..first].iter().map(|row| Row::without_cells(row.line));

@@ -1,7 +1,7 @@
 //! A text becomes rows of cells: at one separator for the whole text where its heading has one, else line by line.
 
 /// Most rows of a list.
-const ROWS_MAX: usize = 10_000;
+pub const ROWS_MAX: usize = 10_000;
 /// A cell may have several lines; one with more has lost its closing quote.
 const CELL_LINES_MAX: usize = 40;
 

@@ -57,6 +57,14 @@ fn any_bytes_as_any_form_are_no_panic() {
 }
 
 #[test]
+fn a_file_with_more_rows_than_are_read_says_so() {
+    let rows = |count: usize| (0..count).map(|n| format!("{n};n{n}\n")).collect::<String>();
+    let list = list_of(&format!("address;name\n{}", rows(10_050)));
+    assert_eq!((list.named.len(), &list.warnings[..]), (9_999, &["only the first 10000 rows are read".to_owned()][..]));
+    assert_eq!(list_of(&format!("address;name\n{}", rows(50))).warnings, Vec::<String>::new());
+}
+
+#[test]
 fn line_ends_marks_and_encodings_change_nothing() {
     let text = "address;name;unit\n5;Flow;°C\n6;Level;cm\n";
     let plain = list_of(text);

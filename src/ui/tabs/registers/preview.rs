@@ -74,9 +74,14 @@ impl Preview {
         self.list = register_map::read(&self.bytes, &self.context);
     }
 
-    /// Rows and lines that are left out.
+    /// Rows, and what is said of others.
     fn count(&self) -> usize {
-        self.list.named.len() + self.list.problems.len()
+        self.list.named.len() + self.said().count()
+    }
+
+    /// What is odd about the file, and the lines that are left out.
+    fn said(&self) -> impl Iterator<Item = &String> {
+        self.list.warnings.iter().chain(&self.list.problems)
     }
 
     /// What is read beside the window, so that the rows on the screen have values.
@@ -191,7 +196,8 @@ fn base_words(context: &ListContext) -> &'static str {
 
 /// Draws it.
 pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
-    let (Some(Preview { context, list, column, top, .. }), theme) = (&tab.preview, cx.theme) else { return };
+    let (Some(preview), theme) = (&tab.preview, cx.theme) else { return };
+    let Preview { context, list, column, top, .. } = preview;
     let room = canvas.width().saturating_sub(2);
     let (count, left) = (list.named.len(), list.problems.len());
     let words = t!("{count} registers can be taken, {left} lines cannot. Are the values right?", count, left);
@@ -235,7 +241,7 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         canvas.text_right(room, y, &value, if is_good { theme.strong() } else { theme.dim() });
     }
     let shown = list.named.len().saturating_sub(*top).min(rows);
-    let problems = list.problems.iter().skip(top.saturating_sub(list.named.len())).take(rows - shown);
+    let problems = preview.said().skip(top.saturating_sub(list.named.len())).take(rows - shown);
     for (y, problem) in (HEAD + to_u16(shown)..).zip(problems) {
         canvas.text(1, y, &fit_words(problem, room), theme.trouble());
     }
