@@ -50,6 +50,10 @@ pub fn order_of(text: &str) -> Option<ByteOrder> {
 
 /// The type that a manual means by a word.
 pub fn kind_of(text: &str) -> Option<DataType> {
+    // As a profile says it, and an export: `cstring(8)`, `mod10k(2)`.
+    if let Ok(kind) = text.trim().parse() {
+        return Some(kind);
+    }
     let word: String = text.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
     let text_bytes =
         ["string", "char", "ascii"].iter().find_map(|prefix| word.strip_prefix(prefix)?.parse::<u8>().ok());
@@ -180,6 +184,8 @@ mod tests {
         check("uint8le", Some(1), Some((DataType::U8, Some(ByteOrder::Badc))));
         check("int8be", None, Some((DataType::I8, Some(ByteOrder::Abcd))));
         check("uint48", Some(3), Some((DataType::U48, None)));
+        check("cstring(8)", None, Some((DataType::TextToNul(8), None)));
+        check("mod10k(2)", Some(2), Some((DataType::Mod10k(2), None)));
     }
 
     #[test]
