@@ -121,6 +121,7 @@
 //! | to add | touch |
 //! |---|---|
 //! | a device, a plant, a scenario | one TOML file under `profiles` |
+//! | a form of register maps | its file in `register_map/format`, its rows in `register_map/mod.rs` and `format/foreign.rs` |
 //! | a data type | its variant and rows in `plant/data_type.rs` |
 //! | an alarm condition | `plant/alarm/condition.rs`, its keys in `profile/condition.rs`, one scenario |
 //! | a symbol of the mimic | its kind in `profile/picture/symbol.rs`, its item in `plant/mimic_def.rs`, its drawing in `ui/widgets/mimic` |
@@ -144,6 +145,7 @@ pub mod text;
 pub mod plant;
 pub mod profile;
 pub mod bus;
+pub mod register_map;
 pub mod sim;
 pub mod report;
 pub mod history;

@@ -31,6 +31,7 @@ mod own_files;
 mod paths;
 mod profile_choice;
 mod profiles;
+mod register_map;
 mod progress;
 mod prompt;
 mod recognition;
@@ -134,6 +135,8 @@ enum Command {
     Mimic(mimic::Args),
     /// List the known profiles, print one, or the page about the format
     Profiles(profiles::Args),
+    /// Import a register map of another program as a device profile, or export a profile
+    Profile(register_map::Args),
     /// Print a page of the manual, or the options of a command
     Help(help::Args),
     /// Write the report of a shift or period from the history, through the station while it runs
@@ -309,6 +312,7 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Check(args)) => check::main(args),
         Some(Command::Mimic(args)) => mimic::main(&args),
         Some(Command::Profiles(args)) => profiles::main(args),
+        Some(Command::Profile(args)) => register_map::main(args),
         Some(Command::Help(args)) => help::main(&args),
         Some(Command::Report(args)) => report::main(args),
         Some(Command::Export(args)) => export::main(args),

@@ -119,7 +119,7 @@ impl Point {
 }
 
 /// Do the bits of both say the same? −0 of a float is a mark of its own, 0 is either.
-pub(super) fn is_same(mark: Exact, raw: Exact) -> bool {
+pub fn is_same(mark: Exact, raw: Exact) -> bool {
     let is_minus_zero = |number: Exact| number.near() == 0.0 && number.near().is_sign_negative();
     mark == raw && (!is_minus_zero(mark) || is_minus_zero(raw))
 }

@@ -84,6 +84,14 @@ impl Errors {
             Severity::Warning | Severity::Advice => "warning",
         }
     }
+    /// Line and message of each, where it has a place.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (usize, String)> {
+        self.list.iter().filter_map(|problem| {
+            let at = problem.at?;
+            let why = if problem.label.is_empty() { String::new() } else { format!(" ({})", problem.label) };
+            Some((self.sources[at.source].position(at.start).0, format!("{}{why}", problem.message)))
+        })
+    }
     /// One line for each problem: `tank.toml:12:8: unknown line `L2``.
     pub fn lines(&self) -> impl Iterator<Item = String> {
         self.list.iter().map(|problem| match problem.at {

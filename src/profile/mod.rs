@@ -57,6 +57,7 @@ pub(crate) mod sunspec;
 mod size;
 mod tag;
 mod tag_keys;
+pub(crate) mod tag_text;
 mod units;
 
 #[cfg(test)]
@@ -134,6 +135,11 @@ fn check_device(stem: &str, text: plant::Text) -> Result<Checked, Errors> {
     let find = |_: &str| Ok(Some(plant::Text { file: file.clone(), bytes: bytes.clone() }));
     plant::build(stem, &plant, &plant::Library { find: &find, names: vec![stem.to_owned()], is_program: &|_| true })
         .map(|(def, warnings)| Checked { plant: Arc::new(def), warnings })
+}
+
+/// Checks the text of a device profile that is not written yet.
+pub(crate) fn check_text(name: &str, text: &str) -> Result<Checked, Errors> {
+    check_device(name, plant::Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() })
 }
 
 /// The device profiles of the configuration folders and beside a plant file: those that the plant file can name.

@@ -4,13 +4,16 @@ use std::{fmt::Write, time::Duration};
 
 use toml_edit::Value;
 
-use super::{OwnProfiles, edit};
+use super::{
+    OwnProfiles, edit,
+    tag_text::{quoted, tag_keys},
+};
 use crate::plant::{
     PlantDef,
     address::of_modicon,
     def::{LineDef, TagId},
     live::ReplyTimes,
-    tag::{Access, ByteOrder, Decimals, Poll, TagDef},
+    tag::{Access, Poll, TagDef},
 };
 
 /// Most values on the mimic, pens of the trend and tags of the report.
@@ -308,41 +311,11 @@ fn is_number(tag: &TagDef) -> bool {
     !tag.is_text() && tag.enum_labels.is_empty()
 }
 
-/// The keys of a tag, those that are usual left out.
+/// The keys of a tag, read often.
 fn tag_text(tag: &TagDef) -> String {
-    let point = tag.point;
-    let mut keys = vec![
-        format!("name = {}", quoted(&tag.short)),
-        format!("table = {}", quoted(point.table.word())),
-        format!("address = {}", point.address),
-    ];
-    if !point.table.is_bits() {
-        keys.push(format!("type = {}", quoted(&point.kind.to_string())));
-    }
-    if point.order != ByteOrder::Abcd {
-        keys.push(format!("order = {}", quoted(point.order.word())));
-    }
-    if !tag.is_text() {
-        let number = |key: &str, value: f64| format!("{key} = {}", Value::from(value).to_string().trim());
-        keys.extend((tag.scale != 1.0).then(|| number("scale", tag.scale)));
-        keys.extend((tag.offset != 0.0).then(|| number("offset", tag.offset)));
-        if let Decimals::Fixed(decimals) = tag.decimals {
-            keys.push(format!("decimals = {decimals}"));
-        }
-        keys.extend((!tag.unit.is_empty()).then(|| format!("unit = {}", quoted(&tag.unit))));
-        if !tag.enum_labels.is_empty() {
-            let labels = tag.enum_labels.iter().map(|(number, word)| format!("{number} = {}", quoted(word)));
-            keys.push(format!("enum = {{ {} }}", labels.collect::<Vec<_>>().join(", ")));
-        }
-    }
-    keys.extend((tag.access == Access::ReadWrite).then(|| "access = \"rw\"".to_owned()));
+    let mut keys = tag_keys(tag);
     keys.push("poll = \"fast\"".to_owned());
     keys.join(", ")
-}
-
-/// A string of TOML.
-fn quoted(text: &str) -> String {
-    Value::from(text).to_string().trim().to_owned()
 }
 
 /// What a tag may be called: letters, digits and `- _ / # + .`, anything else becomes `_`.

@@ -13,7 +13,6 @@ pub struct OwnProfiles {
 
 impl OwnProfiles {
     /// One that lies in the folder that the program was started in.
-    #[cfg(test)]
     pub fn of_text(name: &str, text: &str) -> OwnProfiles {
         let text = plant::Text { file: format!("{name}.toml"), bytes: text.as_bytes().to_vec() };
         OwnProfiles { texts: BTreeMap::from([(name.to_owned(), text)]) }

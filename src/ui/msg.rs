@@ -51,7 +51,7 @@ pub enum Msg {
     /// A log of this tab could not be written, and why.
     LogFailed(Tab, String),
     /// The text of a file that this tab wanted, or why not.
-    Loaded(Tab, Result<String, String>),
+    Loaded(Tab, Result<Vec<u8>, String>),
     /// The station did not take this command: its queue is full, or it has gone.
     Undelivered(CommandId, &'static str),
     /// The preferences were kept, and what the file holds now; or why not.

@@ -93,6 +93,8 @@ fn no_file_and_no_name_of_one_acts_on_the_terminal() {
             vec!["export", path, "--out", "-"],
             vec!["alarms", path],
             vec!["profiles", path],
+            vec!["profile", "import", path, "--format", "list"],
+            vec!["profile", "export", path, "--format", "csv"],
         ] {
             check(&args, "");
         }

@@ -37,6 +37,7 @@
 //! | `endings` | every way in which a terminal or its station can end, in a pseudo-terminal |
 //! | `settings` | settings of a line: tried out, saved into the plant file; commands made before a reload |
 //! | `exact` | counters of 64 bits from a slave to every screen, file and write: all digits; writes to all units of a line |
+//! | `register_maps` | register maps of others by command: what becomes a profile, and what is said |
 //! | `reload` | a plant file reloaded: what is as it was keeps its connections, values and curves |
 //! | `durability` | killed, unplugged, locked, damaged |
 //! | `guarded` | a station whose users must log in, for `rights` and `users` |
@@ -77,6 +78,7 @@ mod outstanding;
 mod peers;
 mod users;
 mod pty;
+mod register_maps;
 mod reload;
 mod reports;
 mod rights;

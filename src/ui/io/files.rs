@@ -5,17 +5,20 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::profile::io::{
-    atomic::{write_for_user, write_new},
-    regular,
+use crate::{
+    profile::io::{
+        atomic::{write_for_user, write_new},
+        regular,
+    },
+    register_map,
 };
 
 /// Most bytes of a file that is loaded.
-const LOAD_MAX: u64 = 4 << 20;
+const LOAD_MAX: u64 = register_map::BYTES_MAX;
 
-/// A text of the user; one of another encoding is read as well as it can be.
-pub(super) fn load(path: &Path) -> io::Result<String> {
-    Ok(String::from_utf8_lossy(&regular::read(path, LOAD_MAX)?).into_owned())
+/// A file of the user.
+pub(super) fn load(path: &Path) -> io::Result<Vec<u8>> {
+    regular::read(path, LOAD_MAX)
 }
 
 /// A half-written report never has the name of a whole one.

@@ -146,7 +146,7 @@ pub trait TabView: Keyed {
     }
 
     /// The text of a file that the tab wanted, or why not.
-    fn on_loaded(&mut self, _cx: &ViewContext, _result: Result<String, String>) -> Vec<UiAction> {
+    fn on_loaded(&mut self, _cx: &ViewContext, _result: Result<Vec<u8>, String>) -> Vec<UiAction> {
         Vec::new()
     }
 

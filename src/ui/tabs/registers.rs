@@ -8,14 +8,12 @@ mod cells;
 mod compare;
 mod detail;
 mod find;
-mod import;
 mod keys;
 mod layout;
 mod likely;
-mod list;
 mod lists;
-mod names;
 mod page;
+mod preview;
 mod recognise;
 mod save;
 mod unit;
@@ -32,7 +30,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 #[cfg(test)]
 pub use self::keys::chords_of_page;
 pub use self::watch::start::{Start, parse_all as parse_watched};
-use self::{cells::Cells, names::Names, recognise::Recognition};
+use self::{cells::Cells, recognise::Recognition};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -41,6 +39,7 @@ use crate::{
         tag::{ByteOrder, Table},
     },
     profile::OwnProfiles,
+    register_map::named::Names,
     ui::Effect,
 };
 
@@ -82,7 +81,7 @@ pub struct Registers {
     /// What came of a log, said with the next snapshot.
     said: Option<UiAction>,
     /// A list that was loaded and is not taken yet.
-    preview: Option<import::preview::Preview>,
+    preview: Option<preview::Preview>,
     /// A list that was pasted, which is read with the next snapshot.
     pasted: Option<String>,
     /// Number and steady time of the read on its way, and what it reads.
@@ -113,6 +112,7 @@ enum Asking {
     Enable,
     Name,
     Save,
+    Profile,
     List,
     Write,
     Compare,
@@ -192,7 +192,7 @@ impl TabView for Registers {
         }
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         match (&self.preview, &self.picking) {
-            (Some(_), _) => import::preview::view(self, cx, &mut canvas),
+            (Some(_), _) => preview::view(self, cx, &mut canvas),
             (None, Some(picking)) => picking.view(cx, &mut canvas),
             (None, None) => view::view(self, cx, &mut canvas),
         }
@@ -211,7 +211,7 @@ impl TabView for Registers {
         // A window closes when a session begins.
         actions.extend(self.said.take_if(|_| cx.session.who.is_some()));
         if let Some(text) = self.pasted.take_if(|_| cx.session.who.is_some()) {
-            actions.extend(self.load_list(cx, &text));
+            actions.extend(self.load_list(cx, text.as_bytes()));
         }
         if !self.paused && (self.on_way.is_none() || wanted) {
             actions.extend(self.ask(cx, None));
@@ -281,6 +281,7 @@ impl TabView for Registers {
             Asking::Compare => self.compare_typed(cx, text)?,
             Asking::Save => return self.save(cx, text),
             Asking::Log => return self.log_typed(text),
+            Asking::Profile => return self.save_profile(text),
             Asking::List => {
                 return Ok(vec![UiAction::Do(Effect::Load { tab: Tab::Registers, path: PathBuf::from(text) })]);
             }
@@ -292,9 +293,9 @@ impl TabView for Registers {
         Ok(self.read_now(cx))
     }
 
-    fn on_loaded(&mut self, cx: &ViewContext, result: Result<String, String>) -> Vec<UiAction> {
+    fn on_loaded(&mut self, cx: &ViewContext, result: Result<Vec<u8>, String>) -> Vec<UiAction> {
         match result {
-            Ok(text) => self.load_list(cx, &text),
+            Ok(bytes) => self.load_list(cx, &bytes),
             Err(why) => vec![save::no_list(why)],
         }
     }

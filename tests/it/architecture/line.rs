@@ -5,8 +5,21 @@ use std::fs;
 use super::source::{self, Facts, snippet};
 
 /// Modules in reading order; a module may use only what stands before it.
-const LINE: [&str; 13] = [
-    "text", "plant", "profile", "bus", "sim", "report", "history", "access", "north", "station", "attach", "ui", "cli",
+const LINE: [&str; 14] = [
+    "text",
+    "plant",
+    "profile",
+    "bus",
+    "register_map",
+    "sim",
+    "report",
+    "history",
+    "access",
+    "north",
+    "station",
+    "attach",
+    "ui",
+    "cli",
 ];
 
 fn breaches(files: &[Facts]) -> Vec<String> {

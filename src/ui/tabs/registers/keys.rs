@@ -118,7 +118,7 @@ impl KeyTable for Registers {
             (true, _) if self.watch.is_shown_log() => Keys::below(&GRAPH),
             (true, true) => Keys::below(&GRAPH).and(Keys::of(&[LOG, BACK])),
             (true, false) => Keys::below(&GRAPH).and(Keys::of(&[BACK])),
-            (false, _) if self.preview.is_some() => Keys::of(import::preview::KEYS),
+            (false, _) if self.preview.is_some() => Keys::of(preview::KEYS),
             (false, _) if self.picking.is_some() => listing::all_keys(Keys::of(&[lists::KEYS])),
             (false, true) => Keys::of(BENCH),
             (false, false) => Keys::of(PLANT),
@@ -136,7 +136,7 @@ impl KeyTable for Registers {
             let log = Keys::of(&[LOG]).chords();
             ("graph", [chords, log].concat())
         });
-        let list = ("list", Keys::of(import::preview::KEYS).chords());
+        let list = ("list", Keys::of(preview::KEYS).chords());
         let picks = ("picks", listing::all_keys(Keys::<Registers>::of(&[lists::KEYS])).chords());
         [("registers", Keys::of(BENCH).chords()), list, picks].into_iter().chain(graph).collect()
     }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Registers, find, names::Named, view::named_text};
+use super::{Registers, find, view::named_text};
 use crate::bus::recognise;
 use crate::plant::{
     PlantDef,
@@ -10,6 +10,7 @@ use crate::plant::{
     live::{AddressSpan, LiveRead, SPANS_MAX},
     tag::{ByteOrder, Table},
 };
+use crate::register_map::named::Named;
 use crate::ui::tabs::prelude::*;
 
 /// Rows around the selected one that are read, to either side.

@@ -1,11 +1,14 @@
 //! The registers as a page of the tab Bus, of a unit that the plant file knows.
 
-use super::{Registers, names::Named};
-use crate::plant::{
-    number::to_i8,
-    tag::{Decimals, Table, TagDef},
-};
+use super::Registers;
 use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::{
+        number::to_i8,
+        tag::{Decimals, Table, TagDef},
+    },
+    register_map::named::Named,
+};
 
 impl Registers {
     /// As a page of another tab.

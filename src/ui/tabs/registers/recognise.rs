@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{LOST_AFTER, Registers, names::Named};
+use super::{LOST_AFTER, Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{
@@ -16,6 +16,7 @@ use crate::{
         tag::TagDef,
     },
     profile::sunspec::profile_text,
+    register_map::named::Named,
 };
 
 /// The name of the profile that was made of the SunSpec models, until it is saved.

@@ -2,19 +2,20 @@
 
 use std::{path::PathBuf, sync::Arc};
 
-use super::{Asking, Registers, names::Named, recognise::SUNSPEC};
+use super::{Asking, Registers, preview, recognise::SUNSPEC};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         PlantDef,
         def::LineDef,
         exact::Exact,
-        tag::{Access, Decimals, Point, TagDef},
+        tag::{Access, Decimals, TagDef},
     },
     profile::{
         new_plant::{NewAlarm, NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
         suggested_alarms::{plausible_alarms, suggested_alarms},
     },
+    register_map::{self, named::Named},
     ui::Effect,
 };
 
@@ -67,7 +68,7 @@ impl Registers {
     pub(super) fn on_written(&mut self, result: Result<PathBuf, String>) -> Vec<UiAction> {
         match (self.saved_next.take(), result) {
             (Some((path, bytes)), Ok(_)) => vec![save_new(path, bytes)],
-            (_, result) => vec![outcome(result)],
+            (_, result) => vec![outcome(result, self.asking == Asking::Profile)],
         }
     }
 
@@ -79,8 +80,8 @@ impl Registers {
         let tags = self.names.iter().filter(|named| !profile.is_some_and(|profile| is_of(named, &profile.tags)));
         let tags = tags.map(|named| {
             let is_written = self.writing.has_written(self.unit, named.table, named.address);
-            let access = if is_written { Access::ReadWrite } else { Access::Read };
-            let tag = TagDef { access, ..tag_of(named, &taken) };
+            let tag = tag_of(named, &taken);
+            let tag = if is_written { TagDef { access: Access::ReadWrite, ..tag } } else { tag };
             taken.push(tag.short.clone());
             tag
         });
@@ -123,8 +124,36 @@ impl Registers {
     }
 
     /// Shows a register list before it is taken; or says why it is none.
-    pub(super) fn load_list(&mut self, cx: &ViewContext, text: &str) -> Vec<UiAction> {
-        self.preview(cx, text).unwrap_or_else(|why| vec![no_list(why)])
+    pub(super) fn load_list(&mut self, cx: &ViewContext, bytes: &[u8]) -> Vec<UiAction> {
+        self.preview(cx, bytes).unwrap_or_else(|why| vec![no_list(why)])
+    }
+}
+
+impl Registers {
+    /// Asks for the file of a profile of the list that is shown.
+    pub(super) fn ask_profile(&mut self) -> Vec<UiAction> {
+        self.asking = Asking::Profile;
+        let hint = t!("a new device profile; an existing file is never overwritten");
+        vec![UiAction::Open(Modal::Prompt(Prompt::new(t!("save as device profile"), hint, "device.toml")))]
+    }
+
+    /// Writes all of the list as a device profile, which was checked before; says what was left out.
+    pub(super) fn save_profile(&mut self, text: &str) -> Result<Vec<UiAction>, String> {
+        let mut path = PathBuf::from(text);
+        path.set_extension("toml");
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        if stem.is_empty() || text.is_empty() {
+            return Err(t!("expected the name of a file such as bench.toml").to_owned());
+        }
+        let list =
+            self.preview.as_ref().map(preview::Preview::list).ok_or_else(|| t!("there is nothing in it").to_owned())?;
+        let written = register_map::profile::written(list, &plain_name(&stem), t!("a list"))?;
+        let save = Effect::SaveReport { tab: Some(Tab::Registers), path, bytes: written.text.into_bytes(), new: true };
+        let mut actions = vec![UiAction::Do(save)];
+        if !written.problems.is_empty() {
+            actions.push(UiAction::Open(Modal::Notice(Notice::list(t!("save as device profile"), written.problems))));
+        }
+        Ok(actions)
     }
 }
 
@@ -139,8 +168,15 @@ pub fn no_list(why: String) -> UiAction {
 }
 
 /// What became of the file.
-fn outcome(result: Result<PathBuf, String>) -> UiAction {
+fn outcome(result: Result<PathBuf, String>, is_profile: bool) -> UiAction {
     let words = match result {
+        Ok(path) if is_profile => vec![
+            t!("saved {path}", path = path.display()),
+            t!(
+                "sightglass check {file} says what is in it; a plant file beside it names it as profile.",
+                file = path.display()
+            ),
+        ],
         Ok(path) => vec![
             t!("saved {path}", path = path.display()),
             t!(
@@ -163,24 +199,10 @@ fn is_of(named: &Named, tags: &[TagDef]) -> bool {
 fn tag_of(named: &Named, taken: &[String]) -> TagDef {
     let plain = plain_name(&named.name);
     let short = if taken.contains(&plain) { format!("{plain}_{}", named.address) } else { plain };
-    tag(named, &short)
+    named.tag(&short)
 }
 
-/// What is named, as a tag that is called so.
-pub fn tag(named: &Named, name: &str) -> TagDef {
-    let point = Point { table: named.table, address: named.address, kind: named.kind, order: named.order, field: None };
-    TagDef {
-        short: name.to_owned(),
-        scale: named.scale,
-        offset: named.offset,
-        decimals: Decimals::Fixed(named.decimals),
-        unit: named.unit.clone(),
-        enum_labels: named.enum_labels.clone(),
-        ..TagDef::new(TagId(0), DeviceId(0), name, point)
-    }
-}
-
-/// The decimals of a tag that [`tag`] has made.
+/// The decimals of a tag that [`Named::tag`] has made.
 pub fn decimals(tag: &TagDef) -> u8 {
     if let Decimals::Fixed(decimals) = tag.decimals { decimals } else { 0 }
 }

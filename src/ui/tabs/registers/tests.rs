@@ -8,7 +8,8 @@ mod watch;
 
 use std::sync::Arc;
 
-use super::{names::Named, *};
+use super::*;
+use crate::register_map::named::Named;
 use crate::{
     plant::{
         PlantDef,

@@ -2,8 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Asking, Recognition, Registers, cells::Cells, names::Names};
-use crate::ui::tabs::prelude::*;
+use super::{Asking, Recognition, Registers, cells::Cells};
+use crate::{register_map::named::Names, ui::tabs::prelude::*};
 
 impl Registers {
     pub(super) fn ask_unit(&mut self, cx: &ViewContext) -> Vec<UiAction> {

@@ -6,7 +6,6 @@ use super::{
     cells::Cell,
     compare, detail,
     layout::{Columns, layout, name_column},
-    names::Named,
     watch,
 };
 use crate::ui::tabs::prelude::*;
@@ -18,6 +17,7 @@ use crate::{
         event::LineState,
         tag::{ByteOrder, DataType},
     },
+    register_map::named::Named,
 };
 
 /// Rows of the heading: tables, state, names of the columns.

@@ -7,7 +7,6 @@ use std::{collections::VecDeque, path::PathBuf};
 
 use super::{
     Asking, Registers,
-    names::Named,
     view::{is_long_ago, named_text},
 };
 use crate::ui::tabs::prelude::*;
@@ -20,6 +19,7 @@ use crate::{
         tag::{ByteOrder, DataType, Encoding, Table},
     },
     profile::unit_of,
+    register_map::named::Named,
     report::value_log,
     text::file,
     ui::{Effect, widgets::spark},

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Registers, import::preview::Preview, view};
+use super::{Registers, preview::Preview, view};
 use crate::{
     access::right::needs_for_query,
     plant::{

@@ -3,11 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::AddressSpan;
-use super::{
-    Registers,
-    names::{Named, Names},
-};
+use super::{AddressSpan, Registers};
 use crate::ui::{chrome::outcome_words, tabs::prelude::*};
 use crate::{
     bus::codec,
@@ -19,6 +15,7 @@ use crate::{
         scale,
         tag::{ByteOrder, DataType, Encoding, Point, Table},
     },
+    register_map::named::{Named, Names},
 };
 
 /// Writes that are listed.

@@ -139,7 +139,7 @@ fn a_list_from_a_manual_gives_names() {
     let mut bench = Bench::at_unit(device_of_a_manual);
     bench.keys("Nlist.csv⏎");
     let list = "address;name;type;scale;unit\n41003;SV;int16;0.1;°C\nsee page 9\n";
-    bench.send(Msg::Loaded(Tab::Registers, Ok(list.to_owned())));
+    bench.send(Msg::Loaded(Tab::Registers, Ok(list.into())));
     let read = bench.answer(1, |address| device_of_a_manual(Table::Holding, address));
     assert!(read.spans.iter().any(|span| span.address == 1002), "what the list names is read: {read:?}");
     let shown = bench.screen(80, 24);
@@ -164,7 +164,7 @@ fn a_list_from_a_manual_gives_names() {
 fn a_list_that_can_be_read_in_two_ways_asks_before_it_is_taken() {
     let mut bench = Bench::at_unit(|_, _| None);
     let list = "address;name;type\n40080;W;int16\n40083;VA;int16\n".to_owned();
-    bench.send(Msg::Loaded(Tab::Registers, Ok(list)));
+    bench.send(Msg::Loaded(Tab::Registers, Ok(list.into_bytes())));
     let shown = bench.screen(120, 24);
     let both = "40080: holding 79 (Modicon) or holding 40080 (as sent)? b says which";
     assert!(shown.contains(both), "{shown}");
@@ -178,7 +178,7 @@ fn a_list_that_can_be_read_in_two_ways_asks_before_it_is_taken() {
 #[test]
 fn the_meaning_of_a_column_is_changed_by_a_key() {
     let mut bench = Bench::at_unit(|_, _| None);
-    bench.send(Msg::Loaded(Tab::Registers, Ok("address;name;factor\n5;W;10\n6;VA;100\n".to_owned())));
+    bench.send(Msg::Loaded(Tab::Registers, Ok("address;name;factor\n5;W;10\n6;VA;100\n".into())));
     bench.answer(1, |address| Some(address * 10));
     assert!(bench.screen(120, 24).contains("×10 "), "{}", bench.screen(120, 24));
     bench.keys("→→m");
@@ -189,14 +189,28 @@ fn the_meaning_of_a_column_is_changed_by_a_key() {
 }
 
 #[test]
+fn a_configuration_of_another_program_is_saved_as_a_profile() {
+    let mut bench = Bench::at_unit(|_, _| None);
+    let text = "modbus:\n  - sensors:\n    - { name: Flow rate, slave: 3, address: 5, scale: 0.1 }\n    - { name: Own, slave: 3, address: 6, structure: \">h\", data_type: custom }\n";
+    bench.send(Msg::Loaded(Tab::Registers, Ok(text.into())));
+    let shown = bench.screen(120, 24);
+    assert!(shown.contains("1 registers can be taken, 1 lines cannot") && shown.contains("S profile"), "{shown}");
+    let effects = type_keys(&mut bench.model, &format!("S{}meter⏎", "\u{8}".repeat(11)));
+    let [Effect::SaveReport { path, bytes, new: true, .. }] = &effects[..] else { panic!("{effects:?}") };
+    let saved = String::from_utf8_lossy(bytes).into_owned();
+    assert_eq!(path.to_str(), Some("meter.toml"));
+    assert!(saved.contains("name = \"Flow_rate\"") && saved.contains("label = \"Flow rate\""), "{saved}");
+}
+
+#[test]
 fn a_file_that_is_no_list_is_refused_with_what_can_be_read() {
     let mut bench = Bench::at_unit(|_, _| None);
     for (text, name) in [
-        ("{ \"group\": { \"points\": [] } }", "a model of SunSpec"),
-        ("modbus:\n  - name: hub\n    type: tcp\n", "Home Assistant"),
+        ("{ \"group\": { \"points\": [] } }", "there is nothing in it"),
+        ("a: 1\nb: 2\nc:\n  - d: 3\n", "it is YAML"),
         ("Mode\tCode\nWait\t0\nOn\t1\n", "no column of addresses"),
     ] {
-        bench.send(Msg::Loaded(Tab::Registers, Ok(text.to_owned())));
+        bench.send(Msg::Loaded(Tab::Registers, Ok(text.into())));
         let shown = bench.screen(120, 40);
         assert!(shown.contains(name) && shown.contains("What can be"), "{shown}");
         bench.keys("⎋");

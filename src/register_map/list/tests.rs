@@ -3,7 +3,7 @@
 use super::*;
 
 fn context() -> ListContext {
-    ListContext { table: Table::Holding, base: None, order: ByteOrder::Abcd, unit: 1, means: BTreeMap::new() }
+    ListContext { unit: Some(1), ..ListContext::default() }
 }
 
 fn shown(list: &List) -> Vec<String> {

@@ -1,17 +1,19 @@
 //! A list before anything of it is taken: its first rows with what they hold now, what its columns mean, and what is left out.
 
-use super::super::{
-    Registers,
-    list::{Column, List, ListContext, Unclear},
-    next,
-    view::named_text,
-};
-use crate::plant::{
-    address::{AddressBase, TABLES},
-    live::AddressSpan,
-    tag::{ByteOrder, Table},
-};
+use super::{Registers, next, view::named_text};
 use crate::ui::tabs::prelude::*;
+use crate::{
+    plant::{
+        address::{AddressBase, TABLES},
+        live::AddressSpan,
+        tag::{ByteOrder, Table},
+    },
+    register_map::{
+        self,
+        list::{Column, List, ListContext, Unclear},
+        named::Named,
+    },
+};
 
 /// Rows above the list: what can be taken, addresses, columns, heading.
 const HEAD: u16 = 4;
@@ -21,7 +23,7 @@ const READ_MAX: usize = 24;
 /// A list that was loaded and is not taken yet.
 #[derive(Debug)]
 pub struct Preview {
-    text: String,
+    bytes: Vec<u8>,
     context: ListContext,
     list: List,
     /// The selected column.
@@ -55,24 +57,31 @@ const LIST: &[Key] = &[
         registers.change_list(|preview| preview.context.order = next(&ByteOrder::ALL, preview.context.order))
     }),
 ];
+const KEEP: &[Key] =
+    &[Key::new(char('S'), "profile", "save all of it as a device profile", |registers, _| registers.keep_list())];
 const CANCEL: &[Key] = &[Key::elsewhere(code(KeyCode::Esc), "cancel", "take nothing of this list")];
 
 /// All keys.
-pub const KEYS: &[&[keys::Key<Registers>]] = &[&SCROLL, LIST, CANCEL];
+pub const KEYS: &[&[keys::Key<Registers>]] = &[&SCROLL, LIST, KEEP, CANCEL];
 
 impl Preview {
-    fn new(text: String, context: ListContext) -> Preview {
-        let list = super::parse(&text, &context);
-        Preview { text, context, list, column: 0, top: 0 }
+    fn new(bytes: Vec<u8>, context: ListContext) -> Preview {
+        let list = register_map::read(&bytes, &context);
+        Preview { bytes, context, list, column: 0, top: 0 }
     }
 
     fn read_again(&mut self) {
-        self.list = super::parse(&self.text, &self.context);
+        self.list = register_map::read(&self.bytes, &self.context);
     }
 
-    /// Rows and lines that are left out.
+    /// Rows, and what is said of others.
     fn count(&self) -> usize {
-        self.list.named.len() + self.list.problems.len()
+        self.list.named.len() + self.said().count()
+    }
+
+    /// What is odd about the file, and the lines that are left out.
+    fn said(&self) -> impl Iterator<Item = &String> {
+        self.list.warnings.iter().chain(&self.list.problems)
     }
 
     /// What is read beside the window, so that the rows on the screen have values.
@@ -80,6 +89,11 @@ impl Preview {
         let shown = self.list.named.iter().skip(self.top).take(READ_MAX);
         let span = shown.map(|named| AddressSpan { table: named.table, address: named.address, count: named.len() });
         span.filter(|span| span.range().end <= 0x1_0000)
+    }
+
+    /// What was read.
+    pub fn list(&self) -> &List {
+        &self.list
     }
 
     fn change_meaning(&mut self) {
@@ -101,11 +115,15 @@ impl Preview {
 
 impl Registers {
     /// Shows what a list has before it is taken; `Err` says why it is none.
-    pub fn preview(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
+    pub fn preview(&mut self, cx: &ViewContext, bytes: &[u8]) -> Result<Vec<UiAction>, String> {
         let base = Some(self.base).filter(|base| *base != AddressBase::Modicon);
         let (table, order, unit) = (self.table, self.order, self.unit);
-        let context = ListContext { table, base, order, unit, means: Default::default() };
-        let preview = Preview::new(text.to_owned(), context);
+        let context = ListContext { table, base, order, unit: Some(unit), ..ListContext::default() };
+        let preview = Preview::new(bytes.to_vec(), context.clone());
+        // A file of another unit is read for what it is of.
+        let is_other = preview.list.named.is_empty() && preview.list.refused.is_none();
+        let preview =
+            if is_other { Preview::new(bytes.to_vec(), ListContext { unit: None, ..context }) } else { preview };
         if let Some(why) = preview.list.refused {
             return Err(why);
         }
@@ -126,13 +144,26 @@ impl Registers {
         preview.top = motion.to(preview.top, preview.count(), room);
     }
 
-    /// Takes the names, in place of those that were there.
+    /// Asks for the file of a profile.
+    fn keep_list(&mut self) -> Vec<UiAction> {
+        match &self.preview {
+            Some(preview) if preview.list.unclear.is_some() => vec![unclear()],
+            _ => self.ask_profile(),
+        }
+    }
+
+    /// Takes the names, in place of those that were there. Of several at one address the first has the row of the window.
     fn take_list(&mut self) -> Vec<UiAction> {
         let Some(preview) = self.preview.take_if(|preview| preview.list.unclear.is_none()) else {
-            let words = t!("Its addresses can be read in two ways: say first which with b.").to_owned();
-            return vec![UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![words])))];
+            return vec![unclear()];
         };
-        let list = preview.list;
+        let mut list = preview.list;
+        let mut places = std::collections::BTreeSet::new();
+        let is_first = |named: &Named| places.insert((named.table, named.address));
+        let (named, others) = list.named.into_iter().partition(is_first);
+        list.named = named;
+        let only = |named: Named| t!("{name}: only a profile has several at one address", name = named.name);
+        list.problems.extend(Vec::into_iter(others).map(only));
         let taken = t!("{count} names taken", count = list.named.len());
         if let Some(first) = list.named.first() {
             (self.table, self.first, self.selected) = (first.table, first.address, first.address);
@@ -140,9 +171,14 @@ impl Registers {
         list.named.into_iter().for_each(|named| self.names.put(named));
         vec![UiAction::Open(Modal::Notice(Notice::list(
             t!("load a register list"),
-            std::iter::once(taken).chain(list.problems).collect(),
+            std::iter::once(taken).chain(list.warnings).chain(list.problems).collect(),
         )))]
     }
+}
+
+fn unclear() -> UiAction {
+    let words = t!("Its addresses can be read in two ways: say first which with b.").to_owned();
+    UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![words])))
 }
 
 /// `holding 79`.
@@ -160,7 +196,8 @@ fn base_words(context: &ListContext) -> &'static str {
 
 /// Draws it.
 pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
-    let (Some(Preview { context, list, column, top, .. }), theme) = (&tab.preview, cx.theme) else { return };
+    let (Some(preview), theme) = (&tab.preview, cx.theme) else { return };
+    let Preview { context, list, column, top, .. } = preview;
     let room = canvas.width().saturating_sub(2);
     let (count, left) = (list.named.len(), list.problems.len());
     let words = t!("{count} registers can be taken, {left} lines cannot. Are the values right?", count, left);
@@ -204,7 +241,7 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         canvas.text_right(room, y, &value, if is_good { theme.strong() } else { theme.dim() });
     }
     let shown = list.named.len().saturating_sub(*top).min(rows);
-    let problems = list.problems.iter().skip(top.saturating_sub(list.named.len())).take(rows - shown);
+    let problems = preview.said().skip(top.saturating_sub(list.named.len())).take(rows - shown);
     for (y, problem) in (HEAD + to_u16(shown)..).zip(problems) {
         canvas.text(1, y, &fit_words(problem, room), theme.trouble());
     }

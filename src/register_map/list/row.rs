@@ -1,17 +1,18 @@
 //! The cells of a row by what they hold, and what becomes of them.
 
 use super::{
-    super::names::Named,
     cells::Cells,
     columns::{Column, Columns, address_in, first_of, is_address},
-    words::{decimals_of, kind_of, number_of, order_of, power_of_ten, table_of, type_of},
+    words::{bad_of, field_of, kind_of, labels_of, number_of, order_of, power_of_ten, table_of, type_of},
 };
 use crate::{
     plant::{
         address::{AddressBase, AddressContext, of_modicon},
-        tag::{ByteOrder, DataType, Table},
+        keyword::Keyword,
+        tag::{Access, ByteOrder, DataType, Table},
     },
     profile::{is_known_unit, unit_of},
+    register_map::named::{Named, decimals_of},
     t,
 };
 
@@ -31,8 +32,25 @@ pub struct Row {
     /// As the row states it.
     pub table: Option<Table>,
     order: Option<ByteOrder>,
+    /// Unit address, as the row states it.
+    pub device: Option<u8>,
+    more: More,
     /// Why it cannot be taken, whatever else it says.
     wrong: Option<String>,
+}
+
+/// What few lists say.
+#[derive(Debug, Default)]
+struct More {
+    access: Option<Access>,
+    min: Option<f64>,
+    max: Option<f64>,
+    decimals: Option<u8>,
+    labels: Vec<(i128, String)>,
+    bits: Vec<(i128, String)>,
+    field: Option<(u8, u8)>,
+    bad: Vec<i128>,
+    group: String,
 }
 
 /// What a list does not say itself.
@@ -40,6 +58,8 @@ pub struct Row {
 pub struct Assumed {
     /// Table of a plain number.
     pub table: Table,
+    /// It is said so.
+    pub is_stated: bool,
     /// How one counts.
     pub base: AddressBase,
     /// Order of what takes several registers.
@@ -53,7 +73,7 @@ impl Row {
     }
 
     /// Below a heading.
-    pub fn headed(columns: &Columns, row: &Cells, unit: u8) -> Row {
+    pub fn headed(columns: &Columns, row: &Cells) -> Row {
         let mut read = Row { line: row.line, ..Row::default() };
         if row.is_unclosed {
             return Row { wrong: Some(t!("a quote is never closed").to_owned()), ..read };
@@ -79,15 +99,13 @@ impl Row {
         read.length = cell(Column::Length).and_then(|cell| cell.parse().ok());
         read.unit = cell(Column::Unit).cloned().unwrap_or_default();
         read.table = cell(Column::Table).and_then(|cell| table_of(cell));
+        read.device = cell(Column::Device).and_then(|cell| cell.parse().ok());
         read.order = cell(Column::Order).and_then(|cell| order_of(cell));
         let problems = [
             cell(Column::Order).filter(|_| read.order.is_none()).map(|order| t!("`{order}` is no byte order", order)),
             cell(Column::Table).filter(|_| read.table.is_none()).map(|table| t!("`{table}` is no table", table)),
             cell(Column::Formula)
                 .map(|formula| t!("the formula `{formula}` is more than a factor and an offset", formula)),
-            cell(Column::Device)
-                .filter(|cell| cell.parse() != Ok(unit))
-                .map(|other| t!("it is of unit {other}, the registers of unit {unit} are shown", other, unit)),
             read.factor(cell(Column::Scale), cell(Column::Divisor), cell(Column::Exponent)).err(),
         ];
         match cell(Column::Offset).map(|cell| (number_of(cell), cell)) {
@@ -95,6 +113,17 @@ impl Row {
             Some((Some(offset), _)) => read.offset = offset,
             None => {}
         }
+        read.more = More {
+            access: cell(Column::Access).and_then(|cell| Access::from_word(cell)),
+            min: cell(Column::Min).and_then(|cell| number_of(cell)),
+            max: cell(Column::Max).and_then(|cell| number_of(cell)),
+            decimals: cell(Column::Decimals).and_then(|cell| cell.parse().ok()),
+            labels: cell(Column::Labels).and_then(|cell| labels_of(cell)).unwrap_or_default(),
+            bits: cell(Column::Bits).and_then(|cell| labels_of(cell)).unwrap_or_default(),
+            field: cell(Column::Field).and_then(|cell| field_of(cell)),
+            bad: cell(Column::Bad).and_then(|cell| bad_of(cell)).unwrap_or_default(),
+            group: cell(Column::Group).cloned().unwrap_or_default(),
+        };
         read.wrong = problems.into_iter().flatten().next().or(read.wrong);
         read
     }
@@ -159,7 +188,8 @@ impl Row {
 
     /// Table and address, as assumed where the row does not say more.
     fn place(&self, assumed: Assumed) -> Option<(Table, u16)> {
-        let (table, is_stated) = (self.table.unwrap_or(assumed.table), self.table.is_some());
+        let table = self.table.unwrap_or(assumed.table);
+        let is_stated = self.table.is_some() || assumed.is_stated;
         AddressContext { table, is_stated, base: assumed.base }.parse(first_of(self.address.as_ref()?))
     }
 
@@ -192,7 +222,31 @@ impl Row {
         let scale = self.scale.unwrap_or(1.0);
         let (decimals, unit) = (decimals_of(scale, kind), unit_of(&self.unit));
         let named = Named::new(table, address, kind, order, &self.name);
-        Ok(Named { scale, offset: self.offset, decimals, unit, ..named })
+        let decimals = decimals.max(decimals_of(self.offset, DataType::U16));
+        Ok(self.with_more(Named { scale, offset: self.offset, decimals, unit, ..named }))
+    }
+
+    fn with_more(&self, named: Named) -> Named {
+        let more = &self.more;
+        let is_writable = matches!(named.table, Table::Holding | Table::Coil) && !named.kind.is_text();
+        let access = more.access.filter(|_| is_writable).unwrap_or(named.access);
+        let is_written = access != Access::Read;
+        let field = more.field.filter(|_| named.kind.is_binary() && !named.table.is_bits());
+        let named = Named {
+            access,
+            min: more.min.filter(|_| is_written),
+            max: more.max.filter(|_| is_written),
+            decimals: more.decimals.unwrap_or(named.decimals),
+            field,
+            group: more.group.clone(),
+            ..named
+        };
+        let raw = |number: &i128| named.point().raw_number(*number, false).number();
+        let bad_if = more.bad.iter().filter_map(raw).collect();
+        let bits = more.bits.iter().filter_map(|(bit, label)| Some((u8::try_from(*bit).ok()?, label.clone())));
+        let bit_labels = bits.collect();
+        let named = Named { bad_if, bit_labels, ..named };
+        if more.labels.is_empty() { named } else { named.labelled(more.labels.clone()) }
     }
 }
 

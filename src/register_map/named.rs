@@ -1,15 +1,17 @@
 //! What registers are called and how their numbers become values: the one place for names of a unit, wherever they come
 //! from (a device profile, a list from a manual, by hand).
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, time::Duration};
 
 use crate::{
-    bus::{codec, interpret},
+    bus::codec,
     plant::{
         exact::Exact,
+        id::{DeviceId, TagId},
         number::digits,
+        raw_number::is_same,
         scale,
-        tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
+        tag::{Access, Bound, ByteOrder, DataType, Decimals, Encoding, Point, Poll, Table, TagDef},
     },
     t,
 };
@@ -37,10 +39,30 @@ pub struct Named {
     pub name: String,
     /// Names of the numbers of an enumeration, before scaling; empty for a quantity.
     pub enum_labels: Vec<(i128, String)>,
+    /// Only these bits of its registers, lowest and number.
+    pub field: Option<(u8, u8)>,
     /// Names of the bits of a status word.
     pub bit_labels: Vec<(u8, String)>,
     /// Raw numbers that mean "no value".
     pub bad_if: Vec<Exact>,
+    /// `Battery`; empty for none.
+    pub group: String,
+    /// Least and greatest value that may be written, in its unit.
+    pub min: Option<f64>,
+    /// The greatest.
+    pub max: Option<f64>,
+    /// What may be done with it.
+    pub access: Access,
+    /// The function that it must be written with.
+    pub write_fc: Option<u8>,
+    /// Where it is written, if not where it is read.
+    pub write_at: Option<(Table, u16)>,
+    /// How often it is read, where that is said.
+    pub poll: Option<Duration>,
+    /// Where a power of ten stands by which it is multiplied besides.
+    pub power_at: Option<u16>,
+    /// The line of the file that it comes from; 0 for none.
+    pub line: usize,
 }
 
 impl Named {
@@ -57,8 +79,18 @@ impl Named {
             unit: String::new(),
             name: name.to_owned(),
             enum_labels: Vec::new(),
+            field: None,
             bit_labels: Vec::new(),
             bad_if: Vec::new(),
+            group: String::new(),
+            min: None,
+            max: None,
+            access: Access::Read,
+            write_fc: None,
+            write_at: None,
+            poll: None,
+            power_at: None,
+            line: 0,
         }
     }
 
@@ -73,7 +105,40 @@ impl Named {
         let scale = format!("{}e{power}", tag.scale).parse().unwrap_or(tag.scale);
         let decimals = Decimals::shown(decimals);
         let (enum_labels, bit_labels, bad_if) = (tag.enum_labels.clone(), tag.bit_labels.clone(), tag.bad_if.clone());
-        Named { scale, offset: tag.offset, decimals, unit, enum_labels, bit_labels, bad_if, ..plain }
+        let field = tag.point.field;
+        Named { scale, offset: tag.offset, decimals, unit, enum_labels, bit_labels, bad_if, field, ..plain }
+    }
+
+    /// The same as a tag that is called so.
+    pub fn tag(&self, name: &str) -> TagDef {
+        let bound = |value: Option<f64>| value.map(|value| Bound::Fixed(value.into()));
+        let plain = TagDef::new(TagId(0), DeviceId(0), name, self.point());
+        TagDef {
+            short: name.to_owned(),
+            label: if self.name == name { String::new() } else { self.name.clone() },
+            scale: self.scale,
+            offset: self.offset,
+            decimals: Decimals::Fixed(self.decimals),
+            unit: self.unit.clone(),
+            enum_labels: self.enum_labels.clone(),
+            bit_labels: self.bit_labels.clone(),
+            bad_if: self.bad_if.clone(),
+            group: self.group.clone(),
+            min: bound(self.min),
+            max: bound(self.max),
+            access: self.access,
+            write_fc: self.write_fc,
+            write_at: self.write_at,
+            read_modify_write: self.access != Access::Read && self.point().part().is_some(),
+            poll: self.poll.map_or(plain.poll, Poll::Every),
+            ..plain
+        }
+    }
+
+    /// Sets the scale, and the decimals that show what it leaves.
+    pub fn scaled(self, scale: f64, offset: f64) -> Named {
+        let decimals = decimals_of(scale, self.kind).max(decimals_of(offset, self.kind));
+        Named { scale, offset, decimals, ..self }
     }
 
     /// Registers or bits that it takes.
@@ -92,7 +157,7 @@ impl Named {
         if self.kind.is_text() {
             return codec::decode_text(self.point(), words.get(..usize::from(self.len()))?);
         }
-        let raw = self.raw(words)?;
+        let raw = self.raw(words).filter(|raw| !self.bad_if.iter().any(|bad| is_same(*bad, *raw)))?;
         if let Some((_, label)) = self.enum_labels.iter().find(|(number, _)| Exact::whole(*number) == raw) {
             return Some(label.clone());
         }
@@ -111,14 +176,21 @@ impl Named {
 
     /// Where and as what it is encoded.
     pub fn point(&self) -> Point {
-        Point { table: self.table, address: self.address, kind: self.kind, order: self.order, field: None }
+        Point { table: self.table, address: self.address, kind: self.kind, order: self.order, field: self.field }
     }
 
     /// The number before scaling; `None` as for [`Named::value`].
     pub fn raw(&self, words: &[u16]) -> Option<Exact> {
         let bit = || words.first().map(|word| f64::from(*word).into());
-        if self.table.is_bits() { bit() } else { interpret::number(self.kind, self.order, words) }
+        if self.table.is_bits() { bit() } else { codec::decode(self.point(), words.get(..usize::from(self.len()))?) }
     }
+}
+
+/// Decimals that show what a scale leaves of a raw number.
+pub fn decimals_of(scale: f64, kind: DataType) -> u8 {
+    let fraction = format!("{scale}").split_once('.').map_or(0, |(_, digits)| digits.len().min(6));
+    let float = kind.encoding() == Encoding::Float;
+    u8::try_from(if float { fraction.max(2) } else { fraction }).unwrap_or(0)
 }
 
 /// The names of a unit, by table and first address.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::{
     cells::Cells,
-    words::{is_sized_type, kind_of, number_of, table_of, type_of},
+    words::{bad_of, field_of, is_sized_type, kind_of, labels_of, number_of, table_of, type_of},
 };
 use crate::plant::{
     address::{AddressBase, AddressContext},
@@ -14,27 +14,55 @@ use crate::plant::{
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Column {
+    /// Of the first register.
     Address,
+    /// What it is called.
     Name,
+    /// Type of the raw value.
     Type,
     /// Registers.
     Length,
+    /// It multiplies.
     Scale,
+    /// It divides.
     Divisor,
     /// Of ten.
     Exponent,
+    /// Added after scaling.
     Offset,
+    /// `°C`.
     Unit,
+    /// One of the four.
     Table,
+    /// Of bytes and words.
     Order,
     /// Unit address.
     Device,
+    /// More than a scale and an offset.
     Formula,
+    /// `r`, `rw`, `w`.
+    Access,
+    /// Least value that may be written.
+    Min,
+    /// The greatest.
+    Max,
+    /// Decimals to show.
+    Decimals,
+    /// `0=off; 1=on`: names of numbers.
+    Labels,
+    /// The same of bits.
+    Bits,
+    /// `5-4`, `3`: bits of a register.
+    Field,
+    /// Raw numbers that mean "no value".
+    Bad,
+    /// What it belongs to.
+    Group,
 }
 
 impl Column {
     /// In the order in which a key offers them.
-    pub const ALL: [Column; 13] = [
+    pub const ALL: [Column; 22] = [
         Column::Address,
         Column::Name,
         Column::Type,
@@ -48,6 +76,15 @@ impl Column {
         Column::Order,
         Column::Device,
         Column::Formula,
+        Column::Access,
+        Column::Min,
+        Column::Max,
+        Column::Decimals,
+        Column::Labels,
+        Column::Bits,
+        Column::Field,
+        Column::Bad,
+        Column::Group,
     ];
 
     /// On the screen.
@@ -66,6 +103,15 @@ impl Column {
             Column::Order => "byte order",
             Column::Device => "unit address",
             Column::Formula => "formula",
+            Column::Access => "access",
+            Column::Min => "least",
+            Column::Max => "greatest",
+            Column::Decimals => "decimals",
+            Column::Labels => "names of numbers",
+            Column::Bits => "names of bits",
+            Column::Field => "bits",
+            Column::Bad => "no value",
+            Column::Group => "group",
         }
     }
 }
@@ -86,6 +132,18 @@ const HEADINGS: [(Column, &[&str]); 13] = [
     (Column::Offset, &["offset"]),
     (Column::Address, &["address", "addr", "addr.", "register", "reg", "reg.", "modicon", "pdu", "wire", "hex", "dec"]),
     (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function"]),
+];
+/// Headings that are this word and no more: as the export writes them.
+const EXACT: [(Column, &str); 9] = [
+    (Column::Access, "access"),
+    (Column::Min, "min"),
+    (Column::Max, "max"),
+    (Column::Decimals, "decimals"),
+    (Column::Labels, "enum"),
+    (Column::Bits, "bits"),
+    (Column::Field, "field"),
+    (Column::Bad, "bad if"),
+    (Column::Group, "group"),
 ];
 /// A heading with one of these alone is no column of addresses: tables of codes have them too.
 const WEAK: [&str; 2] = ["hex", "dec"];
@@ -206,6 +264,20 @@ fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
     if !cells.is_empty() && 80 <= share(&is_sized_type) {
         return Some(Column::Type);
     }
+    let exact = EXACT.iter().find(|(_, word)| heading.trim().eq_ignore_ascii_case(word)).map(|(column, _)| *column);
+    let is_number = |cell: &str| number_of(cell).is_some();
+    let fits_exactly = match exact {
+        Some(Column::Access) => 100 == share(&|cell| matches!(cell, "r" | "rw" | "w")),
+        Some(Column::Min | Column::Max | Column::Decimals) => 100 == share(&is_number),
+        Some(Column::Labels | Column::Bits) => 100 == share(&|cell| labels_of(cell).is_some()),
+        Some(Column::Field) => 100 == share(&|cell| field_of(cell).is_some()),
+        Some(Column::Bad) => 100 == share(&|cell| bad_of(cell).is_some()),
+        Some(_) => true,
+        None => false,
+    };
+    if fits_exactly {
+        return exact;
+    }
     let is_whole = |cell: &str| cell.parse::<u32>().is_ok();
     let fits = |column: Column| match column {
         Column::Address => 40 <= share(&|cell| is_address(&address_in(heading, cell))),
@@ -219,6 +291,15 @@ fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
         Column::Exponent => 60 <= share(&|cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number))),
         Column::Name => true,
         Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
+        Column::Access
+        | Column::Min
+        | Column::Max
+        | Column::Decimals
+        | Column::Labels
+        | Column::Bits
+        | Column::Field
+        | Column::Bad
+        | Column::Group => false,
     };
     let candidates = candidates(heading);
     if let Some(column) = candidates.iter().copied().find(|column| fits(*column)) {

@@ -1,7 +1,7 @@
 //! A text becomes rows of cells: at one separator for the whole text where its heading has one, else line by line.
 
 /// Most rows of a list.
-const ROWS_MAX: usize = 10_000;
+pub const ROWS_MAX: usize = 10_000;
 /// A cell may have several lines; one with more has lost its closing quote.
 const CELL_LINES_MAX: usize = 40;
 
@@ -34,6 +34,11 @@ pub fn rows(text: &str, separator: Option<char>) -> Vec<Cells> {
         Some(separator) => separated(text, separator),
         None => text.lines().zip(1..).map(|(line, number)| row(number, by_blanks(line))).collect(),
     };
+    without_rules(all)
+}
+
+/// The same rows without those that only draw a line, are blank or a comment.
+pub fn without_rules(all: Vec<Cells>) -> Vec<Cells> {
     let is_rule = |cells: &[String]| cells.iter().all(|cell| cell.chars().all(|sign| "-: ".contains(sign)));
     let is_comment = |cells: &[String]| cells.first().is_some_and(|cell| cell.starts_with('#'));
     all.into_iter().filter(|row| !is_rule(&row.cells) && !is_comment(&row.cells)).take(ROWS_MAX).collect()

@@ -1,7 +1,7 @@
 //! A register list from a manual becomes names: CSV, Markdown, or columns as they are copied from a PDF, recognised by their
 //! heading or, without one, by their form. What is not sure is not taken, and said by line.
 
-mod cells;
+pub mod cells;
 mod columns;
 mod row;
 pub mod words;
@@ -14,7 +14,7 @@ use self::{
     columns::{Columns, first_of, is_address, is_heading},
     row::{Assumed, Row},
 };
-use super::names::Named;
+use super::{Format, named::Named};
 use crate::{
     plant::{
         address::{AddressBase, AddressContext, of_modicon},
@@ -26,16 +26,40 @@ use crate::{
 /// What a list does not say itself, or what its reader has decided.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ListContext {
+    /// What the file is; `None`: what it seems.
+    pub format: Option<Format>,
     /// Table of an address that names none.
     pub table: Table,
+    /// It is said so: a Modicon number of another table is none.
+    pub is_table_stated: bool,
     /// How plain numbers count; `None`: that is not said.
     pub base: Option<AddressBase>,
     /// Order of what takes several registers.
     pub order: ByteOrder,
-    /// The unit whose registers are shown.
-    pub unit: u8,
+    /// The unit whose registers are wanted; `None`: the first that the file has.
+    pub unit: Option<u8>,
+    /// Where the first register of a map without addresses of its own stands.
+    pub start: Option<u16>,
+    /// Which of several models is meant, in a file that has a value for each, from 0.
+    pub variant: Option<usize>,
     /// What columns mean other than it seems.
     pub means: BTreeMap<usize, Option<Column>>,
+}
+
+impl Default for ListContext {
+    fn default() -> ListContext {
+        ListContext {
+            format: None,
+            table: Table::Holding,
+            is_table_stated: false,
+            base: None,
+            order: ByteOrder::Abcd,
+            unit: None,
+            start: None,
+            variant: None,
+            means: BTreeMap::new(),
+        }
+    }
 }
 
 /// What was read of a list, and what was not, by line.
@@ -51,6 +75,16 @@ pub struct List {
     pub unclear: Option<Unclear>,
     /// Heading of each column, and what it means.
     pub columns: Vec<(String, Option<Column>)>,
+    /// What it is.
+    pub format: Option<Format>,
+    /// Maker and model, where the file names them.
+    pub about: [String; 2],
+    /// Connection in the file and unit of the rows that are taken.
+    pub station: Option<(usize, u8)>,
+    /// What is assumed, or is odd about the file, beside its rows.
+    pub warnings: Vec<String>,
+    /// What is not kept of rows that are taken: how often, and in which line first.
+    pub notes: BTreeMap<String, (usize, usize)>,
 }
 
 /// The first address of a list that can be read in two ways.
@@ -70,41 +104,132 @@ impl List {
         List { refused: Some(why), ..List::default() }
     }
 
+    /// Adds what the row of a line gave, unless it is of another unit or connection than those that are taken.
+    pub fn push_of(
+        &mut self,
+        context: &ListContext,
+        station: Option<(usize, u8)>,
+        line: usize,
+        named: Result<Named, String>,
+    ) {
+        let wanted = |of: (usize, u8)| context.unit.is_none_or(|unit| unit == of.1);
+        let of_other = |(connection, unit): (usize, u8)| {
+            let taken = self.station.unwrap_or((connection, context.unit.unwrap_or(unit)));
+            if taken == (connection, unit) {
+                return None;
+            }
+            Some(match taken.1 == unit {
+                true => t!("it is of another connection with unit {unit}", unit),
+                false => {
+                    t!("it is of unit {other}, the registers of unit {unit} are taken", other = unit, unit = taken.1)
+                }
+            })
+        };
+        let named = match station.and_then(of_other) {
+            Some(why) => Err(why),
+            None => named,
+        };
+        if named.is_ok() && self.station.is_none() {
+            self.station = station.filter(|of| wanted(*of));
+        }
+        self.push(&t!("line {number}", number = line), named);
+    }
+
+    /// Says once that the file has more rows than are read.
+    fn warn_cut(&mut self) {
+        let words = t!("only the first {count} rows are read", count = cells::ROWS_MAX);
+        if !self.warnings.contains(&words) {
+            self.warnings.push(words);
+        }
+    }
+
+    /// Adds another list; its places have this in front.
+    pub fn append(&mut self, other: List, place: &str) {
+        for named in other.named {
+            let at = format!("{place}{}", t!("line {number}", number = named.line));
+            self.push(&at, Ok(named));
+        }
+        self.warnings.extend(other.warnings);
+        self.problems.extend(other.problems.into_iter().map(|problem| format!("{place}{problem}")));
+        self.unclear = self.unclear.take().or(other.unclear);
+        self.station = self.station.or(other.station);
+        if self.columns.is_empty() {
+            self.columns = other.columns;
+        }
+    }
+
+    /// Counts something of a row that is not kept, although the row is.
+    pub fn note(&mut self, what: String, line: usize) {
+        self.notes.entry(what).or_insert((0, line)).0 += 1;
+    }
+
     /// Adds what a row gave.
     pub fn push(&mut self, place: &str, named: Result<Named, String>) {
-        let free = named.and_then(|named| {
-            let is_taken = self.named.iter().any(|old| (old.table, old.address) == (named.table, named.address));
-            if is_taken { Err(t!("{name}: this address has a name already", name = named.name)) } else { Ok(named) }
+        // Each row is compared with all others.
+        if cells::ROWS_MAX <= self.named.len() {
+            self.warn_cut();
+            return;
+        }
+        let free = named.and_then(|named| match self.named.iter().find_map(|old| conflict(old, &named)) {
+            Some(why) => Err(format!("{}: {why}", named.name)),
+            None => Ok(named),
         });
         match free {
-            Ok(named) => self.named.push(named),
+            Ok(mut named) => {
+                named.name = named.name.split_whitespace().collect::<Vec<_>>().join(" ");
+                self.named.push(named);
+            }
             Err(why) => self.problems.push(format!("{place}: {why}")),
         }
     }
 }
 
+/// Why a register cannot be taken beside another one.
+fn conflict(old: &Named, new: &Named) -> Option<String> {
+    let end = |named: &Named| u32::from(named.address) + u32::from(named.len());
+    if old.table != new.table || end(old) <= u32::from(new.address) || end(new) <= u32::from(old.address) {
+        return None;
+    }
+    if (old.address, old.field) == (new.address, new.field) {
+        return Some(t!("this address has a name already").to_owned());
+    }
+    let is_same = (old.address, old.kind, old.order) == (new.address, new.kind, new.order);
+    let is_part = |named: &Named| named.point().part().is_some();
+    let are_fields = old.len() == 1 && new.len() == 1 && (is_part(old) || is_part(new));
+    (!is_same && !are_fields).then(|| t!("it overlaps {name}, which is read as another type", name = old.name))
+}
+
 /// Reads a list.
 pub fn parse(text: &str, context: &ListContext) -> List {
     let separator = cells::separator(text);
-    let all = cells::rows(text, separator);
+    of_cells(&cells::rows(text, separator), separator.is_some(), context)
+}
+
+/// Reads rows of cells, which a separator or the cells of a table keep apart.
+pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> List {
     let mut list = List::default();
+    if cells::ROWS_MAX <= all.len() {
+        list.warn_cut();
+    }
     let rows = match all.iter().position(|row| is_heading(&row.cells)) {
         Some(first) => {
             let above = all[..first].iter().map(|row| Row::without_cells(row.line));
-            above.chain(below_headings(&all[first..], separator.is_some(), context, &mut list)).collect()
+            above.chain(below_headings(&all[first..], is_separated, context, &mut list)).collect()
         }
-        None => match by_form(&all, separator.is_some()) {
+        None => match by_form(all, is_separated) {
             Ok(rows) => rows,
             Err(why) => return List::refused(why),
         },
     };
+    let stated = Some(context.table).filter(|_| context.is_table_stated);
     let written: Vec<(&str, Option<Table>)> =
-        rows.iter().filter_map(|row| Some((first_of(row.address.as_ref()?), row.table))).collect();
+        rows.iter().filter_map(|row| Some((first_of(row.address.as_ref()?), row.table.or(stated)))).collect();
     let (base, unclear) = base_of(&written, context);
     list.unclear = unclear;
-    let assumed = Assumed { table: context.table, base, order: context.order };
+    let assumed = Assumed { table: context.table, is_stated: context.is_table_stated, base, order: context.order };
     for row in rows {
-        list.push(&t!("line {number}", number = row.line), row.named(assumed));
+        let named = row.named(assumed).map(|named| Named { line: row.line, ..named });
+        list.push_of(context, row.device.map(|unit| (0, unit)), row.line, named);
     }
     list
 }
@@ -127,7 +252,7 @@ fn below_headings(all: &[Cells], is_separated: bool, context: &ListContext, list
         for row in below {
             // A line of a PDF with other columns than the heading is taken by its form.
             let read = if is_separated || row.cells.len() == heading.len() {
-                Row::headed(&columns, row, context.unit)
+                Row::headed(&columns, row)
             } else {
                 Row::by_form(row.line, &row.cells)
             };

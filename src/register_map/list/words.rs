@@ -1,7 +1,7 @@
 //! The words of a cell: types with their byte order, tables, factors.
 
 use crate::{
-    plant::tag::{ByteOrder, DataType, Encoding, Table},
+    plant::tag::{ByteOrder, DataType, Table},
     t,
 };
 
@@ -24,6 +24,7 @@ pub fn power_of_ten(exponent: f64) -> f64 {
     format!("1e{exponent}").parse().unwrap_or(f64::NAN)
 }
 
+/// The table that a word or a function code means.
 pub fn table_of(text: &str) -> Option<Table> {
     let text = text.to_lowercase().replace('_', " ");
     let is = |words: &[&str]| words.iter().any(|word| text.contains(word));
@@ -42,12 +43,17 @@ pub fn table_of(text: &str) -> Option<Table> {
     }
 }
 
+/// The order of four letters.
 pub fn order_of(text: &str) -> Option<ByteOrder> {
     ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(text))
 }
 
 /// The type that a manual means by a word.
 pub fn kind_of(text: &str) -> Option<DataType> {
+    // As a profile says it, and an export: `cstring(8)`, `mod10k(2)`.
+    if let Ok(kind) = text.trim().parse() {
+        return Some(kind);
+    }
     let word: String = text.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
     let text_bytes =
         ["string", "char", "ascii"].iter().find_map(|prefix| word.strip_prefix(prefix)?.parse::<u8>().ok());
@@ -133,11 +139,25 @@ pub fn type_of(word: &str, length: Option<u16>) -> Result<(DataType, Option<Byte
     }
 }
 
-/// Decimals that show what a scale leaves of a raw number.
-pub fn decimals_of(scale: f64, kind: DataType) -> u8 {
-    let fraction = format!("{scale}").split_once('.').map_or(0, |(_, digits)| digits.len().min(6));
-    let float = kind.encoding() == Encoding::Float;
-    u8::try_from(if float { fraction.max(2) } else { fraction }).unwrap_or(0)
+/// `0=off; 1=on`.
+pub fn labels_of(cell: &str) -> Option<Vec<(i128, String)>> {
+    let label = |part: &str| {
+        let (number, text) = part.split_once('=')?;
+        Some((number.trim().parse().ok()?, text.trim().to_owned()))
+    };
+    cell.split(';').map(label).collect()
+}
+
+/// `5-4` or `3`: the lowest bit and how many.
+pub fn field_of(cell: &str) -> Option<(u8, u8)> {
+    let (high, low) = cell.split_once('-').unwrap_or((cell, cell));
+    let (high, low): (u8, u8) = (high.trim().parse().ok()?, low.trim().parse().ok()?);
+    (low <= high && high < 64).then(|| (low, high - low + 1))
+}
+
+/// Numbers with a blank between them.
+pub fn bad_of(cell: &str) -> Option<Vec<i128>> {
+    cell.split_whitespace().map(|number| number.parse().ok()).collect()
 }
 
 #[cfg(test)]
@@ -164,6 +184,8 @@ mod tests {
         check("uint8le", Some(1), Some((DataType::U8, Some(ByteOrder::Badc))));
         check("int8be", None, Some((DataType::I8, Some(ByteOrder::Abcd))));
         check("uint48", Some(3), Some((DataType::U48, None)));
+        check("cstring(8)", None, Some((DataType::TextToNul(8), None)));
+        check("mod10k(2)", Some(2), Some((DataType::Mod10k(2), None)));
     }
 
     #[test]

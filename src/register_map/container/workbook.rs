@@ -1,0 +1,97 @@
+//! The sheets of an Excel workbook, as rows of cells.
+
+use std::io::{Cursor, Read};
+
+use calamine::{DataRef, Reader, Xlsx};
+
+use crate::{register_map::list::cells::Cells, t};
+
+/// Most bytes of a workbook once it is unpacked.
+const UNPACKED_MAX: usize = 96 << 20;
+/// Most rows and columns of a sheet that are read.
+const ROWS_MAX: u32 = 20_000;
+const COLUMNS_MAX: u32 = 256;
+const SHEETS_MAX: usize = 100;
+
+/// Is it an archive, as a workbook is?
+pub fn is_archive(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"PK\x03\x04")
+}
+
+/// Name and rows of each sheet that has any.
+pub fn sheets(bytes: &[u8]) -> Result<Vec<(String, Vec<Cells>)>, String> {
+    check_size(bytes)?;
+    let no_book = |error: &dyn std::fmt::Display| t!("it is no Excel workbook (.xlsx): {error}", error);
+    let mut book = Xlsx::new(Cursor::new(bytes)).map_err(|error| no_book(&error))?;
+    let mut sheets = Vec::new();
+    for name in book.sheet_names().into_iter().take(SHEETS_MAX) {
+        // A sheet that is a chart has no cells.
+        if let Ok(rows) = rows(&mut book, &name) {
+            sheets.push((name, rows));
+        }
+    }
+    sheets.retain(|(_, rows)| !rows.is_empty());
+    Ok(sheets)
+}
+
+/// A small file may be a large one in an archive.
+fn check_size(bytes: &[u8]) -> Result<(), String> {
+    let broken = |error: &dyn std::fmt::Display| t!("it is no Excel workbook (.xlsx): {error}", error);
+    let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|error| broken(&error))?;
+    let (mut size, mut buffer) = (0, vec![0; 1 << 16]);
+    for n in 0..archive.len() {
+        let mut entry = archive.by_index(n).map_err(|error| broken(&error))?;
+        loop {
+            let read = entry.read(&mut buffer).map_err(|error| broken(&error))?;
+            if read == 0 {
+                break;
+            }
+            size += read;
+            if UNPACKED_MAX < size {
+                return Err(t!("it is nested too deeply, or too large").to_owned());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn rows(book: &mut Xlsx<Cursor<&[u8]>>, name: &str) -> Result<Vec<Cells>, calamine::XlsxError> {
+    let mut cells = book.worksheet_cells_reader(name)?;
+    let mut rows: Vec<Cells> = Vec::new();
+    while let Some(cell) = cells.next_cell()? {
+        let (row, column) = cell.get_position();
+        let text = text(cell.get_value());
+        if text.is_empty() || COLUMNS_MAX <= column {
+            continue;
+        }
+        if ROWS_MAX <= row {
+            break;
+        }
+        let line = usize::try_from(row).unwrap_or(0) + 1;
+        if rows.last().is_none_or(|last| last.line != line) {
+            rows.push(Cells { line, cells: Vec::new(), is_unclosed: false });
+        }
+        let Some(last) = rows.last_mut() else { continue };
+        let column = usize::try_from(column).unwrap_or(0);
+        let width = last.cells.len().max(column + 1);
+        last.cells.resize(width, String::new());
+        last.cells[column] = text;
+    }
+    Ok(rows)
+}
+
+/// A number of a cell is a float that shows no more digits than it has.
+fn text(value: &DataRef<'_>) -> String {
+    let text = match value {
+        DataRef::Empty => String::new(),
+        DataRef::Int(number) => number.to_string(),
+        DataRef::Float(number) => number.to_string(),
+        DataRef::Bool(flag) => flag.to_string(),
+        DataRef::String(text) => text.clone(),
+        DataRef::SharedString(text) => (*text).to_owned(),
+        DataRef::DateTime(time) => time.to_string(),
+        DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => text.clone(),
+        DataRef::Error(error) => error.to_string(),
+    };
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,183 @@
+//! The `modbus:` section of Home Assistant: <https://www.home-assistant.io/integrations/modbus/>.
+
+mod entities;
+
+use std::time::Duration;
+
+use super::{missing, swapped, text_of, unsaid, wrong};
+use crate::{
+    plant::tag::{ByteOrder, DataType, Table},
+    profile::unit_of,
+    register_map::{
+        container::node::{Node, Tree, Value},
+        list::{List, ListContext, words},
+        named::Named,
+    },
+    t,
+};
+
+/// Keys without a meaning for a value, or read beside the row.
+const PLAIN: &[&str] = &[
+    "name",
+    "unique_id",
+    "device_class",
+    "state_class",
+    "slave",
+    "device_address",
+    "lazy_error_count",
+    "scan_interval",
+    "icon",
+    "entity_category",
+];
+/// Keys of a sensor that its row keeps.
+const SENSOR: &[&str] = &[
+    "address",
+    "input_type",
+    "data_type",
+    "count",
+    "swap",
+    "scale",
+    "offset",
+    "precision",
+    "unit_of_measurement",
+    "nan_value",
+    "slave_count",
+    "virtual_count",
+    "structure",
+];
+/// What an entity may be; sensors first.
+const SECTIONS: [&str; 7] = ["sensors", "binary_sensors", "switches", "lights", "fans", "covers", "climates"];
+/// Most registers of an array.
+const ARRAY_MAX: i64 = 1_000;
+
+/// Reads all hubs; the rows of the first unit are taken.
+pub fn read(tree: &Tree, context: &ListContext) -> List {
+    let mut list = List::of_tree(tree);
+    let hubs = tree.root.get("modbus").unwrap_or(&tree.root);
+    // A file that is included has the sensors of one hub, without their key.
+    let is_sensors = hubs.items().iter().all(|item| item.get("address").is_some());
+    if is_sensors {
+        hubs.items().iter().for_each(|item| row(&mut list, context, 0, SECTIONS[0], item));
+    }
+    for (n, hub) in hubs.items().iter().enumerate().filter(|_| !is_sensors) {
+        for section in SECTIONS {
+            let items = hub.all(section);
+            if let [Node { line, value: Value::Scalar(_) }] = items {
+                list.problems.push(t!("line {line}: `{section}` is in another file", line = *line, section));
+                continue;
+            }
+            items.iter().for_each(|item| row(&mut list, context, n, section, item));
+        }
+    }
+    list
+}
+
+fn row(list: &mut List, context: &ListContext, hub: usize, section: &str, item: &Node) {
+    let unit = item.get("slave").or(item.get("device_address")).and_then(Node::whole);
+    let station = unit.and_then(|unit| Some((hub, u8::try_from(unit).ok()?))).or((0 < hub).then_some((hub, 0)));
+    let is_sensor = section == SECTIONS[0];
+    let rows = match section {
+        _ if is_sensor => sensors(item),
+        "binary_sensors" => entities::binary_sensors(item),
+        "covers" => entities::cover(item).map(|one| vec![one]),
+        "climates" => entities::climate(item),
+        _ => entities::switch(item).map(|one| vec![one]),
+    };
+    let rows = rows.map_or_else(|why| vec![Err(why)], |rows| rows.into_iter().map(Ok).collect());
+    let poll = item.get("scan_interval").and_then(Node::whole).and_then(|seconds| u64::try_from(seconds).ok());
+    let poll = poll.filter(|seconds| (1..=86_400).contains(seconds)).map(Duration::from_secs);
+    let taken = list.named.len();
+    for named in rows {
+        let named = named.map(|named| Named { line: item.line, poll, ..named }).map_err(|why| because(item, &why));
+        list.push_of(context, station, item.line, named);
+    }
+    if taken < list.named.len() {
+        list.note_keys(item, &[PLAIN, if is_sensor { SENSOR } else { entities::KEPT }]);
+    }
+}
+
+/// The name of an item before what is wrong with it.
+fn because(item: &Node, why: &str) -> String {
+    item.word("name").map_or_else(|| why.to_owned(), |name| format!("{name}: {why}"))
+}
+
+/// Table, type and order of a value in registers.
+fn point(item: &Node, name: &str) -> Result<Named, String> {
+    let table = match item.word("input_type").unwrap_or("holding") {
+        "holding" => Table::Holding,
+        "input" => Table::Input,
+        "coil" => Table::Coil,
+        "discrete_input" => Table::Discrete,
+        _ => {
+            return Err(item.get("input_type").map_or_else(|| missing("input_type"), |node| wrong("input_type", node)));
+        }
+    };
+    let address = item.wire_address("address")?;
+    let count = item.opt_whole("count")?;
+    let word = item.word("data_type").unwrap_or("int16");
+    let kind = match word {
+        _ if table.is_bits() => DataType::Bool,
+        "custom" => return Err(unsaid("structure")),
+        "string" => text_of(count.ok_or_else(|| missing("count"))?).ok_or_else(|| unsaid("count"))?,
+        "int" => words::type_of("int", count.and_then(|count| u16::try_from(count).ok()))?.0,
+        "uint" => words::type_of("uint", count.and_then(|count| u16::try_from(count).ok()))?.0,
+        "float" => words::type_of("float", count.and_then(|count| u16::try_from(count).ok()))?.0,
+        word => words::kind_of(word).ok_or_else(|| t!("`{word}` is not a known type", word))?,
+    };
+    if count.is_some_and(|count| !kind.is_text() && count != i64::from(kind.registers())) {
+        return Err(unsaid("count"));
+    }
+    let swap = item.word("swap").unwrap_or("none");
+    let order = swapped(swap).ok_or_else(|| unsaid("swap"))?;
+    // Words of a single register are not swapped.
+    let order = match (order, kind.registers()) {
+        (ByteOrder::Cdab, 1) => ByteOrder::Abcd,
+        (ByteOrder::Dcba, 1) => ByteOrder::Badc,
+        (order, _) => order,
+    };
+    Ok(Named::new(table, address, kind, order, name))
+}
+
+/// A value with its scale and unit.
+fn quantity(item: &Node, name: &str) -> Result<Named, String> {
+    let named = point(item, name)?;
+    if named.kind.is_text() || named.table.is_bits() {
+        return Ok(named);
+    }
+    let (scale, offset) = (item.opt_number("scale")?.unwrap_or(1.0), item.opt_number("offset")?.unwrap_or(0.0));
+    if scale == 0.0 {
+        return Err(unsaid("scale"));
+    }
+    let mut named = named.scaled(scale, offset);
+    if let Some(precision) = item.opt_whole("precision")? {
+        named.decimals = u8::try_from(precision).unwrap_or(0).min(6);
+    }
+    named.unit = unit_of(item.word("unit_of_measurement").unwrap_or_default());
+    if let Some(node) = item.get("nan_value") {
+        let value = node.whole().ok_or_else(|| wrong("nan_value", node))?;
+        named = named.bad_at(value, node.shown().to_lowercase().starts_with("0x"));
+    }
+    Ok(named)
+}
+
+/// A sensor, and those behind it in the same way.
+fn sensors(item: &Node) -> Result<Vec<Named>, String> {
+    let name = item.word("name").ok_or_else(|| missing("name"))?;
+    let first = quantity(item, name)?;
+    let more = item.opt_whole("slave_count")?.or(item.opt_whole("virtual_count")?).unwrap_or(0);
+    array(first, more, |named, n| {
+        let address = named.address.checked_add(u16::try_from(n).ok()?.checked_mul(named.len())?)?;
+        Some(Named { address, ..named.clone() })
+    })
+}
+
+/// So many more of a row, each with its number behind the name.
+fn array(first: Named, more: i64, next: impl Fn(&Named, i64) -> Option<Named>) -> Result<Vec<Named>, String> {
+    if !(0..ARRAY_MAX).contains(&more) {
+        return Err(unsaid("slave_count"));
+    }
+    let name =
+        |n: i64, named: Named| if n == 0 { named } else { Named { name: format!("{} {n}", first.name), ..named } };
+    let rows = (0..=more).map(|n| next(&first, n).map(|named| name(n, named)).ok_or_else(|| unsaid("slave_count")));
+    rows.collect()
+}

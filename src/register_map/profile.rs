@@ -1,0 +1,151 @@
+//! A register map as a device profile: what its check refuses is left out, and said.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt::Write,
+};
+
+use super::{list::List, named::Named};
+use crate::{
+    plant::tag::{Access, TagDef},
+    profile::{
+        self, Checked,
+        new_plant::plain_name,
+        tag_text::{quoted, tag_keys},
+    },
+    t,
+};
+
+/// How often a refused row is tried with less, or left out.
+const ROUNDS_MAX: usize = 40;
+
+/// A profile that can be written.
+pub struct Written {
+    /// Its text.
+    pub text: String,
+    /// What the check says of it.
+    pub checked: Checked,
+    /// What was left out of it, by line of the file that was read.
+    pub problems: Vec<String>,
+}
+
+/// A row on its way into the profile.
+struct Row {
+    named: Named,
+    tag: TagDef,
+    /// Its limits and how it is written were refused.
+    is_bare: bool,
+}
+
+/// The profile of a list, called so; `Err` says why there is none.
+pub fn written(list: &List, name: &str, source: &str) -> Result<Written, String> {
+    let mut taken = BTreeSet::new();
+    let mut rows: Vec<Row> = list.named.iter().map(|named| row(named, &mut taken)).collect();
+    let mut problems = Vec::new();
+    for _ in 0..ROUNDS_MAX {
+        without_power(&mut rows, &mut problems);
+        if rows.is_empty() {
+            break;
+        }
+        let (text, lines) = text(list, &rows, name, source);
+        let errors = match profile::check_text(name, &text) {
+            Ok(checked) => return Ok(Written { text, checked, problems }),
+            Err(errors) => errors,
+        };
+        let mut refused: Vec<(usize, String)> = Vec::new();
+        for (line, why) in errors.places() {
+            // The row is the last that begins at that line or above.
+            match lines.partition_point(|start| *start <= line) {
+                0 => return Err(why),
+                n if refused.iter().all(|(row, _)| *row != n - 1) => refused.push((n - 1, why)),
+                _ => {}
+            }
+        }
+        if refused.is_empty() {
+            return Err(errors.full_lines().next().unwrap_or_default());
+        }
+        refused.sort_by_key(|(row, _)| std::cmp::Reverse(*row));
+        for (n, why) in refused {
+            lessen(&mut rows, n, &why, &mut problems);
+        }
+    }
+    Err(problems.pop().unwrap_or_else(|| t!("there is nothing in it").to_owned()))
+}
+
+/// Leaves out the rows whose power of ten is left out: without it they would be another value.
+fn without_power(rows: &mut Vec<Row>, problems: &mut Vec<String>) {
+    let places: BTreeSet<_> = rows.iter().map(|row| (row.named.table, row.named.address)).collect();
+    rows.retain(|Row { named, .. }| {
+        let is_whole = named.power_at.is_none_or(|at| places.contains(&(named.table, at)));
+        if !is_whole {
+            let (place, why) = (t!("line {number}", number = named.line), t!("its power of ten is left out"));
+            problems.push(format!("{place}: {}: {why}", named.name));
+        }
+        is_whole
+    });
+}
+
+/// Takes away what may be refused of a row; then the row.
+fn lessen(rows: &mut Vec<Row>, n: usize, why: &str, problems: &mut Vec<String>) {
+    let row = &mut rows[n];
+    let place = t!("line {number}", number = row.named.line);
+    let name = &row.named.name;
+    let has_more = row.named.access != Access::Read || row.named.min.is_some() || row.named.max.is_some();
+    if has_more && !row.is_bare {
+        let bare =
+            Named { access: Access::Read, min: None, max: None, write_fc: None, write_at: None, ..row.named.clone() };
+        problems.push(format!("{place}: {}", t!("{name}: only to be read: {why}", name, why)));
+        row.tag = TagDef { label: row.tag.label.clone(), ..bare.tag(&row.tag.short) };
+        row.is_bare = true;
+    } else {
+        problems.push(format!("{place}: {name}: {why}"));
+        rows.remove(n);
+    }
+}
+
+fn row(named: &Named, taken: &mut BTreeSet<String>) -> Row {
+    let plain = plain_name(&named.name);
+    let place = format!("{plain}_{}", named.address);
+    let bit = named.field.map(|(low, _)| format!("{place}_{low}"));
+    let table = format!("{plain}_{}_{}", named.table.word(), named.address);
+    let numbered = (2..).map(|n| format!("{plain}_{n}"));
+    let mut names = [Some(plain.clone()), Some(place), bit, Some(table)].into_iter().flatten().chain(numbered);
+    let short = names.find(|name| taken.insert(name.clone())).unwrap_or(plain);
+    Row { tag: named.tag(&short), named: named.clone(), is_bare: false }
+}
+
+/// The text, and the line in which each row begins.
+fn text(list: &List, rows: &[Row], name: &str, source: &str) -> (String, Vec<usize>) {
+    let mut out = String::new();
+    let mut lines = Vec::new();
+    // Writing into a string does not fail.
+    let _ = writeln!(
+        out,
+        "# Imported by `sightglass profile import` from {source}: compare it with the manual of the device before it is relied on.\n\
+         # `sightglass check FILE` checks it after a change, `sightglass help format` explains each key.\n"
+    );
+    let [vendor, model] = &list.about;
+    for (key, text, usual) in [("vendor", vendor, "unknown"), ("model", model, name)] {
+        let _ = writeln!(out, "{key} = {}", quoted(if text.is_empty() { usual } else { text }));
+    }
+    let _ = writeln!(
+        out,
+        "status = \"partial\"\nsource = {}\naddress_base = 0\ndefault = {{ confidence = \"low\" }}",
+        quoted(&format!("imported from {source}"))
+    );
+    let powers: BTreeMap<_, _> =
+        rows.iter().map(|row| ((row.named.table, row.named.address), &row.tag.short)).collect();
+    let mut line = out.matches('\n').count();
+    for Row { named, tag, .. } in rows {
+        let mut keys = tag_keys(tag);
+        keys.extend(named.poll.map(|period| format!("poll = \"{}s\"", period.as_secs())));
+        if let Some(power) = named.power_at.and_then(|at| powers.get(&(named.table, at))) {
+            keys.retain(|key| !key.starts_with("decimals = "));
+            keys.push(format!("scale_from = {}", quoted(power)));
+        }
+        lines.push(line + 2);
+        line += keys.len() + 2;
+        let _ = writeln!(out, "\n[[tag]]\n{}", keys.join("\n"));
+    }
+    (out, lines)
+}

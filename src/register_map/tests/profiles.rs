@@ -1,0 +1,68 @@
+//! A map as a profile: it passes its check, and what does not is said.
+
+use super::list_of;
+use crate::{
+    plant::tag::{Access, Decimals, TagDef},
+    register_map::profile::{Written, written},
+};
+
+fn profile(text: &str) -> Written {
+    written(&list_of(text), "made_up", "a test").unwrap_or_else(|why| panic!("{text}: {why}"))
+}
+
+fn tags(written: &Written) -> &[TagDef] {
+    &written.checked.plant.tags
+}
+
+#[test]
+fn a_profile_has_names_of_its_own_and_the_labels_of_the_file() {
+    let text = "address;name\n5;Flow rate [1]\n6;Flow rate (1)\n7;\"SV\u{7} \"\"x\"\"\"\n8;Temperatur außen\n";
+    let written = profile(text);
+    let named: Vec<(&str, &str)> = tags(&written).iter().map(|tag| (tag.short.as_str(), tag.label.as_str())).collect();
+    assert_eq!(named[0], ("Flow_rate__1_", "Flow rate [1]"));
+    assert_eq!(named[1], ("Flow_rate__1__6", "Flow rate (1)"));
+    assert_eq!(named[3], ("Temperatur_außen", "Temperatur außen"));
+    assert_eq!(named.len(), 4, "{}", written.text);
+}
+
+#[test]
+fn everything_that_a_row_has_stands_in_its_profile() {
+    let text = "modbus:\n  - sensors:\n    - { name: Outside, address: 40001, scale: 0.1, offset: -40, nan_value: 0x8000, unit_of_measurement: °C, scan_interval: 30 }\n    switches:\n    - { name: Valve, address: 7, verify: { address: 9, input_type: input } }\n";
+    let written = profile(text);
+    let [outside, valve] = tags(&written) else { panic!("{}", written.text) };
+    assert_eq!(
+        (outside.point.address, outside.scale, outside.offset, outside.unit.as_str()),
+        (40_001, 0.1, -40.0, "°C")
+    );
+    assert!(outside.is_bad((-32_768.0).into()) && written.text.contains("poll = \"30s\""), "{}", written.text);
+    assert_eq!(valve.write_at.map(|(_, address)| address), Some(7));
+    assert_eq!((valve.access, valve.label_of(1.0)), (Access::ReadWrite, Some("on")));
+    assert_eq!(written.problems, Vec::<String>::new());
+}
+
+#[test]
+fn what_the_check_refuses_is_left_out_and_said() {
+    let text =
+        "read_write_word:\n  a: { address: 5, control: number, number: { min: -5, max: 20 } }\n  b: { address: 6 }\n";
+    let written = profile(text);
+    assert_eq!(tags(&written).len(), 2);
+    assert_eq!(tags(&written)[0].access, Access::Read, "{}", written.text);
+    assert!(written.problems[0].starts_with("line 2: a: only to be read: min -5 is outside"), "{:?}", written.problems);
+}
+
+#[test]
+fn a_power_of_ten_is_followed_or_its_value_is_left_out() {
+    let model = |kind: &str| {
+        format!(
+            "{{ \"id\": 9, \"group\": {{ \"name\": \"m\", \"points\": [\n\
+             {{ \"name\": \"W\", \"type\": \"int16\", \"size\": 1, \"sf\": \"SF\" }},\n\
+             {{ \"name\": \"SF\", \"type\": \"sunssf\", \"size\": 1{kind} }} ] }} }}"
+        )
+    };
+    let written = profile(&model(""));
+    assert!(matches!(tags(&written)[0].decimals, Decimals::PowerFrom(_)), "{}", written.text);
+    let mut list = list_of(&model(""));
+    list.named.remove(1);
+    let refused = super::super::profile::written(&list, "made_up", "a test").err();
+    assert!(refused.is_some_and(|why| why.contains("power of ten")));
+}

@@ -1,0 +1,87 @@
+//! Register maps of others by command: what becomes a profile, what is said, and what is never overwritten.
+
+use std::{fs, io::Write, path::Path, process::Stdio};
+
+use crate::support::{folder, sightglass};
+
+const LIST: &str = "address;name;type;factor;unit\n5;Flow rate;uint16;0.1;m3/h\nx;Broken;uint16;;\n6;Level;int16;;cm\n";
+
+/// Exit code and everything that was said.
+fn run(folder: &Path, args: &[&str], input: &[u8]) -> (Option<i32>, String) {
+    let mut command = sightglass();
+    command.args(args).current_dir(folder).env("XDG_CONFIG_HOME", folder);
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // A command that refuses its arguments reads nothing.
+    let _ = child.stdin.take().unwrap().write_all(input);
+    let output = child.wait_with_output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8(said).unwrap())
+}
+
+#[test]
+fn a_list_becomes_a_profile_that_passes_its_check() {
+    let folder = folder();
+    fs::write(folder.path().join("My meter.csv"), LIST).unwrap();
+    let import = ["profile", "import", "My meter.csv"];
+    let (code, said) = run(folder.path(), &import, b"");
+    assert_eq!(code, Some(0), "{said}");
+    for words in
+        ["list, 2 of 3 rows", "line 3: `x` is not an address", "written: my_meter.toml, 2 tags", "sightglass check"]
+    {
+        assert!(said.contains(words), "no `{words}` in: {said}");
+    }
+    let (code, said) = run(folder.path(), &["check", "my_meter.toml", "--strict"], b"");
+    assert_eq!(code, Some(0), "{said}");
+    let text = fs::read_to_string(folder.path().join("my_meter.toml")).unwrap();
+    assert!(text.contains("label = \"Flow rate\"") && text.contains("unit = \"m³/h\""), "{text}");
+    let (code, said) = run(folder.path(), &import, b"");
+    assert!(code == Some(2) && said.contains("my_meter.toml exists"), "never over an existing file: {said}");
+    assert_eq!(run(folder.path(), &[&import[..], &["--force"]].concat(), b"").0, Some(0));
+}
+
+#[test]
+fn a_plant_is_written_only_where_it_is_asked_for() {
+    let folder = folder();
+    let args = ["profile", "import", "-", "--output", "meter.toml", "--unit", "7"];
+    let (code, said) = run(folder.path(), &args, LIST.as_bytes());
+    assert_eq!((code, fs::read_dir(folder.path()).unwrap().count()), (Some(0), 1), "{said}");
+    let args = [&args[..], &["--force", "--plant", "plant.toml"]].concat();
+    let (code, said) = run(folder.path(), &args, LIST.as_bytes());
+    assert_eq!(code, Some(0), "{said}");
+    let (code, said) = run(folder.path(), &["check", "plant.toml"], b"");
+    assert_eq!(code, Some(0), "{said}");
+    let plant = fs::read_to_string(folder.path().join("plant.toml")).unwrap();
+    assert!(plant.contains("profile = \"meter\"") && plant.contains("unit = 7"), "{plant}");
+}
+
+#[test]
+fn what_cannot_be_read_or_has_two_readings_writes_nothing() {
+    let folder = folder();
+    let twice = "address;name;type\n40080;W;int16\n40083;VA;int16\n";
+    for (input, words) in [
+        (&b""[..], "there is nothing in it"),
+        (b"\x7FELF\x00\x00", "it is no text"),
+        (b"a: 1\nb: 2\nc:\n  - d: 3\n", "What can be read"),
+        (twice.as_bytes(), "holding 79 (--base modicon) or holding 40080 (--base 0)"),
+    ] {
+        let (code, said) = run(folder.path(), &["profile", "import", "-"], input);
+        assert!(code == Some(2) && said.contains(words), "{said}");
+    }
+    let (code, said) = run(folder.path(), &["profile", "import", "none.csv"], b"");
+    assert!(code == Some(1) && said.contains("none.csv"), "{said}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    let (code, said) = run(folder.path(), &["profile", "import", "-", "--base", "0"], twice.as_bytes());
+    assert_eq!(code, Some(0), "{said}");
+    assert!(fs::read_to_string(folder.path().join("imported.toml")).unwrap().contains("address = 40080"));
+}
+
+#[test]
+fn an_export_is_imported_again() {
+    let folder = folder();
+    let (code, said) =
+        run(folder.path(), &["profile", "export", "eastron_sdm120", "--format", "csv", "--output", "m.csv"], b"");
+    assert!(code == Some(0) && said.contains("tags as csv"), "{said}");
+    let (code, said) = run(folder.path(), &["profile", "import", "m.csv"], b"");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(fs::read_to_string(folder.path().join("m.toml")).unwrap().contains("name = \"V.L1\""));
+}
