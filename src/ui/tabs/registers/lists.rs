@@ -17,7 +17,7 @@ use crate::ui::tabs::prelude::*;
 const READ_MAX: usize = 40;
 /// Registers that are read although no row has them, rather than with a request of their own.
 const GAP_MAX: u32 = 8;
-/// Columns of a value: a text or the names of many bits are cut.
+/// Columns of a value or a model: a text, the names of many bits or of a whole family are cut.
 const VALUE_WIDTH: u16 = 28;
 /// Registers of one request.
 const REQUEST_MAX: u32 = 125;
@@ -181,7 +181,7 @@ impl Registers {
                 Some(recognise::Miss { tag, read: None, .. }) => t!("{tag} cannot be read", tag),
             };
             let value = if fit.of == 0 { "–".to_owned() } else { t!("{fits} of {of}", fits = fit.fits, of = fit.of) };
-            let group = def.devices.first().map(|device| device.model.clone()).unwrap_or_default();
+            let group = def.devices.first().map(|device| fit(&device.model, VALUE_WIDTH)).unwrap_or_default();
             Pick { id: 0, group, name: def.name.clone(), value, note, target: Target::Profile(def) }
         };
         self.ranked().into_iter().map(row).collect()
