@@ -181,7 +181,7 @@ impl Registers {
                 Some(recognise::Miss { tag, read: None, .. }) => t!("{tag} cannot be read", tag),
             };
             let value = if fit.of == 0 { "–".to_owned() } else { t!("{fits} of {of}", fits = fit.fits, of = fit.of) };
-            let group = def.devices.first().map(|device| fit(&device.model, VALUE_WIDTH)).unwrap_or_default();
+            let group = def.devices.first().map(|device| text::fit(&device.model, VALUE_WIDTH)).unwrap_or_default();
             Pick { id: 0, group, name: def.name.clone(), value, note, target: Target::Profile(def) }
         };
         self.ranked().into_iter().map(row).collect()
