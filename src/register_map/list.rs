@@ -186,7 +186,7 @@ impl List {
 
 /// Why a register cannot be taken beside another one.
 fn conflict(old: &Named, new: &Named) -> Option<String> {
-    let end = |named: &Named| u32::from(named.address) + u32::from(named.len());
+    let end = |named: &Named| u32::from(named.address) + u32::from(named.count());
     if old.table != new.table || end(old) <= u32::from(new.address) || end(new) <= u32::from(old.address) {
         return None;
     }
@@ -195,7 +195,7 @@ fn conflict(old: &Named, new: &Named) -> Option<String> {
     }
     let is_same = (old.address, old.kind, old.order) == (new.address, new.kind, new.order);
     let is_part = |named: &Named| named.point().part().is_some();
-    let are_fields = old.len() == 1 && new.len() == 1 && (is_part(old) || is_part(new));
+    let are_fields = old.count() == 1 && new.count() == 1 && (is_part(old) || is_part(new));
     (!is_same && !are_fields).then(|| t!("it overlaps {name}, which is read as another type", name = old.name))
 }
 

@@ -142,7 +142,7 @@ impl Named {
     }
 
     /// Registers or bits that it takes.
-    pub fn len(&self) -> u16 {
+    pub fn count(&self) -> u16 {
         if self.table.is_bits() { 1 } else { self.kind.registers() }
     }
 
@@ -155,7 +155,7 @@ impl Named {
     /// `70.0 °C`, `RUN`; `None` as for [`Named::value`].
     pub fn text(&self, words: &[u16]) -> Option<String> {
         if self.kind.is_text() {
-            return codec::decode_text(self.point(), words.get(..usize::from(self.len()))?);
+            return codec::decode_text(self.point(), words.get(..usize::from(self.count()))?);
         }
         let raw = self.raw(words).filter(|raw| !self.bad_if.iter().any(|bad| is_same(*bad, *raw)))?;
         if let Some((_, label)) = self.enum_labels.iter().find(|(number, _)| Exact::whole(*number) == raw) {
@@ -182,7 +182,7 @@ impl Named {
     /// The number before scaling; `None` as for [`Named::value`].
     pub fn raw(&self, words: &[u16]) -> Option<Exact> {
         let bit = || words.first().map(|word| f64::from(*word).into());
-        if self.table.is_bits() { bit() } else { codec::decode(self.point(), words.get(..usize::from(self.len()))?) }
+        if self.table.is_bits() { bit() } else { codec::decode(self.point(), words.get(..usize::from(self.count()))?) }
     }
 }
 

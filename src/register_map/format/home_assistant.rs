@@ -166,7 +166,7 @@ fn sensors(item: &Node) -> Result<Vec<Named>, String> {
     let first = quantity(item, name)?;
     let more = item.opt_whole("slave_count")?.or(item.opt_whole("virtual_count")?).unwrap_or(0);
     array(first, more, |named, n| {
-        let address = named.address.checked_add(u16::try_from(n).ok()?.checked_mul(named.len())?)?;
+        let address = named.address.checked_add(u16::try_from(n).ok()?.checked_mul(named.count())?)?;
         Some(Named { address, ..named.clone() })
     })
 }

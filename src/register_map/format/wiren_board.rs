@@ -198,10 +198,8 @@ fn kind_of(row: &Node, address: &Node) -> Result<DataType, String> {
 
 /// Scale, limits and names of numbers.
 fn numbers(row: &Node, named: Named, shown: &str, is_parameter: bool) -> Result<Named, String> {
-    if let Some((low, width)) = named.field {
-        if named.kind.bits() < low.saturating_add(width) {
-            return Err(unsaid("address"));
-        }
+    if named.field.is_some_and(|(low, width)| named.kind.bits() < low.saturating_add(width)) {
+        return Err(unsaid("address"));
     }
     let (scale, offset) = (row.opt_number("scale")?.unwrap_or(1.0), row.opt_number("offset")?.unwrap_or(0.0));
     if scale == 0.0 {

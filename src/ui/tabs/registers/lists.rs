@@ -158,7 +158,7 @@ impl Registers {
 
     fn value_row(&self, cx: &ViewContext, named: &Named) -> Pick {
         let (group, name) = named.name.split_once('.').unwrap_or(("", &named.name));
-        let span = AddressSpan { table: named.table, address: named.address, count: named.len() };
+        let span = AddressSpan { table: named.table, address: named.address, count: named.count() };
         Pick {
             id: 0,
             group: group.to_owned(),

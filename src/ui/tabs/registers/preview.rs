@@ -87,7 +87,7 @@ impl Preview {
     /// What is read beside the window, so that the rows on the screen have values.
     pub fn spans(&self) -> impl Iterator<Item = AddressSpan> {
         let shown = self.list.named.iter().skip(self.top).take(READ_MAX);
-        let span = shown.map(|named| AddressSpan { table: named.table, address: named.address, count: named.len() });
+        let span = shown.map(|named| AddressSpan { table: named.table, address: named.address, count: named.count() });
         span.filter(|span| span.range().end <= 0x1_0000)
     }
 

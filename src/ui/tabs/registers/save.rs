@@ -112,8 +112,8 @@ impl Registers {
         let seen = |tag: &TagDef| {
             let (table, address) = (tag.point.table, tag.point.address);
             let named = self.names.get(table, address)?;
-            let now = self.cells.held(table, address, named.len()).and_then(|words| named.value(&words));
-            let cell = self.cells.get(table, address).filter(|_| named.len() == 1);
+            let now = self.cells.held(table, address, named.count()).and_then(|words| named.value(&words));
+            let cell = self.cells.get(table, address).filter(|_| named.count() == 1);
             let before = cell.into_iter().flat_map(|cell| &cell.seen).filter_map(|(_, word)| named.value(&[*word]));
             let values = before.chain(now).map(Exact::near);
             values.fold(None, |range: Option<(f64, f64)>, value| {

@@ -306,9 +306,9 @@ pub fn is_long_ago(tab: &Registers, cx: &ViewContext, at: Timestamp) -> bool {
 
 /// A named value, and whether it is good: `70.0 °C`, `70.0 °C?` for an old one, `----` for none.
 pub fn named_text(tab: &Registers, cx: &ViewContext, named: &Named) -> (String, bool) {
-    let words = tab.cells.held(named.table, named.address, named.len());
+    let words = tab.cells.held(named.table, named.address, named.count());
     let Some(text) = words.and_then(|words| named.text(&words)) else { return ("----".to_owned(), false) };
-    let mut cells = (0..named.len()).filter_map(|n| tab.cells.get(named.table, named.address.checked_add(n)?));
+    let mut cells = (0..named.count()).filter_map(|n| tab.cells.get(named.table, named.address.checked_add(n)?));
     if cells.any(|cell| is_old(tab, cx, cell)) { (format!("{text}?"), false) } else { (text, true) }
 }
 

@@ -189,7 +189,7 @@ impl Registers {
     pub(super) fn watched_spans(&self, window: AddressSpan) -> impl Iterator<Item = AddressSpan> {
         let span = |item: &Watched| {
             let (table, address) = item.at;
-            let count = self.names.get(table, address).map_or(1, Named::len);
+            let count = self.names.get(table, address).map_or(1, Named::count);
             let room = 0x1_0000 - u32::from(address);
             AddressSpan { table, address, count: to_u16(u32::from(count).min(room)) }
         };
@@ -266,7 +266,7 @@ impl Registers {
 /// What a read has brought of a value: two halves of different moments are no value. Of `before` is left what the fault
 /// leaves of it; what was not read at all is stale.
 fn sample(reading: &LiveReading, named: &Named, before: Sample) -> Sample {
-    let wanted = AddressSpan { table: named.table, address: named.address, count: named.len() }.range();
+    let wanted = AddressSpan { table: named.table, address: named.address, count: named.count() }.range();
     let of_it = || reading.parts.iter().filter(|part| part.span.table == named.table);
     let all = of_it().find_map(|part| {
         let own = part.span.range();

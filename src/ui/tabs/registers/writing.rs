@@ -163,8 +163,8 @@ impl Registers {
     /// The name of what is selected, if it has one, and the words that it holds.
     fn named_and_held(&self) -> Option<(&Named, Vec<u16>)> {
         let named = self.names.get(self.table, self.selected).filter(|named| !named.table.is_bits())?;
-        let held = self.cells.words(self.table, self.selected, named.len());
-        (held.len() == usize::from(named.len())).then_some((named, held))
+        let held = self.cells.words(self.table, self.selected, named.count());
+        (held.len() == usize::from(named.count())).then_some((named, held))
     }
 
     /// Asks whether to add to the selected register.
@@ -223,7 +223,7 @@ fn change(names: &Names, write: &RegisterWrite) -> String {
     let (old, new) = (list(&write.expected), list(&write.words));
     let place = write.table.modicon(write.address);
     let raw = t!("unit {unit} {place}: {old} to {new}", unit = write.unit, place, old, new);
-    let named = names.get(write.table, write.address).filter(|named| usize::from(named.len()) == write.words.len());
+    let named = names.get(write.table, write.address).filter(|named| usize::from(named.count()) == write.words.len());
     let said = named.and_then(|named| {
         let (old, new) = (named.text(&write.expected)?, named.text(&write.words)?);
         Some(t!("{name} {old} to {new}, {raw}", name = named.name, old, new, raw))

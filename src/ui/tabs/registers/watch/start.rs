@@ -40,9 +40,9 @@ pub fn parse(text: &str) -> Result<Vec<Named>, String> {
     let words: Vec<&str> = std::iter::once("name").chain(words).collect();
     let first = Named { name: name.to_owned(), ..named(&words.join(" "), plain)? };
     let one = |n: u16| {
-        let address = u32::from(address) + u32::from(n) * u32::from(first.len());
+        let address = u32::from(address) + u32::from(n) * u32::from(first.count());
         let wrong = || t!("{name}: address {address}: the last is 65535", name, address);
-        let end = address + u32::from(first.len());
+        let end = address + u32::from(first.count());
         let place = u16::try_from(address).ok().filter(|_| end <= 0x1_0000).ok_or_else(wrong)?;
         let name = if count == 1 { name.to_owned() } else { format!("{name}{}", n + 1) };
         Ok(Named { name, address: place, ..first.clone() })
