@@ -129,6 +129,7 @@
 //! | a report format | its file in `report`, its row in `report/mod.rs`, its name in `plant/report.rs` |
 //! | a tab | its file in `ui/tabs`, its row in `ui/tabs/mod.rs` |
 //! | a page with a list | a `Listing` in its file in `ui/tabs`, its rows in `list` and `list_mut` of the tab: see CONTRIBUTING.md |
+//! | a window with fields | a `Form` of `ui/modal/form.rs` in its window, whose fields say what may be typed or chosen |
 //! | what every list can | `ui/tabs/listing`; its key a row in `ui/tabs/listing/keys.rs` |
 //! | a key of a tab | its row in the tab's table of keys, with the function that it calls; footer, help, palette and clash check read the row |
 //! | a renamed TOML key | its row in `profile/renamed.rs` |
