@@ -18,7 +18,7 @@ const MODELS_MAX: usize = 200;
 /// Registers of all models whose contents are read: more than any device has.
 const REGISTERS_MAX: u32 = 16_000;
 
-/// A walk at work.
+/// A walk at work. It ends by itself: each read is of 16 parts of a model or leads to the next one, whose numbers are bounded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Walk {
     step: Step,
@@ -103,12 +103,6 @@ impl Walk {
             }
             Step::Done => {}
         }
-    }
-
-    /// Ends it before its end.
-    pub fn cut(&mut self) {
-        self.step = Step::Done;
-        self.device.iter_mut().for_each(|device| device.is_cut = true);
     }
 
     /// What was found; `None` before the end, and where the unit has no models.

@@ -2,11 +2,6 @@
 
 use std::{collections::BTreeSet, sync::Arc};
 
-use nucleo_matcher::{
-    Config, Matcher, Utf32Str,
-    pattern::{CaseMatching, Normalization, Pattern},
-};
-
 use super::{
     CliError,
     prompt::{ask_until, selection},
@@ -20,7 +15,7 @@ use crate::{
         tag::{Access, Poll, TagDef},
     },
     profile::{
-        OwnProfiles,
+        Card, OwnProfiles, find_cards,
         sunspec::{SunSpecDevice, profile_text},
     },
 };
@@ -91,27 +86,14 @@ fn chosen(answer: &str, profiles: &OwnProfiles) -> Result<Option<Arc<PlantDef>>,
     if let Some(def) = profiles.device(answer) {
         return Ok(Some(def));
     }
-    let all: Vec<(String, String)> = profiles.all().iter().map(|def| (def.name.clone(), model_of(def))).collect();
-    let found = search(answer, &all);
+    let found = find_cards(profiles.cards(), answer);
     if found.is_empty() {
         return Err(format!("no device profile fits `{answer}`; `sightglass profiles` lists them"));
     }
-    let width = found.iter().map(|(name, _)| name.len()).max().unwrap_or_default();
-    let rows: Vec<String> = found.iter().map(|(name, model)| format!("    {name:width$}  {model}")).collect();
+    let width = found.iter().map(|card| card.listed.name.len()).max().unwrap_or_default();
+    let row = |Card { listed, vendor, model, .. }: &Card| format!("    {:width$}  {vendor} {model}", listed.name);
+    let rows: Vec<String> = found.iter().take(FOUND_MAX).map(row).collect();
     Err(format!("{}\n  type the name of one", rows.join("\n")))
-}
-
-/// Those that fit the words, the best first.
-fn search<'a>(words: &str, all: &'a [(String, String)]) -> Vec<&'a (String, String)> {
-    let pattern = Pattern::parse(words, CaseMatching::Ignore, Normalization::Smart);
-    let mut matcher = Matcher::new(Config::DEFAULT);
-    let mut buffer = Vec::new();
-    let mut score = |(name, model): &(String, String)| {
-        pattern.score(Utf32Str::new(&format!("{name} {model}"), &mut buffer), &mut matcher)
-    };
-    let mut found: Vec<(u32, &(String, String))> = all.iter().filter_map(|one| Some((score(one)?, one))).collect();
-    found.sort_by_key(|(score, (name, _))| (std::cmp::Reverse(*score), name.clone()));
-    found.into_iter().map(|(_, one)| one).take(FOUND_MAX).collect()
 }
 
 fn model_of(def: &PlantDef) -> String {
@@ -143,15 +125,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_find_a_profile_by_name_or_model() {
-        let all =
-            [("fuji_pxr", "FUJI PXR"), ("eastron_sdm120", "Eastron SDM120"), ("eastron_sdm630", "Eastron SDM630")]
-                .map(|(name, model)| (name.to_owned(), model.to_owned()));
-        let names = |words| search(words, &all).into_iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>();
-        assert_eq!(names("sdm 630"), ["eastron_sdm630"]);
-        assert_eq!(names("eastron").len(), 2);
-        assert_eq!(names("pxr"), ["fuji_pxr"]);
-        assert!(names("siemens").is_empty());
+    fn words_find_a_profile_by_name_model_or_kind() {
+        let profiles = OwnProfiles::of_text("mine", "vendor = 'ACME'\nmodel = 'Nine'\n");
+        let found = |words: &str| chosen(words, &profiles).expect_err("names to choose from");
+        assert!(found("sdm 630").contains("eastron_sdm630") && !found("sdm 630").contains("fuji_pxr"));
+        assert!(found("meters socomec").contains("socomec_countis_e3x"));
+        assert!(
+            found("acme").lines().any(|row| row.contains("mine") && row.ends_with("ACME Nine")),
+            "{}",
+            found("acme")
+        );
+        assert!(found("qqqq zzzz").contains("no device profile fits"));
+        assert!(chosen("fuji_pxr", &profiles).is_ok_and(|def| def.is_some()));
     }
 
     #[test]

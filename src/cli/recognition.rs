@@ -24,8 +24,6 @@ use crate::{
 const REPLIES: usize = 20;
 /// A live read of a line that does not even connect is given up.
 const READ_MAX: Duration = Duration::from_secs(30);
-/// The models of a device are all found with so many reads, or their number is false.
-const WALK_MAX: usize = 400;
 
 /// What was found at a unit.
 pub struct FoundUnit {
@@ -96,13 +94,7 @@ struct Asked<'a> {
 impl Asked<'_> {
     async fn walk(&mut self) -> Result<Option<SunSpecDevice>, CliError> {
         let mut walk = Walk::default();
-        let mut requests = 0;
         while let Some(spans) = walk.next() {
-            if requests == WALK_MAX {
-                walk.cut();
-                break;
-            }
-            requests += 1;
             self.read(spans).await?;
             walk.on_words(&|span| self.held(span));
         }

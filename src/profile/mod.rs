@@ -71,6 +71,7 @@ use std::{
 };
 
 pub(crate) use self::io::scenario;
+pub(crate) use self::raw_pattern::sunspec_marker;
 pub(crate) use self::units::{is_known as is_known_unit, of as unit_of};
 pub use self::{
     diagnostic::{Errors, render},

@@ -71,6 +71,11 @@ const SUNSPEC: [(DataType, i128); 6] = [
     (DataType::U64, 0xFFFF_FFFF_FFFF_FFFF),
 ];
 
+/// What a number of this type holds where SunSpec has no value.
+pub(crate) fn sunspec_marker(kind: DataType) -> Option<i128> {
+    SUNSPEC.iter().find(|(of, _)| *of == kind).map(|(_, marker)| *marker)
+}
+
 /// The patterns of a word for them all, `"sunspec"`.
 fn sunspec(word: &str, at: Span, problems: &mut Problems) -> Option<BadIf> {
     if word != "sunspec" {

@@ -2,7 +2,9 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use super::{Checked, Errors, check_device, plant, shipped_device, shipped_devices};
+use super::{
+    Card, Checked, Errors, Kind, Listed, Search, cards, check_device, library, plant, shipped_device, shipped_devices,
+};
 use crate::plant::PlantDef;
 
 /// Their texts by name; a profile of the program that has the same name gives way.
@@ -53,6 +55,16 @@ impl OwnProfiles {
         self.names().into_iter().filter_map(|name| self.device(&name)).collect()
     }
 
+    /// All of them at a glance.
+    pub fn cards(&self) -> Vec<Card> {
+        let own = self.texts.iter().map(|(name, text)| {
+            let (kind, folder, from) = (Kind::Device, String::new(), Some(text.file.clone().into()));
+            (Listed { kind, name: name.clone(), folder, from }, Some(text.clone()))
+        });
+        let shipped = cards(&Search::shipped()).into_iter().filter(|card| !self.texts.contains_key(&card.listed.name));
+        shipped.chain(library::cards(own)).collect()
+    }
+
     /// The device of a profile as the only one of a plant; `None` for a profile that there is not, or with errors.
     pub fn device(&self, name: &str) -> Option<Arc<PlantDef>> {
         check_device(name, self.find(name)?).ok().map(|checked| checked.plant)
@@ -84,7 +96,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::profile::{Search, own_profiles, text_of};
+    use crate::profile::{own_profiles, text_of};
 
     #[test]
     fn profiles_beside_the_plant_and_of_the_user_are_recognised() {

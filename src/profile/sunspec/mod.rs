@@ -7,7 +7,10 @@ mod models;
 mod poll;
 mod text;
 
-pub(crate) use self::text::profile_text;
+pub(crate) use self::{
+    models::{Kind, kind_of},
+    text::profile_text,
+};
 use crate::plant::tag::Table;
 
 /// `SunS`, with which the models of a device begin.
@@ -28,7 +31,7 @@ pub(crate) struct SunSpecDevice {
     pub base: u16,
     /// What follows it.
     pub models: Vec<FoundModel>,
-    /// Why there may be more of them.
+    /// There may be more of them.
     pub is_cut: bool,
 }
 

@@ -128,8 +128,8 @@ fn point(line: &'static str) -> ModelPoint {
     ModelPoint { name, kind, registers, is_writable, is_mandatory, is_static, scale, unit, label, symbols }
 }
 
-/// What a type is here, and how many registers it takes.
-fn kind_of(word: &str) -> (Kind, u16) {
+/// What a type is here, and how many registers it takes; [`Kind::Pad`] for one that is not known.
+pub(crate) fn kind_of(word: &str) -> (Kind, u16) {
     let kind = match word {
         "int16" => Kind::Number(DataType::I16),
         "uint16" | "count" => Kind::Number(DataType::U16),

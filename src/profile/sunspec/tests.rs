@@ -92,7 +92,7 @@ fn a_model_gives_names_places_factors_states_and_alarms() {
         let point = tag(&def, name).point;
         assert_eq!((point.table, point.address, point.kind), (Table::Holding, address, kind), "{name}");
     };
-    check("common.Mn", 40_004, DataType::Text(32));
+    check("common.Mn", 40_004, DataType::TextToNul(32));
     check("inverter.A", 40_072, DataType::U16);
     check("inverter.W", 40_084, DataType::I16);
     check("inverter.WH", 40_094, DataType::U32);

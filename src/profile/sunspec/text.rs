@@ -9,7 +9,7 @@ use super::{
     models::{Count, Group, Kind, ModelPoint, model},
     poll::{NEVER, poll_of},
 };
-use crate::plant::tag::Decimals;
+use crate::{plant::tag::Decimals, profile::tag_text::quoted};
 
 /// Most tags of a profile; the rest is left out, and its notes say so.
 const TAGS_MAX: usize = 4_000;
@@ -135,7 +135,7 @@ impl Rows {
                 self.row(place, &format!("{name}.high"), address, "uint64", &half("upper half"));
                 return self.row(place, &format!("{name}.low"), address + 4, "uint64", &half("lower half"));
             }
-            Kind::Text => format!("string({})", 2 * point.registers.min(TEXT_REGISTERS_MAX)),
+            Kind::Text => format!("cstring({})", 2 * point.registers.min(TEXT_REGISTERS_MAX)),
             Kind::Power => "int16".to_owned(),
             Kind::Number(kind) | Kind::NotZero(kind) | Kind::Enum(kind) | Kind::Bits(kind) => kind.to_string(),
         };
@@ -297,9 +297,4 @@ fn short(name: &str) -> &str {
 /// As a person would write it: 0.1, not the nearest to it.
 fn power_of_ten(power: i32) -> f64 {
     format!("1e{power}").parse().unwrap_or(1.0)
-}
-
-/// A string of TOML.
-fn quoted(text: &str) -> String {
-    Value::from(text).to_string().trim().to_owned()
 }

@@ -9,7 +9,10 @@ use crate::{
         number::to_u8,
         tag::{Access, ByteOrder, DataType, Table},
     },
-    profile::unit_of,
+    profile::{
+        sunspec::{self, Kind},
+        sunspec_marker, unit_of,
+    },
     register_map::{
         container::node::{Node, Tree},
         list::{List, ListContext, words::power_of_ten},
@@ -160,30 +163,17 @@ fn symbols(point: &Node, word: &str, mut named: Named) -> Result<Named, String> 
     Ok(named)
 }
 
-/// The type, and the pattern that says that a device does not have the point.
+/// The type, and the pattern that says that a device does not have the point; both as for a device that is walked.
 fn kind_of(word: &str, size: i64) -> Result<(DataType, Option<i128>), String> {
-    Ok(match word {
-        "int16" => (DataType::I16, Some(0x8000)),
-        "uint16" | "enum16" | "bitfield16" | "count" => (DataType::U16, Some(0xFFFF)),
-        // Its own way to say so is 0, which is a right value of a new meter.
-        "acc16" => (DataType::U16, None),
-        "acc32" => (DataType::U32, None),
-        "acc64" => (DataType::U64, None),
-        "int32" => (DataType::I32, Some(0x8000_0000)),
-        "uint32" | "enum32" | "bitfield32" => (DataType::U32, Some(0xFFFF_FFFF)),
-        "int64" => (DataType::I64, Some(0x8000_0000_0000_0000)),
-        "uint64" | "bitfield64" => (DataType::U64, Some(0xFFFF_FFFF_FFFF_FFFF)),
-        // Not a number is none already.
-        "float32" => (DataType::F32, None),
-        "float64" => (DataType::F64, None),
-        "sunssf" => (DataType::I16, Some(0x8000)),
-        "string" => {
-            let bytes = size.checked_mul(2).and_then(|bytes| usize::try_from(bytes).ok()).map_or(0, to_u8);
-            if !(1..=125).contains(&size) {
-                return Err(unsaid("size"));
-            }
-            (DataType::TextToNul(bytes), None)
-        }
-        word => return Err(t!("`{word}` is not a known type", word)),
+    if word == "string" && !(1..=125).contains(&size) {
+        return Err(unsaid("size"));
+    }
+    let kind = if word == "string" { Kind::Text } else { sunspec::kind_of(word).0 };
+    Ok(match kind {
+        Kind::Number(kind) | Kind::Enum(kind) | Kind::Bits(kind) => (kind, sunspec_marker(kind)),
+        Kind::NotZero(kind) => (kind, Some(0)),
+        Kind::Power => (DataType::I16, sunspec_marker(DataType::I16)),
+        Kind::Text => (DataType::TextToNul(to_u8(2 * size)), None),
+        Kind::Wide | Kind::Pad => return Err(t!("`{word}` is not a known type", word)),
     })
 }

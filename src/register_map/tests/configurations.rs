@@ -279,7 +279,7 @@ fn a_model_of_sunspec_follows_its_sizes_and_factors() {
         "440081 Evt uint32 ABCD x1 #4=Fan !4294967295",
         "440083 Str1.V uint16 ABCD x0.1 !65535",
         "440084 Str2.V uint16 ABCD x0.1 !65535",
-        "440085 End1.A uint32 ABCD x1",
+        "440085 End1.A uint32 ABCD x1 !0",
     ];
     assert_eq!((named, problems), (expect.map(str::to_owned).to_vec(), Vec::new()));
     let warnings = list_of(text).warnings;

@@ -261,6 +261,10 @@ impl Maker {
         if report.until < due.period.to {
             return Err(NotMade::Yet("the clock was set back".to_owned()));
         }
+        // Its file would stay as it is.
+        if report.unstored != Some(0) {
+            return Err(NotMade::Yet("records wait for the disk of the history".to_owned()));
+        }
         let (def, rule) = (self.task.def.clone(), due.rule);
         let format = report::format(due.format).map_err(NotMade::Ever)?;
         let folder = rule.folder.clone().unwrap_or_else(|| def.report.folder.clone());

@@ -175,7 +175,8 @@ impl Form {
             Input::Secret(line) if line.text().is_empty() => Some(required(field.label)),
             Input::Text(_) | Input::Digits(_) | Input::Secret(_) | Input::Choice(..) => None,
         };
-        let (n, why) = self.fields.iter().enumerate().find_map(|(n, field)| Some((n, lacks(field)?)))?;
+        let mut shown = self.fields.iter().enumerate().filter(|(_, field)| !field.hidden);
+        let (n, why) = shown.find_map(|(n, field)| Some((n, lacks(field)?)))?;
         self.at = n;
         Some(why)
     }

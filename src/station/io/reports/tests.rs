@@ -45,6 +45,8 @@ struct Running {
     events: mpsc::Receiver<Event>,
     /// Messages until it is killed.
     lives: usize,
+    /// Records that wait for the disk while a report is asked for.
+    unstored: Option<u64>,
 }
 
 impl Stand {
@@ -95,7 +97,7 @@ impl Stand {
             status,
         };
         let task = tokio::spawn(run(task, stopped));
-        Running { clock, store, task, _stop, _status, queries, records, audit, events, lives }
+        Running { clock, store, task, _stop, _status, queries, records, audit, events, lives, unstored: Some(0) }
     }
 
     /// Runs until an instant, or until the station is killed by a message that it does not live to answer.
@@ -123,7 +125,11 @@ impl Stand {
                 Some((terminal, QueryRequest { query, reply })) = running.queries.recv() => {
                     assert_eq!(terminal, STATION);
                     if running.dies() { break }
-                    let _ = reply.send(running.store.answer(&query, running.clock.utc()));
+                    let mut answer = running.store.answer(&query, running.clock.utc());
+                    if let Ok(Answer::Report(report)) = &mut answer {
+                        report.unstored = running.unstored;
+                    }
+                    let _ = reply.send(answer);
                 }
                 Some(event) = running.events.recv() => {
                     if let Event::Station { state, .. } = event { self.alarms.push(state) }
@@ -235,6 +241,26 @@ async fn a_history_that_is_still_empty_is_waited_for() {
     stand.follow(&mut running, at("2026-11-01T14:02+07")).await;
     assert_eq!(stand.files(), stand.expected(PeriodKind::Shift, "2026-11-01T14:02+07"));
     running.task.abort();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_report_is_not_made_while_records_wait_for_the_disk() {
+    for unstored in [Some(3), None] {
+        let mut stand = Stand::new(&[(PeriodKind::Shift, "csv")], "2026-11-01T06:00+07");
+        let mut running = Running { unstored, ..stand.start(at("2026-11-01T06:00+07"), FOREVER) };
+        stand.follow(&mut running, at("2026-11-01T14:10+07")).await;
+        assert_eq!((&stand.made[..], stand.files()), (&[][..], BTreeSet::new()), "{unstored:?}");
+        assert!(
+            matches!(&stand.alarms[..], [FaultState::Active(why)] if why.contains("not made")),
+            "{:?}",
+            stand.alarms
+        );
+        running.unstored = Some(0);
+        stand.follow(&mut running, at("2026-11-01T14:30+07")).await;
+        assert_eq!(stand.alarms.last(), Some(&FaultState::Cleared));
+        assert_eq!(stand.files(), stand.expected(PeriodKind::Shift, "2026-11-01T14:30+07"));
+        running.task.abort();
+    }
 }
 
 #[tokio::test(start_paused = true)]
