@@ -163,6 +163,11 @@ fn shipped_devices() -> impl Iterator<Item = String> {
     io::list(&Search::shipped()).into_iter().filter(|listed| listed.kind == Kind::Device).map(|listed| listed.name)
 }
 
+/// Those of the program at a glance.
+fn shipped_cards() -> Vec<Card> {
+    cards(&Search::shipped())
+}
+
 /// All device profiles at a glance, the kinds of device one after the other.
 pub fn cards(search: &Search) -> Vec<Card> {
     let devices = list(search).into_iter().filter(|listed| listed.kind == Kind::Device);

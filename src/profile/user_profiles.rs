@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
-    Card, Checked, Errors, Kind, Listed, Search, cards, check_device, library, plant, shipped_device, shipped_devices,
+    Card, Checked, Errors, Kind, Listed, check_device, library, plant, shipped_cards, shipped_device, shipped_devices,
 };
 use crate::plant::PlantDef;
 
@@ -61,7 +61,7 @@ impl OwnProfiles {
             let (kind, folder, from) = (Kind::Device, String::new(), Some(text.file.clone().into()));
             (Listed { kind, name: name.clone(), folder, from }, Some(text.clone()))
         });
-        let shipped = cards(&Search::shipped()).into_iter().filter(|card| !self.texts.contains_key(&card.listed.name));
+        let shipped = shipped_cards().into_iter().filter(|card| !self.texts.contains_key(&card.listed.name));
         shipped.chain(library::cards(own)).collect()
     }
 
@@ -96,7 +96,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::profile::{own_profiles, text_of};
+    use crate::profile::{Search, own_profiles, text_of};
 
     #[test]
     fn profiles_beside_the_plant_and_of_the_user_are_recognised() {

@@ -45,6 +45,10 @@ const SENSOR: &[&str] = &[
     "virtual_count",
     "structure",
 ];
+/// Keys that turn a value into another one, in a way that no profile says.
+const TURNING: &[&str] = &["reverse_order"];
+/// The unit of an entity that states none.
+const USUAL_UNIT: u8 = 1;
 /// What an entity may be; sensors first.
 const SECTIONS: [&str; 7] = ["sensors", "binary_sensors", "switches", "lights", "fans", "covers", "climates"];
 /// Most registers of an array.
@@ -73,10 +77,16 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
 }
 
 fn row(list: &mut List, context: &ListContext, hub: usize, section: &str, item: &Node) {
-    let unit = item.get("slave").or(item.get("device_address")).and_then(Node::whole);
-    let station = unit.and_then(|unit| Some((hub, u8::try_from(unit).ok()?))).or((0 < hub).then_some((hub, 0)));
+    let unit = match item.get("slave").or(item.get("device_address")) {
+        Some(node) => node.whole().and_then(|unit| u8::try_from(unit).ok()).ok_or_else(|| wrong("slave", node)),
+        None => Ok(USUAL_UNIT),
+    };
     let is_sensor = section == SECTIONS[0];
+    let turning = TURNING.iter().find(|key| item.get(key).is_some_and(Node::is_true));
     let rows = match section {
+        _ if unit.is_err() || turning.is_some() => {
+            Err(turning.map_or_else(|| unit.clone().err().unwrap_or_default(), |key| unsaid(key)))
+        }
         _ if is_sensor => sensors(item),
         "binary_sensors" => entities::binary_sensors(item),
         "covers" => entities::cover(item).map(|one| vec![one]),
@@ -89,7 +99,7 @@ fn row(list: &mut List, context: &ListContext, hub: usize, section: &str, item: 
     let taken = list.named.len();
     for named in rows {
         let named = named.map(|named| Named { line: item.line, poll, ..named }).map_err(|why| because(item, &why));
-        list.push_of(context, station, item.line, named);
+        list.push_of(context, unit.as_ref().ok().map(|unit| (hub, *unit)), item.line, named);
     }
     if taken < list.named.len() {
         list.note_keys(item, &[PLAIN, if is_sensor { SENSOR } else { entities::KEPT }]);
@@ -129,33 +139,33 @@ fn point(item: &Node, name: &str) -> Result<Named, String> {
     }
     let swap = item.word("swap").unwrap_or("none");
     let order = swapped(swap).ok_or_else(|| unsaid("swap"))?;
-    // Words of a single register are not swapped.
-    let order = match (order, kind.registers()) {
-        (ByteOrder::Cdab, 1) => ByteOrder::Abcd,
-        (ByteOrder::Dcba, 1) => ByteOrder::Badc,
-        (order, _) => order,
-    };
-    Ok(Named::new(table, address, kind, order, name))
+    // Of a text the registers are swapped, too, end to end.
+    if kind.is_text() && 1 < kind.registers() && matches!(order, ByteOrder::Cdab | ByteOrder::Dcba) {
+        return Err(unsaid("swap"));
+    }
+    Ok(Named::new(table, address, kind, ByteOrder::Abcd, name).ordered(order))
 }
 
-/// A value with its scale and unit.
-fn quantity(item: &Node, name: &str) -> Result<Named, String> {
+/// A value with its unit and its scale, which these keys state.
+fn quantity(item: &Node, name: &str, [scale, offset]: [&str; 2]) -> Result<Named, String> {
     let named = point(item, name)?;
     if named.kind.is_text() || named.table.is_bits() {
         return Ok(named);
     }
-    let (scale, offset) = (item.opt_number("scale")?.unwrap_or(1.0), item.opt_number("offset")?.unwrap_or(0.0));
-    if scale == 0.0 {
-        return Err(unsaid("scale"));
+    let (factor, added) = (item.opt_number(scale)?.unwrap_or(1.0), item.opt_number(offset)?.unwrap_or(0.0));
+    if factor == 0.0 {
+        return Err(unsaid(scale));
     }
-    let mut named = named.scaled(scale, offset);
+    let mut named = named.scaled(factor, added);
     if let Some(precision) = item.opt_whole("precision")? {
         named.decimals = u8::try_from(precision).unwrap_or(0).min(6);
     }
     named.unit = unit_of(item.word("unit_of_measurement").unwrap_or_default());
     if let Some(node) = item.get("nan_value") {
         let value = node.whole().ok_or_else(|| wrong("nan_value", node))?;
-        named = named.bad_at(value, node.shown().to_lowercase().starts_with("0x"));
+        // The program takes the number with either sign; its pattern is what the file means where the type has a sign.
+        let is_pattern = node.shown().to_lowercase().starts_with("0x");
+        named = named.bad_at(value, is_pattern).bad_at(-value, false);
     }
     Ok(named)
 }
@@ -163,7 +173,7 @@ fn quantity(item: &Node, name: &str) -> Result<Named, String> {
 /// A sensor, and those behind it in the same way.
 fn sensors(item: &Node) -> Result<Vec<Named>, String> {
     let name = item.word("name").ok_or_else(|| missing("name"))?;
-    let first = quantity(item, name)?;
+    let first = quantity(item, name, ["scale", "offset"])?;
     let more = item.opt_whole("slave_count")?.or(item.opt_whole("virtual_count")?).unwrap_or(0);
     array(first, more, |named, n| {
         let address = named.address.checked_add(u16::try_from(n).ok()?.checked_mul(named.count())?)?;

@@ -58,8 +58,12 @@ impl Node {
 
     /// The address that a key must have.
     pub fn wire_address(&self, key: &str) -> Result<u16, String> {
-        let node = self.get(key).ok_or_else(|| missing(key))?;
-        node.whole().and_then(|number| u16::try_from(number).ok()).ok_or_else(|| wrong(key, node))
+        self.get(key).ok_or_else(|| missing(key))?.address(key)
+    }
+
+    /// It is an address.
+    pub fn address(&self, key: &str) -> Result<u16, String> {
+        self.whole().and_then(|number| u16::try_from(number).ok()).ok_or_else(|| wrong(key, self))
     }
 
     /// Its keys as numbers and their texts, as an enumeration has them.
@@ -101,9 +105,22 @@ impl Named {
         Named { enum_labels, ..self }
     }
 
+    /// The same in this order; words of a single register, and of a text, are not swapped.
+    pub fn ordered(self, order: ByteOrder) -> Named {
+        let is_single = self.kind.registers() == 1 || self.kind.is_text();
+        let order = match order {
+            ByteOrder::Cdab if is_single => ByteOrder::Abcd,
+            ByteOrder::Dcba if is_single => ByteOrder::Badc,
+            order => order,
+        };
+        Named { order, ..self }
+    }
+
     /// The same with a number that means "no value", written as a pattern of its bits or as the number.
     pub fn bad_at(mut self, written: i64, is_pattern: bool) -> Named {
-        self.bad_if.extend(self.point().raw_number(i128::from(written), is_pattern).number());
+        let number = self.point().raw_number(i128::from(written), is_pattern).number();
+        let number = number.filter(|number| !self.bad_if.contains(number));
+        self.bad_if.extend(number);
         self
     }
 }

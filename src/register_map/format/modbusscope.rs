@@ -3,10 +3,7 @@
 
 use super::{field_of, missing, unsaid, wrong};
 use crate::{
-    plant::{
-        address::of_modicon,
-        tag::{ByteOrder, DataType, Table},
-    },
+    plant::tag::{ByteOrder, DataType, Table},
     register_map::{
         container::node::{Node, Tree, whole},
         list::{List, ListContext},
@@ -81,7 +78,7 @@ fn parse(text: &str) -> Option<Expression> {
         [_, connection, kind] => (Some(whole(connection)?), *kind),
         _ => return None,
     };
-    let (mut scale, mut offset) = (1.0, 0.0);
+    let (mut scale, mut offset, mut has_added) = (1.0, 0.0, false);
     while !rest.trim().is_empty() {
         let sign = rest.trim().chars().next()?;
         let behind = rest.trim()[sign.len_utf8()..].trim_start();
@@ -91,11 +88,10 @@ fn parse(text: &str) -> Option<Expression> {
         let number: f64 = number.parse().ok()?;
         match sign {
             // What is multiplied after something was added would multiply that as well.
-            '*' | '/' if offset != 0.0 => return None,
+            '*' | '/' if has_added => return None,
             '*' => scale *= number,
             '/' if number != 0.0 => scale = if scale == 1.0 { 1.0 / number } else { scale / number },
-            '+' => offset += number,
-            '-' => offset -= number,
+            '+' | '-' => (offset, has_added) = (if sign == '+' { offset + number } else { offset - number }, true),
             _ => return None,
         }
         rest = left;
@@ -132,9 +128,14 @@ fn place(written: &str) -> Option<(Table, u16)> {
     let tables = [('h', Table::Holding), ('i', Table::Input), ('c', Table::Coil), ('d', Table::Discrete)];
     let lettered =
         tables.iter().find_map(|(letter, table)| Some((*table, written.strip_prefix(*letter)?.parse().ok()?)));
-    // Below 10000 a number without its zeros is a coil.
-    let padded = format!("{:0>5}", written.trim());
-    lettered.or_else(|| of_modicon(&padded))
+    lettered.or_else(|| of_number(written.trim().parse().ok()?))
+}
+
+/// The first number of each table, the highest first. Coils begin with 0 in this program, and the last table has no end.
+fn of_number(number: u32) -> Option<(Table, u16)> {
+    let tables = [(40_001, Table::Holding), (30_001, Table::Input), (10_001, Table::Discrete), (0, Table::Coil)];
+    let (first, table) = tables.into_iter().find(|(first, _)| *first <= number)?;
+    Some((table, u16::try_from(number - first).ok()?))
 }
 
 /// The form of older versions: `unsigned`, `bitmask`, `shift`, `multiply` and `divide`, each of its own.

@@ -95,10 +95,11 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
         let name = group.word("group").unwrap_or_default();
         let own = code_of(group).unwrap_or(usual);
         for item in group.all("items") {
+            let item = &with_those_of(item, group);
             let chosen = of_variant(item, context.variant);
             let is_stated = code_of(item).is_some();
             let named = chosen.as_ref().map_err(Clone::clone).and_then(|item| item_of(item, own, &tables, is_stated));
-            let poll = item.get("update_interval").or(group.get("update_interval")).and_then(Node::whole);
+            let poll = item.get("update_interval").and_then(Node::whole);
             let poll =
                 poll.and_then(|seconds| u64::try_from(seconds).ok()).filter(|seconds| (1..=86_400).contains(seconds));
             let poll = poll.map(Duration::from_secs);
@@ -112,6 +113,14 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
         }
     }
     list
+}
+
+/// An item with the keys of its group that it does not have itself.
+fn with_those_of(item: &Node, group: &Node) -> Node {
+    let inherited = group.entries().iter().filter(|(key, _)| !["group", "items"].contains(&key.as_str()));
+    let inherited = inherited.filter(|(key, _)| item.get(key).is_none());
+    let entries = item.entries().iter().chain(inherited).cloned().collect();
+    Node { line: item.line, value: Value::Map(entries) }
 }
 
 /// Lists of lists of registers, and lists of factors, have a place for each model.
@@ -160,10 +169,7 @@ fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Resul
     }
     let rule = item.opt_whole("rule")?.ok_or_else(|| missing("rule"))?;
     let nodes = item.all("registers");
-    let registers = nodes
-        .iter()
-        .map(|node| node.whole().and_then(|number| u16::try_from(number).ok()).ok_or_else(|| wrong("registers", node)));
-    let registers: Vec<u16> = registers.collect::<Result<_, _>>()?;
+    let registers: Vec<u16> = nodes.iter().map(|node| node.address("registers")).collect::<Result<_, _>>()?;
     let first = *registers.iter().min().ok_or_else(|| missing("registers"))?;
     let stated = tables.iter().find(|(start, end, _)| (*start..=*end).contains(&i64::from(first)));
     let table = if is_stated { code_of(item) } else { stated.map(|(.., table)| *table) }.unwrap_or(usual);
@@ -182,7 +188,7 @@ fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Resul
     let named = part(item, named, rule)?;
     let named = match item.get("lookup") {
         Some(lookup) if !lookup.items().is_empty() => labelled(lookup, named)?,
-        _ => scaled(item, named)?,
+        _ => scaled(item, named, rule)?,
     };
     Ok(with_limits(item, named))
 }
@@ -236,8 +242,13 @@ fn clock(registers: &[u16]) -> Result<DataType, String> {
 
 /// A part of the number: by its mask, or one bit.
 fn part(item: &Node, named: Named, rule: i64) -> Result<Named, String> {
-    let found = ["mask", "bit", "bitmask"].iter().find_map(|key| Some((*key, item.get(key)?)));
-    let Some((key, node)) = found else { return Ok(named) };
+    let found: Vec<_> = ["mask", "bit", "bitmask"].iter().filter_map(|key| Some((*key, item.get(key)?))).collect();
+    let (key, node) = match found.as_slice() {
+        [] => return Ok(named),
+        [one] => *one,
+        // One after the other.
+        [_, (key, _), ..] => return Err(unsaid(key)),
+    };
     let number = node.whole().and_then(|number| u64::try_from(number).ok()).ok_or_else(|| wrong(key, node))?;
     let field = match key {
         "bit" => u8::try_from(number).ok().map(|bit| (bit, 1)),
@@ -257,12 +268,16 @@ fn shift(item: &Node, named: &Named) -> u8 {
     if item.get("mask").is_some() { named.field.map_or(0, |(low, _)| low) } else { 0 }
 }
 
-fn scaled(item: &Node, named: Named) -> Result<Named, String> {
+fn scaled(item: &Node, named: Named, rule: i64) -> Result<Named, String> {
     let scale = item.opt_number("scale")?.unwrap_or(1.0);
     let divide = item.opt_number("divide")?.unwrap_or(1.0);
     let before = item.opt_number("offset")?.unwrap_or(0.0);
     if scale == 0.0 || divide == 0.0 {
         return Err(unsaid("scale"));
+    }
+    // Of a number without a sign the other program does not turn it.
+    if rule % 2 == 1 && item.get("inverted").is_some_and(Node::is_true) {
+        return Err(unsaid("inverted"));
     }
     let sign = if item.get("inverted").is_some_and(Node::is_true) { -1.0 } else { 1.0 };
     let scale = if divide == 1.0 { sign * scale } else { sign * scale / divide };

@@ -35,7 +35,13 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
         // An input of its own is a connection of its own, unless it is the same.
         let connection =
             inputs.iter().position(|other| other.word("controller") == input.word("controller")).unwrap_or(n);
-        let unit = unit_of(input);
+        // The program asks unit 0 where none is stated.
+        let unit = unit_of(input).unwrap_or(0);
+        let cut = input.get("workarounds").and_then(|own| own.word("string_register_location")).unwrap_or("both");
+        let in_whole = |named: Result<Option<Named>, String>| match named {
+            Ok(Some(named)) if named.kind.is_text() && cut != "both" => Err(unsaid("string_register_location")),
+            named => named,
+        };
         for (section, table) in [
             ("discrete_inputs", Table::Discrete),
             ("coils", Table::Coil),
@@ -43,15 +49,13 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
             ("input_registers", Table::Input),
         ] {
             for field in input.all(section) {
-                let named = register(field, table);
-                push(&mut list, context, unit.map(|unit| (connection, unit)), field, named);
+                push(&mut list, context, (connection, unit), field, in_whole(register(field, table)));
             }
         }
         for request in input.all("request").iter().chain(input.all("metric")) {
-            let unit = unit_of(request).or(unit);
+            let unit = unit_of(request).unwrap_or(unit);
             for field in request.all("fields") {
-                let named = requested(request, field);
-                push(&mut list, context, unit.map(|unit| (connection, unit)), field, named);
+                push(&mut list, context, (connection, unit), field, in_whole(requested(request, field)));
             }
         }
     }
@@ -65,7 +69,7 @@ fn unit_of(node: &Node) -> Option<u8> {
 fn push(
     list: &mut List,
     context: &ListContext,
-    station: Option<(usize, u8)>,
+    station: (usize, u8),
     field: &Node,
     named: Result<Option<Named>, String>,
 ) {
@@ -77,34 +81,28 @@ fn push(
     if named.is_ok() {
         list.note_keys(field, &[KNOWN]);
     }
-    list.push_of(context, station, field.line, named);
+    list.push_of(context, Some(station), field.line, named);
 }
 
 /// A field of the style with registers, `address = [3, 4]`.
 fn register(field: &Node, table: Table) -> Result<Option<Named>, String> {
     let name = field.word("name").ok_or_else(|| missing("name"))?;
-    let addresses: Vec<u16> = field
-        .all("address")
-        .iter()
-        .map(|node| node.whole().and_then(|number| u16::try_from(number).ok()).ok_or_else(|| wrong("address", node)))
-        .collect::<Result<_, _>>()?;
+    let addresses = field.all("address").iter().map(|node| node.address("address"));
+    let addresses: Vec<u16> = addresses.collect::<Result<_, _>>()?;
     let first = *addresses.first().ok_or_else(|| missing("address"))?;
     if table.is_bits() {
         return Ok(Some(Named::new(table, first, DataType::Bool, ByteOrder::Abcd, name)));
     }
     let word = field.word("data_type").ok_or_else(|| missing("data_type"))?;
     if word == "BIT" {
-        let bit = field.opt_whole("bit")?.unwrap_or(0);
-        let bit = u8::try_from(bit).ok().filter(|bit| *bit < 16).ok_or_else(|| unsaid("bit"))?;
-        let named = Named::new(table, first, DataType::U16, ByteOrder::Abcd, name);
-        return Ok(Some(Named { field: Some((bit, 1)), ..named }));
+        return bit(field, table, first, field.get("byte_order"), name).map(Some);
     }
     if addresses.windows(2).any(|pair| pair[0].checked_add(1) != Some(pair[1])) {
         return Err(apart());
     }
     let count = i64::try_from(addresses.len()).unwrap_or(0);
     let (kind, order) = kind_of(word, count, field.get("byte_order"))?;
-    Ok(Some(scaled(Named::new(table, first, kind, order, name), field)?))
+    Ok(Some(scaled(Named::new(table, first, kind, ByteOrder::Abcd, name).ordered(order), field)?))
 }
 
 /// A field of the styles with requests and metrics.
@@ -126,16 +124,22 @@ fn requested(request: &Node, field: &Node) -> Result<Option<Named>, String> {
         return Ok(Some(Named::new(table, address, DataType::Bool, ByteOrder::Abcd, name)));
     }
     let word = field.word("type").ok_or_else(|| missing("type"))?;
+    let order = field.get("byte_order").or(request.get("byte_order"));
     if word == "BIT" {
-        let bit = field.opt_whole("bit")?.unwrap_or(0);
-        let bit = u8::try_from(bit).ok().filter(|bit| *bit < 16).ok_or_else(|| unsaid("bit"))?;
-        let named = Named::new(table, address, DataType::U16, ByteOrder::Abcd, name);
-        return Ok(Some(Named { field: Some((bit, 1)), ..named }));
+        return bit(field, table, address, order, name).map(Some);
     }
     let length = field.opt_whole("length")?.unwrap_or(1);
-    let order = field.get("byte_order").or(request.get("byte_order"));
     let (kind, order) = kind_of(word, if word == "STRING" { length } else { 0 }, order)?;
-    Ok(Some(scaled(Named::new(table, address, kind, order, name), field)?))
+    Ok(Some(scaled(Named::new(table, address, kind, ByteOrder::Abcd, name).ordered(order), field)?))
+}
+
+/// A bit of a register, counted after its bytes are in order.
+fn bit(field: &Node, table: Table, address: u16, order: Option<&Node>, name: &str) -> Result<Named, String> {
+    let bit = field.opt_whole("bit")?.unwrap_or(0);
+    let bit = u8::try_from(bit).ok().filter(|bit| *bit < 16).ok_or_else(|| unsaid("bit"))?;
+    let order = order.map_or(Ok(ByteOrder::Abcd), order_of)?;
+    let named = Named::new(table, address, DataType::U16, ByteOrder::Abcd, name).ordered(order);
+    Ok(Named { field: Some((bit, 1)), ..named })
 }
 
 fn scaled(named: Named, field: &Node) -> Result<Named, String> {
@@ -176,16 +180,15 @@ fn kind_of(word: &str, count: i64, order: Option<&Node>) -> Result<(DataType, By
     if kind.is_half() {
         return Ok((kind, if word.ends_with('H') { ByteOrder::Badc } else { ByteOrder::Abcd }));
     }
-    let Some(order) = order else { return Ok((kind, ByteOrder::Abcd)) };
-    let written = order.text().unwrap_or_default();
-    let found = match (written, kind.registers(), kind.is_text()) {
-        ("AB" | "ABCD" | "ABCDEFGH", ..) => ByteOrder::Abcd,
-        ("CDAB" | "GHEFCDAB", 1, _) | ("CDAB" | "GHEFCDAB", _, true) => ByteOrder::Abcd,
-        ("CDAB" | "GHEFCDAB", ..) => ByteOrder::Cdab,
-        ("BA" | "BADC" | "BADCFEHG", ..) => ByteOrder::Badc,
-        ("DCBA" | "HGFEDCBA", 1, _) | ("DCBA" | "HGFEDCBA", _, true) => ByteOrder::Badc,
-        ("DCBA" | "HGFEDCBA", ..) => ByteOrder::Dcba,
+    Ok((kind, order.map_or(Ok(ByteOrder::Abcd), order_of)?))
+}
+
+fn order_of(order: &Node) -> Result<ByteOrder, String> {
+    Ok(match order.text().unwrap_or_default() {
+        "AB" | "ABCD" | "ABCDEFGH" => ByteOrder::Abcd,
+        "CDAB" | "GHEFCDAB" => ByteOrder::Cdab,
+        "BA" | "BADC" | "BADCFEHG" => ByteOrder::Badc,
+        "DCBA" | "HGFEDCBA" => ByteOrder::Dcba,
         _ => return Err(wrong("byte_order", order)),
-    };
-    Ok((kind, found))
+    })
 }

@@ -1,6 +1,6 @@
 //! Templates and configurations of wb-mqtt-serial: <https://github.com/wirenboard/wb-mqtt-serial>. Only the form is known here.
 
-use super::{missing, text_of, unsaid, wrong};
+use super::{missing, unsaid, wrong};
 use crate::{
     plant::tag::{Access, ByteOrder, DataType, Table},
     profile::unit_of,
@@ -112,6 +112,10 @@ fn channel(row: &Node, name: &str, device: &Node, key: &str) -> Result<Named, St
     if name.is_empty() {
         return Err(missing("name"));
     }
+    // Which device or setting has it, only the other program finds out.
+    if row.get("condition").is_some() {
+        return Err(unsaid("condition"));
+    }
     let is_parameter = !key.is_empty() || row.get("default").is_some() || row.get("reg_type").is_none();
     let word = row.word("reg_type").unwrap_or("holding");
     let (table, write_fc) = match word {
@@ -126,13 +130,13 @@ fn channel(row: &Node, name: &str, device: &Node, key: &str) -> Result<Named, St
     let (address, field) = place(node)?;
     let kind = if table.is_bits() { DataType::Bool } else { kind_of(row, node)? };
     let is_little = |key: &str| row.word(key).or(device.word(key)) == Some("little_endian");
-    let order = match (is_little("word_order"), is_little("byte_order"), kind.registers()) {
-        (false, false, _) | (true, false, 1) => ByteOrder::Abcd,
-        (true, false, _) => ByteOrder::Cdab,
-        (false, true, _) | (true, true, 1) => ByteOrder::Badc,
-        (true, true, _) => ByteOrder::Dcba,
+    let order = match (is_little("word_order"), is_little("byte_order")) {
+        _ if kind.is_text() && is_little("word_order") => return Err(unsaid("word_order")),
+        (false, false) => ByteOrder::Abcd,
+        (true, false) => ByteOrder::Cdab,
+        (false, true) => ByteOrder::Badc,
+        (true, true) => ByteOrder::Dcba,
     };
-    let order = if kind.is_text() && order == ByteOrder::Cdab { return Err(unsaid("word_order")) } else { order };
     if field.is_some() && !kind.is_binary() {
         return Err(unsaid("address"));
     }
@@ -145,16 +149,21 @@ fn channel(row: &Node, name: &str, device: &Node, key: &str) -> Result<Named, St
         (true, false) => Access::ReadWrite,
     };
     let write_fc = write_fc.filter(|_| is_written && field.is_none() && kind.registers() == 1 && !kind.is_half());
-    let named = Named { field, access, write_fc, ..Named::new(table, address, kind, order, name) };
+    let named =
+        Named { field, access, write_fc, ..Named::new(table, address, kind, ByteOrder::Abcd, name).ordered(order) };
     let named = match row.get("write_address").filter(|_| is_written) {
         Some(node) => Named { write_at: Some((table, place(node)?.0)), ..named },
         None => named,
     };
     let named = Named { group: row.word("group").unwrap_or_default().to_owned(), ..named };
+    // A bit that is on while it is 0 would be shown the other way round.
+    if table.is_bits() && row.opt_whole("on_value")?.is_some_and(|on| on == 0) {
+        return Err(unsaid("on_value"));
+    }
     if kind.is_text() || table.is_bits() { Ok(named) } else { numbers(row, named, shown, is_parameter) }
 }
 
-/// `16`, `"0x10"`, `"0x10:4:2"` with a bit and how many.
+/// `16`, `"0x10"`, `"0x10:4:2"` with the lowest bit and how many.
 fn place(node: &Node) -> Result<(u16, Option<(u8, u8)>), String> {
     let bad = || wrong("address", node);
     let text = node.text().ok_or_else(bad)?;
@@ -163,8 +172,8 @@ fn place(node: &Node) -> Result<(u16, Option<(u8, u8)>), String> {
     let part = |n: usize| parts.get(n).copied().flatten().and_then(|number| u8::try_from(number).ok());
     match parts.len() {
         1 => Ok((address, None)),
-        2 | 3 => {
-            let (low, width) = (part(1).ok_or_else(bad)?, if parts.len() == 3 { part(2).ok_or_else(bad)? } else { 1 });
+        3 => {
+            let (low, width) = (part(1).ok_or_else(bad)?, part(2).ok_or_else(bad)?);
             let fits = 0 < width && low.saturating_add(width) <= 64;
             Ok((address, Some(Some((low, width)).filter(|_| fits).ok_or_else(bad)?)))
         }
@@ -189,8 +198,10 @@ fn kind_of(row: &Node, address: &Node) -> Result<DataType, String> {
         "float" => DataType::F32,
         "double" => DataType::F64,
         "string" => {
-            let registers = row.opt_whole("string_data_size")?.ok_or_else(|| wrong("address", address))?;
-            text_of(registers).ok_or_else(|| unsaid("string_data_size"))?
+            // A register holds one character, in its low byte.
+            let length = row.opt_whole("string_data_size")?.ok_or_else(|| wrong("address", address))?;
+            let length = u8::try_from(length).ok().filter(|length| (1..=DataType::CHARS_MAX).contains(length));
+            DataType::Chars(length.ok_or_else(|| unsaid("string_data_size"))?)
         }
         word => return Err(t!("`{word}` is not a known type", word)),
     })

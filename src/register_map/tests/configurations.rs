@@ -116,7 +116,7 @@ fn telegraf_is_read_in_all_its_styles() {
         "40011 level uint16 BADC x1",
         "30001 volt float32 DCBA x0.001",
         "30004 temp int16 BADC x1",
-        "30005 bit uint16[3+1] ABCD x1",
+        "30005 bit uint16[3+1] BADC x1",
         "30006 half uint8 BADC x1",
         "30007 text cstring(6) BADC x1",
     ];

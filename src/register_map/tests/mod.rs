@@ -2,6 +2,7 @@
 
 mod configurations;
 mod exports;
+mod meanings;
 mod odd;
 mod older;
 mod profiles;

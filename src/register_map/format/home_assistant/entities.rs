@@ -30,6 +30,10 @@ pub const KEPT: &[&str] = &[
     "swap",
     "scale",
     "offset",
+    "current_temp_scale",
+    "current_temp_offset",
+    "target_temp_scale",
+    "target_temp_offset",
     "precision",
     "min_temp",
     "max_temp",
@@ -99,6 +103,10 @@ pub fn switch(item: &Node) -> Result<Named, String> {
         "coils" => Some(15),
         _ => None,
     };
+    // A bit that is on while it is 0 would be shown the other way round.
+    if write.is_bits() && [on, off] != [1, 0] {
+        return Err(unsaid("command_on"));
+    }
     let written = Named { access: Access::ReadWrite, write_fc, ..plain(write, address, name_of(item)?) };
     let Some(verify) = item.get("verify").filter(|verify| !verify.entries().is_empty()) else {
         return Ok(with_states(written, on, off));
@@ -151,7 +159,13 @@ pub fn cover(item: &Node) -> Result<Named, String> {
             Named { table: read, address: place, write_at, ..named }
         }
     };
-    Ok(if named.table.is_bits() { named } else { named.labelled(states) })
+    if !named.table.is_bits() {
+        return Ok(named.labelled(states));
+    }
+    if states[..2].iter().map(|(state, _)| *state).ne([0, 1]) {
+        return Err(unsaid("state_open"));
+    }
+    Ok(named)
 }
 
 /// The temperature, the one that is wanted, and the modes of a climate.
@@ -159,12 +173,19 @@ pub fn climate(item: &Node) -> Result<Vec<Named>, String> {
     let name = name_of(item)?;
     let unit =
         if item.word("temperature_unit").is_some_and(|unit| unit.eq_ignore_ascii_case("f")) { "°F" } else { "°C" };
-    let now = Named { unit: unit_of(unit), ..quantity(item, name)? };
+    let of = |which: &str| -> Result<Named, String> {
+        // One of the keys for both, or each has its own.
+        let keys = ["scale", "offset"].map(|key| {
+            let own = format!("{which}_temp_{key}");
+            if item.get(&own).is_some() { own } else { key.to_owned() }
+        });
+        Ok(Named { unit: unit_of(unit), ..quantity(item, name, [&keys[0], &keys[1]])? })
+    };
+    let (now, wanted) = (of("current")?, of("target")?);
     let mut rows = vec![now.clone()];
     let targets = item.all("target_temp_register");
     for (n, node) in targets.iter().enumerate() {
-        let address = node.whole().and_then(|number| u16::try_from(number).ok());
-        let address = address.ok_or_else(|| wrong("target_temp_register", node))?;
+        let address = node.address("target_temp_register")?;
         let number = if targets.len() == 1 { String::new() } else { format!(" {}", n + 1) };
         let many = item.get("target_temp_write_registers").is_some_and(Node::is_true) && now.kind.registers() == 1;
         let target = Named {
@@ -175,10 +196,13 @@ pub fn climate(item: &Node) -> Result<Vec<Named>, String> {
             write_fc: many.then_some(16),
             min: item.opt_number("min_temp")?,
             max: item.opt_number("max_temp")?,
-            ..now.clone()
+            ..wanted.clone()
         };
         // Where it is read is where it is written.
         if now.table == Table::Holding && address == now.address {
+            if (now.scale, now.offset) != (wanted.scale, wanted.offset) {
+                return Err(unsaid("target_temp_scale"));
+            }
             rows.clear();
         }
         rows.push(target);
@@ -211,9 +235,7 @@ fn mode(node: &Node, name: &str, access: Access) -> Result<Named, String> {
     let table = table(node, "input_type", Table::Holding)?;
     let address = match node.get("address").map(Node::items) {
         // One to read and one to write, the same.
-        Some([one]) => {
-            one.whole().and_then(|number| u16::try_from(number).ok()).ok_or_else(|| wrong("address", one))?
-        }
+        Some([one]) => one.address("address")?,
         _ => return Err(unsaid("address")),
     };
     let mut labels = Vec::new();
