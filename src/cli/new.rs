@@ -292,7 +292,9 @@ async fn save(plant: &NewPlant, profiles: &OwnProfiles, made: &[String], path: &
     })
     .await?;
     let path = path.display();
-    let (lines, devices, alarms) = (plant.lines.len(), plant.devices.len(), plant.alarms.len());
+    // As `check` counts them: with those that every device and line has.
+    let alarms = profiles.check("plant", &text).map_or(0, |checked| checked.plant.alarms.len());
+    let (lines, devices) = (plant.lines.len(), plant.devices.len());
     say(&format!("saved {path}: lines {lines}, devices {devices}, alarms {alarms}"));
     say(&format!("`sightglass {path}` shows it, `sightglass check {path}` its read plan"));
     Ok(())

@@ -22,9 +22,11 @@ const PENS_MAX: usize = 4;
 const REPORTED_MAX: usize = 12;
 /// Tags that are of interest where a profile reads none often.
 const INTEREST_MAX: usize = 34;
-/// Values of a column of the mimic, and cells of the first column at least.
+/// Values of a column of the mimic; cells of all of them, of one beside controllers, and of a name at least.
 const ROWS: usize = 17;
+const PICTURE_COLUMNS: usize = 78;
 const LEFT_COLUMNS: usize = 47;
+const NAME_COLUMNS: usize = 12;
 
 /// What a new plant is made of.
 #[derive(Debug, Clone)]
@@ -203,9 +205,8 @@ impl NewPlant {
 
     fn screens(&self, out: &mut String) -> std::fmt::Result {
         let controllers: Vec<&NewDevice> = self.devices.iter().filter(|device| device.controller).take(2).collect();
-        let columns = if controllers.is_empty() { 2 } else { 1 };
         let shown: Vec<(String, &TagDef)> = self.shown().filter(|(_, tag)| !tag.is_text()).collect();
-        let drawn = &shown[..shown.len().min(SHOWN_MAX.min(columns * ROWS))];
+        let drawn = &shown[..shown.len().min(SHOWN_MAX)];
         // A picture without a cell is an error.
         if !drawn.is_empty() || !controllers.is_empty() {
             writeln!(out, "{}", picture(drawn, &controllers))?;
@@ -229,12 +230,21 @@ impl NewPlant {
 
 /// A picture to begin with: the values in columns, with the controllers beside them.
 fn picture(shown: &[(String, &TagDef)], controllers: &[&NewDevice]) -> String {
-    let cell = |row: usize, column: usize| {
-        let (name, tag) = shown.get(column * ROWS + row)?;
-        Some(format!("{:.12} {{{name}}}", tag.short))
+    // Two columns where both leave each name some room; one beside controllers.
+    let is_narrow = |width: usize| shown.iter().all(|(name, _)| NAME_COLUMNS + name.chars().count() + 4 <= width);
+    let (columns, width) = match controllers {
+        [] if is_narrow(PICTURE_COLUMNS / 2) => (2, PICTURE_COLUMNS / 2),
+        [] => (1, PICTURE_COLUMNS),
+        [..] => (1, LEFT_COLUMNS),
     };
-    let wide = |row| cell(row, 0).map(|text| text.chars().count());
-    let width = (0..ROWS).filter_map(wide).max().unwrap_or(0).max(LEFT_COLUMNS);
+    let cell = |row: usize, column: usize| {
+        let (name, tag) = shown.get(column * ROWS + row).filter(|_| column < columns)?;
+        let room = width.saturating_sub(name.chars().count() + 4).max(NAME_COLUMNS);
+        let words = if room < tag.short.chars().count() && !tag.label.is_empty() { &tag.label } else { &tag.short };
+        Some(format!("{} {{{name}}}", words.chars().take(room).collect::<String>().trim_end()))
+    };
+    let widest = (0..ROWS).filter_map(|row| cell(row, 0)).map(|text| text.chars().count()).max();
+    let width = width.max(widest.unwrap_or(0));
     let mut rows: Vec<String> = Vec::new();
     for row in 0..ROWS {
         let right = match controllers.get(row / 7).filter(|_| row % 7 == 0) {

@@ -5,12 +5,13 @@ use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, line::Line, window};
+use crate::plant::number::to_u16;
 use crate::ui::{
     UiAction, ViewContext, keys, replay,
     tabs::{ListPage, Tabs},
     widgets::{
         list::Motion,
-        text::{Canvas, width},
+        text::{Canvas, width, wrap},
     },
 };
 
@@ -104,13 +105,24 @@ impl Prompt {
             }
             return;
         }
-        let problem = self.problem.clone().unwrap_or_default();
-        let inner = width(&self.hint).max(width(&problem)).max(width(&self.line.text()) + 1).max(40);
-        let mut canvas = window(cx, frame, body, &self.title, (inner, 5));
-        canvas.text(0, 0, &self.hint, cx.theme.dim());
-        self.line.view(cx.theme, &mut canvas, 0, 1);
-        canvas.text(0, 3, &problem, cx.theme.trouble());
-        canvas.text(0, 4, &cx.theme.enter(t!("⏎ OK   Esc cancel")), cx.theme.strong());
+        let room = body.width.saturating_sub(8);
+        // Blanks part the examples of a hint in one line.
+        let lines = |text: &str| {
+            if width(text) <= room { vec![text.to_owned()] } else { wrap(&text.replace("   ", ", "), room) }
+        };
+        let [hint, problem] = [self.hint.as_str(), self.problem.as_deref().unwrap_or_default()].map(lines);
+        let widest = hint.iter().chain(&problem).map(|line| width(line)).max().unwrap_or(0);
+        let inner = widest.max((width(&self.line.text()) + 1).min(room)).max(40);
+        let (above, below) = (to_u16(hint.len()), to_u16(problem.len()));
+        let mut canvas = window(cx, frame, body, &self.title, (inner, above + below + 3));
+        for (y, line) in hint.iter().enumerate() {
+            canvas.text(0, to_u16(y), line, cx.theme.dim());
+        }
+        self.line.view(cx.theme, &mut canvas, 0, above);
+        for (y, line) in problem.iter().enumerate() {
+            canvas.text(0, above + 2 + to_u16(y), line, cx.theme.trouble());
+        }
+        canvas.text(0, above + below + 2, &cx.theme.enter(t!("⏎ OK   Esc cancel")), cx.theme.strong());
     }
 }
 

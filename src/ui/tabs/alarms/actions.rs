@@ -39,10 +39,10 @@ pub fn acknowledged(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     open(Modal::Notice(Notice::new(t!("acknowledge"), words)))
 }
 
-/// Acknowledges one alarm with a note.
+/// Acknowledges one alarm with a note; says it where there is nothing to acknowledge.
 pub fn note(cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<UiAction> {
     if !alarm.state.needs_acknowledgement() {
-        return Vec::new();
+        return acknowledged(cx, alarm);
     }
     let needed = cx.def().alarm(alarm.id).ack_comment;
     let notes = vec![name(cx, alarm.id)];

@@ -83,7 +83,8 @@ fn a_frame_is_opened_byte_by_byte() {
 #[test]
 fn a_filter_shows_what_passes_or_says_what_it_expects() {
     let mut model = bus(&Fixture::traffic_trouble(), Theme::FULL, "Ff");
-    assert!(screen(&mut model, 80, 24).contains("unit 1   fc 3   tx   rx   error"));
+    assert!(screen(&mut model, 80, 24).contains("unit 1, fc 3, tx, rx, error"));
+    assert!(screen(&mut model, 120, 40).contains("unit 1   fc 3   tx   rx   error"));
     type_keys(&mut model, "error⏎");
     let shown = screen(&mut model, 80, 24);
     assert!(shown.contains("3 of 126 frames") && shown.contains("filter: error"), "{shown}");

@@ -15,6 +15,9 @@ fn acknowledging_takes_the_most_urgent_or_the_selected() {
         !shown.lines().nth(2).is_some_and(|banner| banner.contains("a ack")),
         "it is not for the banner's: {shown}"
     );
+    type_keys(&mut model, "⎋n");
+    let noted = screen(&mut model, 80, 24);
+    assert!(noted.contains("already acknowledged"), "the key of a note answers as well: {noted}");
     assert_eq!(sent_kind(&type_keys(&mut model, "⎋A")), None, "all: asks first");
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎")), fixture.snapshot().acknowledge_all().as_ref());
     let mut quiet = super::model(&Fixture::normal(), Theme::FULL);
