@@ -12,7 +12,7 @@ use std::{collections::VecDeque, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use super::pdu;
+use super::pdu::{self, Pdu};
 use crate::plant::{
     command::CommandId,
     def::Serial,
@@ -349,10 +349,7 @@ fn planned_step(diagnostic: &Diagnostic, n: u32) -> Step {
         // An adapter that gives back what it sends would pass every loopback. A read cannot be answered by itself: the link
         // knows such an adapter from then on.
         Diagnostic::Loopback { unit, .. } if n == 0 => step(read(*unit, Table::Holding, 0, 1)),
-        Diagnostic::Loopback { unit, data, .. } => {
-            let [high, low] = data.wrapping_add(to_u16(n) - 1).to_be_bytes();
-            step(vec![*unit, 0x08, 0, 0, high, low])
-        }
+        Diagnostic::Loopback { unit, data, .. } => step(Pdu::loopback(data.wrapping_add(to_u16(n) - 1)).to(*unit)),
         Diagnostic::Identify { unit } => identify::first(*unit),
         Diagnostic::Write(write) => write::step_of(write, n),
         Diagnostic::Read { unit, table, address, count } => step(read(*unit, *table, *address, *count)),
@@ -368,8 +365,7 @@ fn step(message: Vec<u8>) -> Step {
 }
 
 fn read(unit: u8, table: Table, address: u16, count: u16) -> Vec<u8> {
-    let ([a, b], [c, d]) = (address.to_be_bytes(), count.to_be_bytes());
-    vec![unit, table.read_fc(), a, b, c, d]
+    Pdu::read(table, address, count).to(unit)
 }
 
 /// What a request asks; `None` of none.

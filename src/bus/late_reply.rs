@@ -20,6 +20,7 @@ use unit::Unit;
 
 use super::{
     frame::{ResponseSignature, response_signature},
+    pdu::Pdu,
     plan::Block,
 };
 use crate::plant::number::{to_u8, to_u32};
@@ -98,7 +99,7 @@ impl OutstandingReplies {
 
     /// A read that resynchronises the unit: part of a block that is read anyway, with a count whose answer cannot
     /// be mistaken. `None`: there is none, see [`loopback`].
-    pub fn probe<'a>(&self, blocks: impl Iterator<Item = &'a Block>) -> Option<[u8; 6]> {
+    pub fn probe<'a>(&self, blocks: impl Iterator<Item = &'a Block>) -> Option<Vec<u8>> {
         blocks
             .flat_map(probes)
             .find(|request| response_signature(request).is_some_and(|signature| !self.is_ambiguous(signature)))
@@ -107,13 +108,12 @@ impl OutstandingReplies {
 
 /// Diagnostics 08 / 00, return query data: the request comes back as it was sent, so with a number of its own it cannot be
 /// mistaken for anything (Modbus application protocol V1.1b3, 6.8). It changes nothing in the device.
-pub fn loopback(unit: u8, number: u16) -> [u8; 6] {
-    let [high, low] = number.to_be_bytes();
-    [unit, 0x08, 0, 0, high, low]
+pub fn loopback(unit: u8, number: u16) -> Vec<u8> {
+    Pdu::loopback(number).to(unit)
 }
 
 /// Reads of the first part of a block, the shortest first: each has a signature of its own.
-fn probes(block: &Block) -> impl Iterator<Item = [u8; 6]> {
+fn probes(block: &Block) -> impl Iterator<Item = Vec<u8>> {
     let (first, step) = if block.table.is_bits() { (1, 8) } else { (block.alignment.max(1), block.alignment.max(1)) };
     let counts = (first..block.count).step_by(usize::from(step)).chain([block.count]);
     let block = block.clone();
@@ -323,7 +323,7 @@ impl LineReplies {
     }
 
     /// The next loopback of a unit, with a number of its own.
-    pub fn next_loopback(&mut self, unit: u8) -> [u8; 6] {
+    pub fn next_loopback(&mut self, unit: u8) -> Vec<u8> {
         self.loopbacks = self.loopbacks.wrapping_add(1);
         loopback(unit, self.loopbacks)
     }

@@ -1,7 +1,12 @@
 //! The layout of every function, one row each (Modbus application protocol V1.1b3, section 6). The link of the master, the
 //! simulated devices, the check before sending and the decoder of frames all read this table.
 
+mod request;
+
+use tokio_modbus::{Response, bytes::Bytes};
+
 use self::Item::*;
+pub use self::request::{Pdu, request_fields};
 use super::names::{self, Counted, counted};
 use crate::{plant::tag::Table, t};
 
@@ -232,43 +237,21 @@ fn measure(message: &[u8], items: &[Item]) -> Option<usize> {
     Some(end)
 }
 
-/// The fields of a request PDU: one number each, and the bytes behind the byte count. `None` if its length is wrong.
-pub fn request_fields(pdu: &[u8]) -> Option<(Vec<u16>, &[u8])> {
-    let (code, mut rest) = pdu.split_first()?;
-    let mut fields = Vec::new();
-    for item in function(*code)?.request {
-        match (item, rest) {
-            (ByteCount, [count, data @ ..]) if usize::from(*count) == data.len() => return Some((fields, data)),
-            (ByteCount, _) => return None,
-            (_, [byte, tail @ ..]) if item.size() == 1 => {
-                fields.push(u16::from(*byte));
-                rest = tail;
-            }
-            (_, [high, low, tail @ ..]) if item.size() == 2 => {
-                fields.push(u16::from_be_bytes([*high, *low]));
-                rest = tail;
-            }
-            _ => return None,
-        }
-    }
-    rest.is_empty().then_some((fields, rest))
-}
-
 /// What a response to a read of one table holds, both as PDUs: the table, the first address and a word each; bits are 0 or 1.
 /// `None` for any other exchange, and for a response of a wrong length.
 pub fn values_read(request: &[u8], response: &[u8]) -> Option<(Table, u16, Vec<u16>)> {
-    let ([code, a, b, c, d], [answered, length, data @ ..]) = (request, response) else { return None };
-    let function = function(*code).filter(|_| answered == code && usize::from(*length) == data.len())?;
-    let (address, count) = (u16::from_be_bytes([*a, *b]), usize::from(u16::from_be_bytes([*c, *d])));
-    let bit = |n: usize| u16::from(data[n / 8] >> (n % 8) & 1);
-    let values = match function.response {
-        [ByteCount, Bits] if data.len() == count.div_ceil(8) => (0..count).map(bit).collect(),
-        [ByteCount, Registers] if data.len() == 2 * count => {
-            data.as_chunks().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
+    let [code, a, b, c, d] = *request else { return None };
+    let (address, count) = (u16::from_be_bytes([a, b]), usize::from(u16::from_be_bytes([c, d])));
+    let table = function(code).filter(|_| response.first() == Some(&code))?.table;
+    let values = match Response::try_from(Bytes::copy_from_slice(response)).ok()? {
+        // The last byte is filled up.
+        Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits) if bits.len() == count.next_multiple_of(8) => {
+            bits.into_iter().take(count).map(u16::from).collect()
         }
+        Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words) if words.len() == count => words,
         _ => return None,
     };
-    Some((function.table, address, values))
+    Some((table, address, values))
 }
 
 /// The objects of a device identification response PDU, id and text, as far as they are whole.

@@ -27,6 +27,7 @@ pub use gaps::{UnreadableRanges, may_be_cut};
 
 use std::{sync::Arc, time::Duration};
 
+use super::pdu::Pdu;
 use crate::plant::{
     PlantDef,
     def::{DeviceDef, DeviceId, LineId, TagId},
@@ -62,9 +63,8 @@ pub struct Block {
 
 impl Block {
     /// The request message: unit, function, address, count.
-    pub fn request(&self) -> [u8; 6] {
-        let ([a, b], [c, d]) = (self.address.to_be_bytes(), self.count.to_be_bytes());
-        [self.unit, self.table.read_fc(), a, b, c, d]
+    pub fn request(&self) -> Vec<u8> {
+        Pdu::read(self.table, self.address, self.count).to(self.unit)
     }
 
     /// First address, and the one behind the last.

@@ -2,7 +2,7 @@
 
 use super::{Step, read, step};
 use crate::{
-    bus::pdu,
+    bus::pdu::{self, Pdu},
     plant::{
         command::{NotConfirmed, Outcome, Refusal},
         diagnostics::RegisterWrite,
@@ -24,30 +24,14 @@ pub fn step_of(write: &RegisterWrite, n: u32) -> Step {
 }
 
 fn message(write: &RegisterWrite) -> Vec<u8> {
-    let [high, low] = write.address.to_be_bytes();
-    let count = to_u16(write.words.len()).to_be_bytes();
     let bits = write.table.is_bits();
-    match write.words.as_slice() {
-        [word] if !write.multiple => {
-            let word = if bits { if *word == 0 { 0 } else { 0xFF00 } } else { *word };
-            let [a, b] = word.to_be_bytes();
-            vec![write.unit, write.function(), high, low, a, b]
-        }
-        words => {
-            let data: Vec<u8> = match bits {
-                true => words.chunks(8).map(byte_of).collect(),
-                false => words.iter().flat_map(|word| word.to_be_bytes()).collect(),
-            };
-            let length = crate::plant::number::to_u8(data.len());
-            let head = [write.unit, write.function(), high, low, count[0], count[1], length];
-            head.into_iter().chain(data).collect()
-        }
-    }
-}
-
-/// Eight bits, the first in the lowest place (V1.1b3, 6.11).
-fn byte_of(bits: &[u16]) -> u8 {
-    bits.iter().rev().fold(0, |byte, bit| (byte << 1) | u8::from(*bit != 0))
+    let pdu = match (write.words.as_slice(), bits) {
+        ([word], true) if !write.multiple => Pdu::write_coil(write.address, *word != 0),
+        ([word], false) if !write.multiple => Pdu::write_register(write.address, *word),
+        (words, true) => Pdu::write_coils(write.address, words),
+        (words, false) => Pdu::write_registers(write.address, words),
+    };
+    pdu.to(write.unit)
 }
 
 /// Before the write: its end, if the device no longer holds what the operator saw, or does not say what it holds.

@@ -1,13 +1,9 @@
 //! The link layer of one open port: whole frames out, checked answers in.
 //!
 //! ```text
-//!  call(Request) ─> tokio-modbus ─> pipe ─> message ─┐
-//!  exchange(message) ────────────────────────────────┼─> wire    RTU, ASCII: check, silences, outstanding replies; one at a time
-//!  submit(message), flush() ─────────────────────────┘           MBAP: transaction ids; several under way
+//!  exchange(message) ────────┬─> wire    RTU, ASCII: check, silences, outstanding replies; one at a time
+//!  submit(message), flush() ─┘           MBAP: transaction ids; several under way
 //! ```
-//!
-//! Writes are made, and answers read, by tokio-modbus, with a fresh context for every request on one end of a pipe; the PDU
-//! of a poll is its block's, and what travels on the port is ours.
 
 mod gaps;
 mod outstanding;
@@ -18,16 +14,7 @@ mod transactions;
 
 use std::{sync::Arc, time::Duration};
 
-use tokio::{
-    io::{AsyncReadExt, AsyncWriteExt, DuplexStream},
-    time::Instant,
-};
-use tokio_modbus::{
-    Request, Response,
-    bytes::Bytes,
-    client::{Client, rtu},
-    slave::Slave,
-};
+use tokio::time::Instant;
 
 pub use self::transactions::Ended;
 use self::{receive::Received, transactions::Transactions};
@@ -42,7 +29,7 @@ use crate::{
     bus::frame,
     plant::{
         def::{Framing, LineDef},
-        event::{ExceptionCode, Fault, FaultKind, LineCounters},
+        event::{Fault, FaultKind, LineCounters},
         number::to_u32,
         traffic::{Exchange, Frame, FrameFault, FrameResult},
     },
@@ -130,39 +117,6 @@ impl Link {
     /// Answers since it was opened; an exception is one.
     pub fn answers(&self) -> u64 {
         answers(&self.wire.counters) - self.answers_before
-    }
-
-    /// Sends a request through tokio-modbus and gives the answer; an exception is a [`Fault::Exception`].
-    pub async fn call(&mut self, unit: u8, request: Request<'_>) -> Result<Response, LinkError> {
-        let (ours, theirs) = tokio::io::duplex(2 * frame::MESSAGE_MAX);
-        let mut context = rtu::attach_slave(theirs, Slave(unit));
-        let (answer, done) = tokio::join!(context.call(request), self.relay(ours));
-        done?;
-        if unit == 0 && self.framing() != Framing::Mbap {
-            // A broadcast has no response to read.
-            return Ok(Response::Custom(0, Bytes::new()));
-        }
-        match answer {
-            Ok(Ok(response)) => Ok(response),
-            Ok(Err(code)) => Err(Fault::Exception(ExceptionCode(code.into())).into()),
-            // The frame was whole and checked, so its content is what the other side got wrong.
-            Err(error) => {
-                tracing::warn!(unit, %error, "an unreadable response");
-                Err(Fault::WrongEcho.into())
-            }
-        }
-    }
-
-    /// Takes one frame from the pipe, exchanges its message over the port, hands the answer back. On an error the pipe is
-    /// dropped, which ends the waiting on its other end.
-    async fn relay(&mut self, mut pipe: DuplexStream) -> Result<(), LinkError> {
-        let mut frame = vec![0; 2 * frame::MESSAGE_MAX];
-        let count = pipe.read(&mut frame).await.unwrap_or(0);
-        let message = frame::without_crc(&frame[..count])?.to_vec();
-        let answer = self.exchange(&message).await?;
-        // A pipe that is no longer listened to is the business of the caller.
-        let _ = pipe.write_all(&frame::with_crc(&answer)).await;
-        Ok(())
     }
 
     /// Sends a message (unit and PDU) and gives the checked answer message. Sent once, never repeated.

@@ -138,7 +138,7 @@ impl Reason {
             Ok(_) if self.form.is_cut() => Some(form::cut()),
             Ok(_) if self.needed && words.is_empty() => {
                 self.form.select(last);
-                Some(t!("reason required").to_owned())
+                Some(t!("a reason is required").to_owned())
             }
             Ok(_) if matches!(&self.action, Action::Shelve(.., max) if typed_time(&words, *max).is_ok()) => {
                 // Typed for the time, while another one was selected.

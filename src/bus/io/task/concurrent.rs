@@ -109,7 +109,7 @@ impl Task<'_> {
             let Some(place) = self.under_way.iter().position(|read| read.id == id) else { continue };
             let UnderWay { index, block, began, misfit, beside, .. } = self.under_way.swap_remove(place);
             let index = self.place_of(index, &block);
-            let answer = answer.and_then(|answer| parse(&block, answer));
+            let answer = answer.and_then(|answer| parse(&block, &answer));
             if let (Err(fault), Some(index), None) = (&answer, index, misfit)
                 && fault.is_corrupt()
                 && link.has_room(block.unit)

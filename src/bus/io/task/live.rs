@@ -2,11 +2,7 @@
 
 use jiff::Timestamp;
 
-use super::{
-    LinkExit, Task,
-    read::{ReadValues, read_in_sync},
-    test::POLLS_BETWEEN,
-};
+use super::{LinkExit, Task, read::read_in_sync, test::POLLS_BETWEEN};
 use crate::{
     bus::{
         io::link::{Link, LinkError},
@@ -49,8 +45,7 @@ impl Task<'_> {
             let ended = self.clock.now();
             self.live_budget.spent(elapsed(started, ended), ended);
             let words = match read {
-                Some(Ok(ReadValues::Registers(words))) => Ok(words),
-                Some(Ok(ReadValues::Bits(bits))) => Ok(bits.into_iter().map(u16::from).collect()),
+                Some(Ok(words)) => Ok(words),
                 Some(Err(LinkError::Fault(fault))) => Err(fault),
                 Some(Err(LinkError::Gone(why))) => {
                     // Made again, it might end the next connection as well.

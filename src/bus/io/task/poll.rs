@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use super::{
     LinkExit, Task,
-    read::{ReadValues, read_in_sync, text_of, value_of},
+    read::{read_in_sync, text_of, value_of},
 };
 use crate::{
     bus::{
@@ -35,7 +35,7 @@ pub(super) struct ReadResult {
     pub took: Duration,
     /// The part of it from the first byte of the request to the last of the answer.
     pub on_wire: Duration,
-    pub answer: Result<ReadValues, Fault>,
+    pub answer: Result<Vec<u16>, Fault>,
     /// The exchange.
     pub exchange: Option<Arc<Exchange>>,
 }
@@ -238,7 +238,7 @@ impl Task<'_> {
         &mut self,
         index: Option<usize>,
         block: &Block,
-        answer: &Result<ReadValues, Fault>,
+        answer: &Result<Vec<u16>, Fault>,
         on_wire: Duration,
         exchange: Option<&Exchange>,
     ) {
@@ -257,7 +257,7 @@ impl Task<'_> {
         link: &mut Link,
         block: &Block,
         index: Option<usize>,
-    ) -> Option<Result<ReadValues, LinkError>> {
+    ) -> Option<Result<Vec<u16>, LinkError>> {
         let mut retried_fault = None;
         let read = if self.requests.stop_waits() {
             None
@@ -322,7 +322,7 @@ impl Task<'_> {
         &mut self,
         at: Timestamp,
         block: &Block,
-        values: &ReadValues,
+        values: &[u16],
         response_time: Duration,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), LinkExit> {

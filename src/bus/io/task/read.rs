@@ -2,16 +2,12 @@
 
 use std::sync::Arc;
 
-use tokio_modbus::{
-    Response,
-    bytes::{Buf, Bytes},
-};
-
 use crate::{
     bus::{
         codec,
         io::link::{Link, LinkError},
         late_reply::Proof,
+        pdu,
         plan::Block,
     },
     plant::{event::Fault, exact::Exact, number::to_u16, tag::TagDef},
@@ -24,13 +20,6 @@ fn check_in_sync(link: &mut Link, block: &Block) -> Result<(), LinkError> {
     }
     link.proof_given(block.unit);
     Ok(())
-}
-
-/// What a block read gave: bits or registers, the first at the block's address.
-#[derive(Debug)]
-pub(super) enum ReadValues {
-    Bits(Vec<bool>),
-    Registers(Vec<u16>),
 }
 
 /// Makes sure that the answer to a block cannot be mistaken for an outstanding one: by a read of another signature, part of this
@@ -80,14 +69,14 @@ fn try_another(link: &mut Link, unit: u8, error: LinkError) -> LinkError {
     error
 }
 
-/// Reads a block from a unit that is in sync. A `corrupt` answer is asked for once more; it counts as outstanding, so the unit is
+/// Reads a block from a unit that is in sync: its words from its address on; bits are 0 or 1. A `corrupt` answer is asked for once more; it counts as outstanding, so the unit is
 /// resynchronised before.
 pub(super) async fn read_in_sync(
     blocks: &[Block],
     link: &mut Link,
     block: &Block,
     corrupt: &mut Option<Fault>,
-) -> Result<ReadValues, LinkError> {
+) -> Result<Vec<u16>, LinkError> {
     resynchronise(blocks, link, block).await?;
     match read(link, block).await {
         Err(LinkError::Fault(fault)) if fault.is_corrupt() => {
@@ -103,47 +92,31 @@ pub(super) async fn read_in_sync(
     }
 }
 
-async fn read(link: &mut Link, block: &Block) -> Result<ReadValues, LinkError> {
+async fn read(link: &mut Link, block: &Block) -> Result<Vec<u16>, LinkError> {
     let answer = link.exchange(&block.request()).await?;
-    Ok(parse(block, answer)?)
+    Ok(parse(block, &answer)?)
 }
 
 /// The values in a checked answer message.
-pub(super) fn parse(block: &Block, answer: Vec<u8>) -> Result<ReadValues, Fault> {
-    let (count, got) = (usize::from(block.count), to_u16(answer.len()));
-    let mut pdu = Bytes::from(answer);
-    pdu.advance(1.min(pdu.len()));
-    match Response::try_from(pdu) {
-        Ok(Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits)) if count <= bits.len() => {
-            Ok(ReadValues::Bits(bits))
-        }
-        Ok(Response::ReadInputRegisters(words) | Response::ReadHoldingRegisters(words)) if words.len() == count => {
-            Ok(ReadValues::Registers(words))
-        }
-        // The length was checked byte for byte before; kept so that no later change can turn a shift into a value.
-        _ => Err(Fault::WrongLength { got, asked: block.count }),
-    }
+pub(super) fn parse(block: &Block, answer: &[u8]) -> Result<Vec<u16>, Fault> {
+    let values = answer.get(1..).and_then(|pdu| pdu::values_read(&block.request()[1..], pdu));
+    // The length was checked byte for byte before; kept so that no later change can turn a shift into a value.
+    let wrong = Fault::WrongLength { got: to_u16(answer.len()), asked: block.count };
+    values.map(|(.., words)| words).ok_or(wrong)
+}
+
+/// The words of a tag in those of a block.
+fn own<'a>(tag: &TagDef, block: &Block, words: &'a [u16]) -> Option<&'a [u16]> {
+    let start = usize::from(tag.point.address.checked_sub(block.address)?);
+    words.get(start..start + usize::from(tag.point.len()))
 }
 
 /// The text of a tag that holds text.
-pub(super) fn text_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Option<Arc<str>> {
+pub(super) fn text_of(tag: &TagDef, block: &Block, words: &[u16]) -> Option<Arc<str>> {
     tag.is_text().then_some(())?;
-    let start = usize::from(tag.point.address.checked_sub(block.address)?);
-    match values {
-        ReadValues::Bits(_) => None,
-        ReadValues::Registers(words) => {
-            let words = words.get(start..start + usize::from(tag.point.len()))?;
-            codec::decode_text(tag.point, words).map(Into::into)
-        }
-    }
+    codec::decode_text(tag.point, own(tag, block, words)?).map(Into::into)
 }
 
-pub(super) fn value_of(tag: &TagDef, block: &Block, values: &ReadValues) -> Option<Exact> {
-    let start = usize::from(tag.point.address.checked_sub(block.address)?);
-    match values {
-        ReadValues::Bits(bits) => bits.get(start).map(|bit| f64::from(u8::from(*bit)).into()),
-        ReadValues::Registers(words) => {
-            codec::decode(tag.point, words.get(start..start + usize::from(tag.point.len()))?)
-        }
-    }
+pub(super) fn value_of(tag: &TagDef, block: &Block, words: &[u16]) -> Option<Exact> {
+    codec::decode(tag.point, own(tag, block, words)?)
 }

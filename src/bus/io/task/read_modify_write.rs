@@ -1,14 +1,11 @@
 //! A field of bits, or one byte, that is written with the whole register: read, set, written back.
 
-use std::borrow::Cow;
-
-use tokio_modbus::Request;
-
-use super::{Task, read::ReadValues};
+use super::Task;
 use crate::{
     bus::{
         codec,
         io::link::{Link, LinkError},
+        pdu::Pdu,
         plan,
     },
     plant::{
@@ -26,12 +23,11 @@ impl Task<'_> {
         link: &mut Link,
         tag: &TagDef,
         raw: Exact,
-    ) -> Result<Result<Request<'static>, WriteResult>, String> {
+    ) -> Result<Result<Pdu, WriteResult>, String> {
         let def = self.def.clone();
         let block = plan::single(def.device(tag.device), tag);
         let held = match self.read_unless_stopped(link, &block, None).await {
-            Some(Ok(ReadValues::Registers(words))) => words,
-            Some(Ok(ReadValues::Bits(_))) => return Ok(Err(WriteResult::NotSent(Fault::NotANumber))),
+            Some(Ok(words)) => words,
             Some(Err(LinkError::Fault(fault))) => return Ok(Err(WriteResult::NotSent(fault))),
             Some(Err(LinkError::Gone(why))) => return Err(why),
             None => return Ok(Err(WriteResult::Superseded)),
@@ -40,13 +36,13 @@ impl Task<'_> {
         let first = usize::from(tag.point.address - block.address);
         let own = held.get(first..first + usize::from(tag.point.len()));
         let words = own.and_then(|own| codec::modified(tag.point, own, raw));
-        Ok(words.map(|words| request(tag, words)).ok_or(WriteResult::NotSent(Fault::NotANumber)))
+        Ok(words.map(|words| request(tag, &words)).ok_or(WriteResult::NotSent(Fault::NotANumber)))
     }
 }
 
-fn request(tag: &TagDef, words: Vec<u16>) -> Request<'static> {
-    match (words.as_slice(), tag.write_fc) {
-        ([word], None | Some(6)) => Request::WriteSingleRegister(tag.point.address, *word),
-        _ => Request::WriteMultipleRegisters(tag.point.address, Cow::Owned(words)),
+fn request(tag: &TagDef, words: &[u16]) -> Pdu {
+    match (words, tag.write_fc) {
+        ([word], None | Some(6)) => Pdu::write_register(tag.point.address, *word),
+        _ => Pdu::write_registers(tag.point.address, words),
     }
 }

@@ -1,14 +1,11 @@
 //! Writing: once, read back, never repeated.
 
-use std::borrow::Cow;
-
-use tokio_modbus::Request;
-
 use super::{LinkExit, Task, read::value_of};
 use crate::{
     bus::{
         codec,
         io::link::{Link, LinkError},
+        pdu::Pdu,
         plan,
         schedule::Schedule,
     },
@@ -17,7 +14,6 @@ use crate::{
         def::{ActionDef, DeviceDef},
         event::{Event, Fault, WriteResult},
         exact::Exact,
-        number::to_u16,
         scale,
         tag::{Table, TagDef},
     },
@@ -210,7 +206,7 @@ impl Task<'_> {
         link: &mut Link,
         tag: &TagDef,
         raw: Exact,
-    ) -> Result<Result<Request<'static>, WriteResult>, String> {
+    ) -> Result<Result<Pdu, WriteResult>, String> {
         if tag.read_modify_write {
             return self.modified(link, tag, raw).await;
         }
@@ -290,12 +286,13 @@ impl Task<'_> {
         &mut self,
         link: &mut Link,
         device: &DeviceDef,
-        request: Request<'_>,
+        request: Pdu,
         keeps: bool,
     ) -> Result<(), LinkError> {
         // If the port is lost, the previous exchange, perhaps of another device, is not counted for this one.
         link.last = None;
-        let sent = link.call(device.unit, request);
+        let message = request.to(device.unit);
+        let sent = link.exchange(&message);
         let sent = if keeps { Some(sent.await) } else { self.requests.unless_stopped(sent).await };
         let Some(sent) = sent else {
             link.abandon();
@@ -320,28 +317,26 @@ fn is_clear(link: &Link, device: &DeviceDef) -> bool {
 
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for
 /// a field of bits, 23 where the profile wants the new value in the response.
-fn write_request(tag: &TagDef, raw: Exact) -> Option<Request<'static>> {
+fn write_request(tag: &TagDef, raw: Exact) -> Option<Pdu> {
     let point = tag.write_point();
     let address = point.address;
     match point.table {
         // A discrete input is written only where the profile names the function for it.
         Table::Discrete if tag.write_fc.is_none() => None,
         Table::Coil | Table::Discrete => Some(match tag.write_fc {
-            Some(15) => Request::WriteMultipleCoils(address, Cow::Owned(vec![raw != 0.0])),
-            Some(_) | None => Request::WriteSingleCoil(address, raw != 0.0),
+            Some(15) => Pdu::write_coils(address, &[u16::from(raw != 0.0)]),
+            Some(_) | None => Pdu::write_coil(address, raw != 0.0),
         }),
         Table::Holding if point.part().is_some() => {
             let (and, or) = codec::field_masks(point, raw)?;
-            Some(Request::MaskWriteRegister(address, and, or))
+            Some(Pdu::mask_write(address, and, or))
         }
         Table::Holding => {
             let words = codec::encode(point, raw)?;
             Some(match (words.as_slice(), tag.write_fc) {
-                ([word], None | Some(6)) => Request::WriteSingleRegister(address, *word),
-                (_, Some(23)) => {
-                    Request::ReadWriteMultipleRegisters(address, to_u16(words.len()), address, Cow::Owned(words))
-                }
-                _ => Request::WriteMultipleRegisters(address, Cow::Owned(words)),
+                ([word], None | Some(6)) => Pdu::write_register(address, *word),
+                (words, Some(23)) => Pdu::write_and_read(address, words),
+                (words, _) => Pdu::write_registers(address, words),
             })
         }
         Table::Input => None,

@@ -373,7 +373,7 @@ fn an_alarm_is_shelved_for_a_chosen_time_with_a_reason() {
     let mut model = shown(&fixture, Theme::FULL, "z");
     insta::assert_snapshot!("window_shelve", screen(&mut model, 80, 24));
     type_keys(&mut model, "⏎");
-    assert!(screen(&mut model, 80, 24).contains("reason required"), "nothing is shelved without a reason");
+    assert!(screen(&mut model, 80, 24).contains("a reason is required"), "nothing is shelved without a reason");
     let effects = type_keys(&mut model, "↑→→sensor is cleaned⏎");
     let Some(Effect::Command(command, _)) = effects.last() else { panic!("{effects:?}") };
     let shelve = AlarmCommand::Shelve { alarms: [AlarmId(0)].into(), lasts: Duration::from_secs(3_600) };
