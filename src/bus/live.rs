@@ -17,6 +17,48 @@ use crate::plant::{
 /// A table of which this many addresses were refused, and none was read, is asked for no more addresses.
 const BARREN: usize = 8;
 
+/// What is lost is asked for so often in a row.
+const TRIES_MAX: u8 = 3;
+
+/// What a read has brought of a register.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// What it holds.
+    Word(u16),
+    /// The unit does not give it.
+    Refused,
+    /// The request or its answer was lost, or the unit has no time now: asked again, it may come.
+    Lost,
+}
+
+impl Outcome {
+    /// Of what was read; `None`: nothing came back at all.
+    pub fn of(read: Option<Result<u16, Fault>>) -> Outcome {
+        match read {
+            Some(Ok(word)) => Outcome::Word(word),
+            Some(Err(Fault::Exception(code))) if may_be_cut(code) => Outcome::Refused,
+            Some(Err(_)) | None => Outcome::Lost,
+        }
+    }
+
+    /// What it holds, if that was read.
+    pub fn word(self) -> Option<u16> {
+        if let Outcome::Word(word) = self { Some(word) } else { None }
+    }
+}
+
+/// How often in a row requests were lost. A unit that has fallen silent is not asked everything several times.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Retries(u8);
+
+impl Retries {
+    /// A request has ended: is it to be made again?
+    pub fn again(&mut self, is_lost: bool) -> bool {
+        self.0 = if is_lost { self.0.saturating_add(1) } else { 0 };
+        is_lost && self.0 < TRIES_MAX
+    }
+}
+
 /// A live read at work.
 #[derive(Debug)]
 pub struct LiveJob {

@@ -5,7 +5,7 @@ use std::{collections::BTreeSet, sync::Arc};
 use super::{
     CliError,
     prompt::{ask_until, selection},
-    recognition::FoundKind,
+    recognition::{FoundKind, sunspec_words},
     say,
 };
 use crate::{
@@ -48,8 +48,7 @@ fn sunspec(
     made: &mut Vec<String>,
     mut names: impl Iterator<Item = String>,
 ) -> String {
-    let [vendor, model, _] = device.identity();
-    say(&format!("unit {unit}: {vendor} {model}, {} SunSpec models", device.models.len()));
+    say(&sunspec_words(unit, device));
     let name = names.find(|name| profiles.text(name).is_none()).unwrap_or_else(|| "sunspec".to_owned());
     profiles.add(&name, &profile_text(device));
     made.push(name.clone());

@@ -31,7 +31,7 @@ pub(crate) struct SunSpecDevice {
     pub base: u16,
     /// What follows it.
     pub models: Vec<FoundModel>,
-    /// There may be more of them.
+    /// There may be more of them, or of what they hold.
     pub is_cut: bool,
 }
 

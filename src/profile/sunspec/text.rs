@@ -226,7 +226,7 @@ impl Rows {
         }
         let mut notes = format!("Models: {}.", listed.join(", "));
         if device.is_cut {
-            notes += " There may be more: reading ended there.";
+            notes += " Not all could be read: there may be more.";
         }
         if 0 < self.missing {
             notes += &format!(" Not implemented, and not polled: {} values.", self.missing);

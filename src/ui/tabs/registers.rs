@@ -66,8 +66,10 @@ pub struct Registers {
     names: Names,
     /// What the plant file calls the registers of this unit.
     names_of_plant: Names,
-    /// Names of the units that were shown before.
-    names_of: BTreeMap<u8, Names>,
+    /// What the profile that was taken calls them.
+    names_of_profile: Names,
+    /// Names of the units that were shown before, and those of their profiles.
+    names_of: BTreeMap<u8, (Names, Names)>,
     recognition: Recognition,
     /// Of the user.
     pub profiles: OwnProfiles,
@@ -137,6 +139,7 @@ impl TabView for Registers {
             cells: Cells::default(),
             names: Names::default(),
             names_of_plant: Names::default(),
+            names_of_profile: Names::default(),
             names_of: BTreeMap::new(),
             recognition: Recognition::default(),
             profiles: OwnProfiles::default(),
@@ -253,6 +256,7 @@ impl TabView for Registers {
         self.reads += 1;
         reading.response_time.into_iter().for_each(|reply| self.replies.see(reply));
         self.cells.on_reading(&reading);
+        self.name_by_profile();
         self.follow_list(cx);
         let began = reading.began;
         let early = self.due.filter(|due| began + self.period / 2 < *due && *due <= began + self.period);

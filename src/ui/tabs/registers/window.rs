@@ -7,7 +7,7 @@ use crate::{
     access::right::needs_for_query,
     plant::{
         command::Refusal,
-        live::{AddressSpan, LiveRead, SPANS_MAX},
+        live::{AddressSpan, CELLS_MAX, LiveRead, SPANS_MAX},
         number::to_u32,
     },
     ui::{rights, tabs::prelude::*},
@@ -67,7 +67,13 @@ impl Registers {
         let relearn = std::mem::take(&mut self.relearn);
         let spans = std::iter::once(span).chain(self.watched_spans(span));
         let spans = spans.chain(self.preview.iter().flat_map(Preview::spans));
-        let spans = spans.chain(self.listed_spans.iter().copied()).take(SPANS_MAX).collect();
+        let spans = spans.chain(self.unscaled_spans()).chain(self.listed_spans.iter().copied());
+        let mut room = CELLS_MAX;
+        let fits = |span: &AddressSpan| {
+            let left = room.checked_sub(span.count.into());
+            left.inspect(|left| room = *left).is_some()
+        };
+        let spans = spans.take(SPANS_MAX).filter(fits).collect();
         let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
         let silent = cx.def().listens_on(self.line).then(|| Refusal::OnlyListens.to_string());
         if let Some(why) = silent.or_else(|| rights::lacks(cx, needs_for_query(&query))) {

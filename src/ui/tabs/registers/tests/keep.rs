@@ -3,7 +3,7 @@
 use super::*;
 
 /// A controller that holds what a PXR holds.
-fn pxr(table: Table, address: u16) -> Option<u16> {
+pub fn pxr(table: Table, address: u16) -> Option<u16> {
     match (table, address) {
         (Table::Input, 1000) => Some(696),
         (Table::Input, 1003) => Some(4_500),

@@ -44,11 +44,52 @@ impl Bench {
     }
 
     fn probes(&mut self, unit: &impl Fn(Table, u16) -> Option<u16>) {
+        self.probes_lost(unit, |_, _| false);
+    }
+
+    /// The same where registers are lost, by the number of their read and their address.
+    fn probes_lost(&mut self, unit: &impl Fn(Table, u16) -> Option<u16>, is_lost: impl Fn(usize, u16) -> bool) {
+        let mut reads = 0;
         while let Some((id, read)) = self.probed.pop() {
             assert_eq!(read.check(), Ok(()));
-            self.respond(0, id, &read, unit);
+            self.respond_or_lose(0, id, &read, |table, address| match unit(table, address) {
+                _ if is_lost(reads, address) => Err(Fault::Timeout),
+                word => word.ok_or(Fault::Exception(ExceptionCode(2))),
+            });
+            reads += 1;
         }
     }
+}
+
+#[test]
+fn one_lost_request_costs_neither_models_nor_a_profile() {
+    for lost in 0..4 {
+        let mut bench = Bench::new();
+        bench.answer(0, |address| inverter(Table::Holding, address));
+        bench.probes_lost(&inverter, |read, _| read == lost);
+        bench.keys("⎋");
+        assert!(bench.screen(110, 24).contains("ACME Sun 5: SunSpec models 2 "), "{}", bench.screen(110, 24));
+        let mut bench = Bench::new();
+        bench.answer(0, |address| keep::pxr(Table::Holding, address));
+        bench.probes_lost(&keep::pxr, |read, address| read % 5 == lost && address != 0);
+        assert!(bench.screen(80, 24).contains("looks like FUJI PXR: 11 of 11"), "{}", bench.screen(80, 24));
+    }
+}
+
+#[test]
+fn values_are_scaled_once_their_power_of_ten_has_come() {
+    let mut bench = Bench::new();
+    bench.answer(0, |address| inverter(Table::Holding, address));
+    bench.probes_lost(&inverter, |_, address| address == 40_083);
+    bench.keys("⎋");
+    assert!(bench.screen(110, 24).contains("not all could be read"), "{}", bench.screen(110, 24));
+    bench.keys("v");
+    let row = |shown: String| shown.lines().find(|row| row.contains("PhVphA")).unwrap_or_default().to_owned();
+    let read = bench.answer(1, |address| inverter(Table::Holding, address).filter(|_| address != 40_083));
+    assert!(read.spans.iter().any(|span| span.range().contains(&40_083)), "{:?}", read.spans);
+    assert!(row(bench.screen(110, 40)).contains("2302 raw"), "{}", bench.screen(110, 40));
+    bench.answer(2, |address| inverter(Table::Holding, address));
+    assert!(row(bench.screen(110, 40)).contains("230.2 V"), "{}", bench.screen(110, 40));
 }
 
 #[test]
@@ -65,7 +106,7 @@ fn an_inverter_says_its_names_and_values_itself() {
     assert!(row("PhVphA").contains("230.2 V") && row("W").contains("4110 W"), "{shown}");
     assert!(row("AphB").contains("----") || row("AphB").contains("no value") || row("AphB").contains("raw"), "{shown}");
     bench.keys("⎋");
-    assert!(bench.screen(110, 40).contains("ACME Sun 5: 2 SunSpec models"), "{}", bench.screen(110, 40));
+    assert!(bench.screen(110, 40).contains("ACME Sun 5: SunSpec models 2"), "{}", bench.screen(110, 40));
 }
 
 #[test]
@@ -107,7 +148,7 @@ fn a_profile_is_chosen_by_hand_and_says_why_others_do_not_fit() {
     bench.keys("/pxr⏎");
     bench.screen(110, 30);
     bench.keys("⏎");
-    bench.probes(&unit);
+    bench.answer(1, |address| unit(Table::Holding, address));
     let shown = bench.screen(110, 30);
     assert!(shown.contains("names of FUJI PXR, as chosen"), "{shown}");
     assert!(!bench.model.tabs.registers.names.is_empty());
