@@ -3,7 +3,7 @@
 use super::live::{Outcome, Retries};
 use crate::{
     plant::{
-        def::Limits,
+        def::READ_REGISTERS_MAX,
         live::AddressSpan,
         number::{to_u16, to_u32},
         tag::Table,
@@ -11,8 +11,6 @@ use crate::{
     profile::sunspec::{BASES, END, FoundModel, MARKER, SunSpecDevice},
 };
 
-/// Registers of one request.
-const REQUEST_MAX: u32 = Limits::STANDARD.read_registers_max as u32;
 /// Requests of one read for the contents of a model.
 const PARTS_MAX: usize = 16;
 /// Models of a device.
@@ -62,13 +60,14 @@ impl Walk {
             }
             Step::Model(from) => {
                 let (table, end) = (self.device.as_ref()?.table, self.end()?);
+                let most = u32::from(READ_REGISTERS_MAX);
                 let part = |n: usize| {
-                    let address = from + to_u32(n) * REQUEST_MAX;
-                    (address < end).then(|| span(table, address, REQUEST_MAX.min(end - address)))
+                    let address = from + to_u32(n) * most;
+                    (address < end).then(|| span(table, address, most.min(end - address)))
                 };
                 let mut spans: Vec<AddressSpan> = (0..PARTS_MAX).map_while(part).collect();
                 let behind = spans.last().map_or(from, |span| span.range().end);
-                spans.extend((behind == end).then(|| head_at(table, end)));
+                spans.extend((behind == end && end < EDGE).then(|| head_at(table, end)));
                 Some(spans)
             }
             Step::Done => None,

@@ -133,7 +133,7 @@ fn models_may_fill_the_addresses_to_the_last() {
         (15_531, vec![END], (1, false)),
         (15_531, vec![7], (1, true)),
         (15_530, vec![END, 0], (1, false)),
-        (15_530, vec![7, 0], (2, true)),
+        (15_530, vec![7, 0], (2, false)),
         (15_530, vec![7, 1], (1, true)),
     ] {
         let mut unit = unit(Table::Holding, 50_000, &[(64_999, length)]);
