@@ -3,7 +3,7 @@
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use super::{CliError, open, paths, source};
+use super::{CliError, open, paths, say, source};
 use crate::{
     bus::{
         live::{Outcome, Retries},
@@ -14,7 +14,7 @@ use crate::{
     plant::{
         PlantDef,
         def::{LineDef, LineId},
-        event::Fault,
+        event::{Fault, LineState},
         live::{AddressSpan, LiveRead, LiveReading, ReplyTimes},
         tag::Table,
     },
@@ -60,6 +60,9 @@ pub async fn recognise_all(
             Some(device) => FoundKind::SunSpec(device),
             None => asked.rank(known).await?,
         };
+        if let Some(fault) = asked.lost() {
+            say(&format!("unit {unit}: not all that tells what it is could be read: {fault}"));
+        }
         found.push(FoundUnit { unit, has_register, kind });
     }
     for (unit, _) in units.iter().cycle().take(2 * REPLIES) {
@@ -84,10 +87,34 @@ pub fn sunspec_words(unit: u8, device: &SunSpecDevice) -> String {
 pub async fn sunspec(line: &LineDef, unit: u8) -> Result<Option<SunSpecDevice>, CliError> {
     let station = open::bench_station(line.clone(), unit);
     let session = station.session(&paths::operator());
-    let mut replies = ReplyTimes::default();
-    let found = Asked { session: &session, unit, read: BTreeMap::new(), replies: &mut replies }.walk().await;
+    let found = sunspec_at(&session, unit).await;
     station.stop().await;
     found
+}
+
+async fn sunspec_at(session: &Session, unit: u8) -> Result<Option<SunSpecDevice>, CliError> {
+    connected(session).await?;
+    let mut replies = ReplyTimes::default();
+    let mut asked = Asked { session, unit, read: BTreeMap::new(), replies: &mut replies };
+    match (asked.walk().await?, asked.lost()) {
+        (None, Some(fault)) => {
+            Err(CliError::Failed(format!("unit {unit}: {fault}; whether it has SunSpec models is not known")))
+        }
+        (found, _) => Ok(found),
+    }
+}
+
+/// Waits for the connection; `Err` says why there is none.
+async fn connected(session: &Session) -> Result<(), CliError> {
+    let mut snapshots = session.snapshots.clone();
+    loop {
+        match &snapshots.borrow_and_update().line(LineId(0)).state {
+            LineState::Waiting { why, .. } => return Err(CliError::Failed(format!("no connection: {why}"))),
+            LineState::Connected | LineState::NoTraffic => return Ok(()),
+            LineState::Connecting | LineState::Disconnected | LineState::Testing => {}
+        }
+        snapshots.changed().await.map_err(|_| CliError::StationGone)?;
+    }
 }
 
 /// A unit that is asked, and what it has said.
@@ -133,12 +160,21 @@ impl Asked<'_> {
         spans.iter().any(|span| span.range().any(|address| self.outcome(span.table, address) == Outcome::Lost))
     }
 
+    /// Why something of it did not come.
+    fn lost(&self) -> Option<Fault> {
+        let lost = |read: &&Result<u16, Fault>| Outcome::of(Some(**read)) == Outcome::Lost;
+        self.read.values().find(lost).and_then(|read| read.err())
+    }
+
     async fn read(&mut self, spans: &[AddressSpan]) -> Result<(), CliError> {
         let read =
             LiveRead { line: LineId(0), unit: self.unit, spans: spans.to_vec(), not_before: None, relearn: false };
         let answer = tokio::time::timeout(READ_MAX, source::query_station(self.session, Query::Registers(read))).await;
-        let lost = || CliError::Failed(format!("unit {}: the line is not connected any more", self.unit));
-        let Answer::Registers(reading) = answer.map_err(|_| lost())?? else { return Err(source::unexpected()) };
+        let Ok(answer) = answer else {
+            connected(self.session).await?;
+            return Err(CliError::Failed(format!("unit {}: the line is not connected any more", self.unit)));
+        };
+        let Answer::Registers(reading) = answer? else { return Err(source::unexpected()) };
         let LiveReading { response_time, parts, .. } = reading;
         response_time.into_iter().for_each(|time| self.replies.see(time));
         for part in parts {
