@@ -172,7 +172,7 @@ impl Registers {
                         // The device itself has said what its registers are.
                         let is_untouched = (self.first, self.selected) == (0, 0) && self.picking.is_none();
                         self.apply_names(cx);
-                        return if is_untouched { self.toggle_values(cx) } else { self.read_now(cx) };
+                        return if is_untouched { self.list_values(cx) } else { self.read_now(cx) };
                     }
                     self.ask_signatures(cx)
                 }
@@ -202,10 +202,17 @@ impl Registers {
         self.read_now(cx)
     }
 
-    /// All profiles, the one that fits best first.
+    /// All profiles, the one that is in use first, then the one that fits best.
     pub(super) fn ranked(&self) -> Vec<recognise::Ranked> {
         let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
-        recognise::ranking(&self.profiles.all(), &words)
+        let mut ranked = recognise::ranking(&self.profiles.all(), &words);
+        ranked.sort_by_key(|one| !self.is_in_use(&one.def));
+        ranked
+    }
+
+    /// Were the names of this profile taken?
+    pub(super) fn is_in_use(&self, def: &PlantDef) -> bool {
+        self.recognition.applied().is_some_and(|applied| applied.name == def.name)
     }
 
     fn ask_signatures(&mut self, cx: &ViewContext) -> Vec<UiAction> {

@@ -4,6 +4,7 @@ mod compare;
 mod keep;
 mod lists;
 mod map;
+mod named;
 mod watch;
 
 use std::sync::Arc;
