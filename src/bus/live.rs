@@ -17,6 +17,48 @@ use crate::plant::{
 /// A table of which this many addresses were refused, and none was read, is asked for no more addresses.
 const BARREN: usize = 8;
 
+/// What is lost is asked for so often in a row.
+const TRIES_MAX: u8 = 3;
+
+/// What a read has brought of a register.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// What it holds.
+    Word(u16),
+    /// The unit does not give it.
+    Refused,
+    /// The request or its answer was lost, or the unit has no time now: asked again, it may come.
+    Lost,
+}
+
+impl Outcome {
+    /// Of what was read; `None`: nothing came back at all.
+    pub fn of(read: Option<Result<u16, Fault>>) -> Outcome {
+        match read {
+            Some(Ok(word)) => Outcome::Word(word),
+            Some(Err(Fault::Exception(code))) if may_be_cut(code) => Outcome::Refused,
+            Some(Err(_)) | None => Outcome::Lost,
+        }
+    }
+
+    /// What it holds, if that was read.
+    pub fn word(self) -> Option<u16> {
+        if let Outcome::Word(word) = self { Some(word) } else { None }
+    }
+}
+
+/// How often in a row requests were lost. A unit that has fallen silent is not asked everything several times.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Retries(u8);
+
+impl Retries {
+    /// A request has ended: is it to be made again?
+    pub fn again(&mut self, is_lost: bool) -> bool {
+        self.0 = if is_lost { self.0.saturating_add(1) } else { 0 };
+        is_lost && self.0 < TRIES_MAX
+    }
+}
+
 /// A live read at work.
 #[derive(Debug)]
 pub struct LiveJob {
@@ -34,7 +76,8 @@ impl LiveJob {
             known.forget(read.unit);
         }
         let unit = read.unit;
-        let queue = read.spans.iter().flat_map(|span| known.requests(unit, *span)).collect();
+        let requests = read.spans.iter().flat_map(|span| known.requests(unit, *span));
+        let queue = requests.flat_map(|span| known.refused.cut(unit, span)).collect();
         let refused = Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS));
         let holes = read.spans.iter().flat_map(|span| known.holes_in(unit, *span));
         let parts = holes.map(|span| LivePart { at, span, words: refused.clone() }).collect();
@@ -53,7 +96,12 @@ impl LiveJob {
         self.reading.requests += 1;
         let whole = AddressRange::of_span(self.unit, span);
         match outcome {
-            Err(Fault::Exception(code)) if may_be_cut(code) && 1 < span.count && !self.is_barren(span.table) => {
+            Err(Fault::Exception(code))
+                if may_be_cut(code)
+                    && 1 < span.count
+                    && !self.is_barren(span.table)
+                    && !known.refused.holds(self.unit, span) =>
+            {
                 let half = span.count / 2;
                 let second = AddressSpan {
                     address: to_u16(u32::from(span.address) + u32::from(half)),
@@ -68,7 +116,10 @@ impl LiveJob {
             }
             words => {
                 match &words {
-                    Ok(_) => self.search.answered_range(whole),
+                    Ok(_) => {
+                        self.search.answered_range(whole);
+                        known.refused.given(self.unit, span);
+                    }
                     Err(Fault::Exception(code)) if may_be_cut(*code) && span.count == 1 => {
                         self.search.refused_range(known, whole, None);
                     }
@@ -85,6 +136,8 @@ impl LiveJob {
         }
         if self.queue.is_empty() {
             self.search.conclude_at_once(known);
+            let refused = |part: &&LivePart| matches!(part.words, Err(Fault::Exception(code)) if may_be_cut(code));
+            self.reading.parts.iter().filter(refused).for_each(|part| known.refused.add(self.unit, part.span));
         }
     }
 
@@ -190,8 +243,30 @@ mod tests {
             let mut known = UnreadableRanges::default();
             let reading = serve_with(&mut known, code, &missing, 125);
             assert!(reading.requests < 40, "exception {code}: {} requests", reading.requests);
-            assert_eq!(known, UnreadableRanges::default(), "a unit that refuses everything is not believed");
+            assert_eq!(known.of(1).count(), 0, "a unit that refuses everything is not believed");
         }
+    }
+
+    #[test]
+    fn a_page_that_is_refused_is_searched_once() {
+        let mut known = UnreadableRanges::default();
+        let has = |address: u16| 500 <= address;
+        let first = serve(&mut known, &[(0, 40)], has, 125);
+        assert!(9 < first.requests, "is a part of it there?");
+        for (n, page) in [[(0, 40)], [(10, 30)]].into_iter().enumerate() {
+            let again = serve(&mut known, &page, has, 125);
+            assert_eq!((again.requests, values(&again).len()), (1, 0), "read {n}");
+        }
+        let wider = serve(&mut known, &[(0, 41), (500, 4)], has, 125);
+        assert_eq!((wider.requests, values(&wider)), (3, vec![500, 501, 502, 503]));
+        let now = serve(&mut known, &[(0, 40)], |_| true, 125);
+        assert_eq!((now.requests, values(&now).len()), (1, 40), "it has them now");
+        assert!(1 < serve(&mut known, &[(0, 40)], has, 125).requests, "and is searched again when it has not");
+        let searched = (0..200).filter(|_| 1 < serve(&mut known, &[(0, 40)], has, 125).requests).count();
+        assert_eq!(searched, 3, "now and then");
+        serve(&mut known, &[(1_000, 40)], |_| false, 125);
+        known.forget(1);
+        assert!(1 < serve(&mut known, &[(1_000, 40)], |_| false, 125).requests, "asked for again");
     }
 
     #[test]

@@ -13,6 +13,7 @@
 pub mod cost;
 pub mod bisection;
 pub mod gaps;
+pub mod refused;
 mod cheapest;
 mod factor;
 #[cfg(test)]

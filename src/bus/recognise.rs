@@ -12,6 +12,7 @@ use crate::plant::{
     scale,
     tag::{Decimals, Point, TagDef},
 };
+use crate::t;
 
 /// Share of the probes that must fit.
 const PERCENT_MIN: usize = 80;
@@ -60,6 +61,17 @@ pub struct Miss {
     pub expected: Expected,
 }
 
+/// `P-DP is 7, expected 0, 1, 2`.
+impl std::fmt::Display for Miss {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Miss { tag, read, expected } = self;
+        f.write_str(&match read {
+            Some(read) => t!("{tag} is {read}, expected {expected}", tag, read, expected),
+            None => t!("{tag} cannot be read", tag),
+        })
+    }
+}
+
 /// What a probe expects.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Expected {
@@ -87,7 +99,8 @@ pub fn ranking(known: &[Arc<PlantDef>], words: Words) -> Vec<Ranked> {
     });
     let mut ranked: Vec<Ranked> = ranked.collect();
     let share = |ranked: &Ranked| (1_000 * ranked.fit.fits).checked_div(ranked.fit.of).unwrap_or(0);
-    ranked.sort_by_key(|one| std::cmp::Reverse((one.fit.is_enough(), share(one), one.fit.fits)));
+    // Those without a signature come last.
+    ranked.sort_by_key(|one| std::cmp::Reverse((one.fit.is_enough(), share(one), one.fit.fits, 0 < one.fit.of)));
     ranked
 }
 

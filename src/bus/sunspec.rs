@@ -1,7 +1,9 @@
 //! Finds out which SunSpec models a unit has: what to read next, and what that says. Pure.
 
+use super::live::{Outcome, Retries};
 use crate::{
     plant::{
+        def::READ_REGISTERS_MAX,
         live::AddressSpan,
         number::{to_u16, to_u32},
         tag::Table,
@@ -9,19 +11,24 @@ use crate::{
     profile::sunspec::{BASES, END, FoundModel, MARKER, SunSpecDevice},
 };
 
-/// Registers of one request.
-const REQUEST_MAX: u32 = 125;
-/// Spans of one read.
-const SPANS_MAX: usize = 16;
+/// Requests of one read for the contents of a model.
+const PARTS_MAX: usize = 16;
 /// Models of a device.
 const MODELS_MAX: usize = 200;
 /// Registers of all models whose contents are read: more than any device has.
 const REGISTERS_MAX: u32 = 16_000;
+/// Behind the last address.
+const EDGE: u32 = 0x1_0000;
 
-/// A walk at work. It ends by itself: each read is of 16 parts of a model or leads to the next one, whose numbers are bounded.
+/// What a read has brought of the register at an address.
+pub type Outcomes<'a> = &'a dyn Fn(Table, u32) -> Outcome;
+
+/// A walk at work. It ends by itself: each read is of 16 parts of a model or leads to the next one, whose numbers are bounded, and
+/// what is lost is asked for again a few times only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Walk {
     step: Step,
+    retries: Retries,
     device: Option<SunSpecDevice>,
 }
 
@@ -38,7 +45,7 @@ enum Step {
 
 impl Default for Walk {
     fn default() -> Walk {
-        Walk { step: Step::Places, device: None }
+        Walk { step: Step::Places, retries: Retries::default(), device: None }
     }
 }
 
@@ -52,52 +59,44 @@ impl Walk {
                 places().nth(n).map(|place| vec![place, AddressSpan { address: place.address + 2, ..place }])
             }
             Step::Model(from) => {
-                let (device, found) = (self.device.as_ref()?, self.device.as_ref()?.models.last()?);
-                let span = |address: u32, count: u32| AddressSpan {
-                    table: device.table,
-                    address: to_u16(address),
-                    count: to_u16(count),
-                };
+                let (table, end) = (self.device.as_ref()?.table, self.end()?);
+                let most = u32::from(READ_REGISTERS_MAX);
                 let part = |n: usize| {
-                    let address = from + to_u32(n) * REQUEST_MAX;
-                    (address < found.end()).then(|| span(address, REQUEST_MAX.min(found.end() - address)))
+                    let address = from + to_u32(n) * most;
+                    (address < end).then(|| span(table, address, most.min(end - address)))
                 };
-                let mut spans: Vec<AddressSpan> = (0..SPANS_MAX).map_while(part).collect();
-                let read: u32 = spans.iter().map(|span| u32::from(span.count)).sum();
-                if from + read == found.end() && found.end() + 2 <= 0x1_0000 {
-                    spans.push(span(found.end(), 2));
-                }
-                (!spans.is_empty()).then_some(spans)
+                let mut spans: Vec<AddressSpan> = (0..PARTS_MAX).map_while(part).collect();
+                let behind = spans.last().map_or(from, |span| span.range().end);
+                spans.extend((behind == end && end < EDGE).then(|| head_at(table, end)));
+                Some(spans)
             }
             Step::Done => None,
         }
     }
 
-    /// What was asked for has been read: good words from an address on, fewer where one was refused.
-    pub fn on_words(&mut self, words: &dyn Fn(AddressSpan) -> Vec<u16>) {
+    /// What was asked for has been read, refused or lost.
+    pub fn on_outcomes(&mut self, outcome: Outcomes) {
         let Some(spans) = self.next() else { return };
+        let is_lost = |span: &AddressSpan| span.range().any(|address| outcome(span.table, address) == Outcome::Lost);
+        let whole = spans.iter().take_while(|span| !is_lost(span)).count();
         match self.step {
-            Step::Places => self.seek(0, words),
-            Step::Marker(n) => match words(spans[0]) == MARKER {
+            Step::Places | Step::Marker(_) if self.retries.again(whole < spans.len()) => {}
+            Step::Places => self.seek(0, outcome),
+            Step::Marker(n) => match words(outcome, spans[0]) == MARKER {
                 true => {
                     let AddressSpan { table, address: base, .. } = spans[0];
                     self.device = Some(SunSpecDevice { table, base, models: Vec::new(), is_cut: false });
-                    self.on_head(u32::from(base) + 2, words);
+                    self.on_head(spans[1], outcome);
                 }
-                false => self.seek(n + 1, words),
+                false => self.seek(n + 1, outcome),
             },
-            Step::Model(from) => {
-                let contents: Vec<AddressSpan> = spans.iter().copied().filter(|span| !self.is_head(*span)).collect();
-                if let Some(found) = self.device.as_mut().and_then(|device| device.models.last_mut()) {
-                    for address in contents.iter().flat_map(|span| span.range()) {
-                        let one = AddressSpan { address: to_u16(address), count: 1, ..contents[0] };
-                        found.words.push(words(one).first().copied());
-                    }
-                    let end = found.end();
-                    let next = contents.last().map_or(from, |span| span.range().end);
-                    self.step = Step::Model(next);
-                    if next == end {
-                        self.on_head(end, words);
+            // Of what was lost the first is asked for again, or given up.
+            Step::Model(_) if self.retries.again(whole == 0) => {}
+            Step::Model(_) => {
+                for span in &spans[..whole.max(1)] {
+                    match Some(u32::from(span.address)) == self.end() {
+                        true => self.on_head(*span, outcome),
+                        false => self.on_contents(*span, outcome),
                     }
                 }
             }
@@ -115,44 +114,69 @@ impl Walk {
         self.device.as_ref().map_or(0, |device| device.models.len())
     }
 
+    /// The address behind the model at hand.
+    fn end(&self) -> Option<u32> {
+        self.device.as_ref().and_then(|device| device.models.last()).map(FoundModel::end)
+    }
+
     /// The next place from the `n`th on that holds the first half of the marker.
-    fn seek(&mut self, n: usize, words: &dyn Fn(AddressSpan) -> Vec<u16>) {
-        let begins = |place: AddressSpan| words(AddressSpan { count: 1, ..place }).first() == MARKER.first();
+    fn seek(&mut self, n: usize, outcome: Outcomes) {
+        let begins = |place: AddressSpan| words(outcome, AddressSpan { count: 1, ..place }).first() == MARKER.first();
         let place = places().enumerate().skip(n).find(|(_, place)| begins(*place));
         self.step = place.map_or(Step::Done, |(n, _)| Step::Marker(n));
     }
 
-    /// The number and length of a model, or the end.
-    fn on_head(&mut self, at: u32, words: &dyn Fn(AddressSpan) -> Vec<u16>) {
+    /// Part of the model at hand.
+    fn on_contents(&mut self, part: AddressSpan, outcome: Outcomes) {
         let Some(device) = &mut self.device else { return };
-        let head = |count: u32| match at + count <= 0x1_0000 {
-            true => words(AddressSpan { table: device.table, address: to_u16(at), count: to_u16(count) }),
-            false => Vec::new(),
-        };
+        let Some(found) = device.models.last_mut() else { return };
+        for address in part.range() {
+            let outcome = outcome(part.table, address);
+            device.is_cut |= outcome == Outcome::Lost;
+            found.words.push(outcome.word());
+        }
+        self.go_on(part.range().end);
+    }
+
+    /// The number and length of a model, or the end.
+    fn on_head(&mut self, head: AddressSpan, outcome: Outcomes) {
+        let Some(device) = &mut self.device else { return };
         self.step = Step::Done;
         let read: u32 = device.models.iter().map(|found| u32::from(found.length)).sum();
-        match (head(1).first(), head(2).get(1)) {
+        match words(outcome, head)[..] {
             // Some end with the number alone.
-            (Some(&END), _) => {}
-            (Some(&0), _) => device.is_cut = true,
-            (Some(&id), Some(&length)) => {
-                let end = at + 2 + u32::from(length);
-                if 0x1_0000 < end || device.models.len() == MODELS_MAX || REGISTERS_MAX < read + u32::from(length) {
+            [END, ..] => {}
+            [id, length] if id != 0 => {
+                let (at, registers) = (head.range().end, u32::from(length));
+                if EDGE < at + registers || device.models.len() == MODELS_MAX || REGISTERS_MAX < read + registers {
                     device.is_cut = true;
                     return;
                 }
-                device.models.push(FoundModel { id, address: to_u16(at + 2), length, words: Vec::new() });
-                self.step = Step::Model(at + 2);
+                device.models.push(FoundModel { id, address: to_u16(at), length, words: Vec::new() });
+                self.go_on(at);
             }
             _ => device.is_cut = true,
         }
     }
 
-    /// Is this the head of the model behind the one at hand?
-    fn is_head(&self, span: AddressSpan) -> bool {
-        let found = self.device.as_ref().and_then(|device| device.models.last());
-        found.is_some_and(|found| found.end() == u32::from(span.address))
+    /// From this address on; nothing stands behind the last.
+    fn go_on(&mut self, from: u32) {
+        self.step = if from == EDGE { Step::Done } else { Step::Model(from) };
     }
+}
+
+fn span(table: Table, address: u32, count: u32) -> AddressSpan {
+    AddressSpan { table, address: to_u16(address), count: to_u16(count) }
+}
+
+/// Number and length of a model, as much as there is room for.
+fn head_at(table: Table, address: u32) -> AddressSpan {
+    span(table, address, (EDGE - address).min(2))
+}
+
+/// Good words from an address on, fewer where one was refused.
+fn words(outcome: Outcomes, span: AddressSpan) -> Vec<u16> {
+    span.range().map_while(|address| outcome(span.table, address).word()).collect()
 }
 
 /// Where the marker may stand, two registers each.

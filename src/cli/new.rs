@@ -28,6 +28,7 @@ use crate::{
         io::atomic,
         new_plant::{NewAlarm, NewDevice, NewPlant, left_out, of_interest, plain_name},
         suggested_alarms::suggested_alarms,
+        sunspec,
     },
 };
 
@@ -222,8 +223,8 @@ async fn add_device(
 
 /// Names for a device profile beside a plant file, of files that are not there.
 fn names_beside(plant: &Path) -> impl Iterator<Item = String> {
-    let stem = plain_name(&plant.file_stem().unwrap_or_default().to_string_lossy()).replace('.', "_");
-    let names = (1..1_000).map(move |n| if n == 1 { format!("{stem}_sunspec") } else { format!("{stem}_sunspec_{n}") });
+    let first = sunspec::profile_name(&plant.file_stem().unwrap_or_default().to_string_lossy());
+    let names = (1..1_000).map(move |n| if n == 1 { first.clone() } else { format!("{first}_{n}") });
     names.filter(|name| !plant.with_file_name(format!("{name}.toml")).exists())
 }
 
@@ -282,12 +283,14 @@ async fn save(plant: &NewPlant, profiles: &OwnProfiles, made: &[String], path: &
     let path = ask_until("write the plant file", &usual, |answer| {
         let path = free(answer)?;
         let used = |name: &&String| plant.devices.iter().any(|of| of.profile.as_ref().is_some_and(|of| of.0 == **name));
-        for name in made.iter().filter(used) {
-            let beside = path.with_file_name(format!("{name}.toml"));
-            write(&beside, profiles.text(name).unwrap_or_default())?;
-            say(&format!("saved {}: the device profile", beside.display()));
-        }
-        write(&path, &text)?;
+        let beside = |name: &String| {
+            (path.with_file_name(format!("{name}.toml")), profiles.text(name).unwrap_or_default().as_bytes().to_vec())
+        };
+        let mut files: Vec<(PathBuf, Vec<u8>)> = made.iter().filter(used).map(beside).collect();
+        let made = files.len();
+        files.push((path.clone(), text.as_bytes().to_vec()));
+        atomic::write_all_new(&files).map_err(|(path, error)| format!("{}: {error}", path.display()))?;
+        files[..made].iter().for_each(|(path, _)| say(&format!("saved {}: the device profile", path.display())));
         Ok(path)
     })
     .await?;
@@ -298,10 +301,6 @@ async fn save(plant: &NewPlant, profiles: &OwnProfiles, made: &[String], path: &
     say(&format!("saved {path}: lines {lines}, devices {devices}, alarms {alarms}"));
     say(&format!("`sightglass {path}` shows it, `sightglass check {path}` its read plan"));
     Ok(())
-}
-
-fn write(path: &Path, text: &str) -> Result<(), String> {
-    atomic::write_new(path, text.as_bytes()).map_err(|error| format!("{}: {error}", path.display()))
 }
 
 #[cfg(test)]

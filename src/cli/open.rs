@@ -43,7 +43,7 @@ const USUAL: [(u32, Parity); 14] = [
 const USUAL_UNITS: [(u8, u8); 7] = [(1, 1), (255, 255), (0, 0), (126, 126), (2, 16), (240, 240), (17, 247)];
 /// Units on a serial line and of the usual settings those that they are looked for with, the most frequent first.
 const USUAL_SERIAL_UNITS: [(u8, u8, usize); 3] = [(1, 1, USUAL.len()), (2, 16, USUAL.len()), (17, 247, 4)];
-/// How long an answer may take while settings are tried.
+/// How long an answer may take while many units or settings are tried, if no time is given.
 const TRIAL: Duration = Duration::from_millis(250);
 
 /// Arguments of `open`.
@@ -172,11 +172,8 @@ pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError>
         return Ok((line, unit));
     }
     let (mut came, mut bench) = (String::new(), Bench::new(&line));
-    for range in USUAL_UNITS {
-        if !line.transport.units().contains(&range.0) {
-            continue;
-        }
-        match first_answer(&mut bench, &line, range, Vec::new()).await? {
+    for scan in unit_scans(&line, args) {
+        match first_answer(&mut bench, &line, scan).await? {
             Ok((unit, _, words)) => {
                 say(&format!("unit {unit} answers: {words}"));
                 return Ok((line, unit));
@@ -188,9 +185,25 @@ pub async fn find(line: LineDef, args: &Args) -> Result<(LineDef, u8), CliError>
     Err(CliError::Failed(format!(
         "{}: the connection opens, but units 0 to 247 and 255 do not answer{came}. In the order of likelihood:\n\
          no device behind the gateway or not powered, other serial settings in the gateway,\n\
-         another protocol on this TCP port",
+         another protocol on this TCP port, answers that take longer (`--timeout 2000`)",
         port_of(&line)
     )))
+}
+
+/// The likeliest units on TCP one by one, each with all the time that an answer may take; then the others.
+fn unit_scans(line: &LineDef, args: &Args) -> Vec<Scan> {
+    let units = line.transport.units();
+    let ranges = USUAL_UNITS.into_iter().filter(|(first, _)| units.contains(first));
+    let scan = |(first, last)| {
+        let timeout = if first == last { line.timeout } else { trial(line, args) };
+        Scan { first, last, serials: Vec::new(), timeout }
+    };
+    ranges.map(scan).collect()
+}
+
+/// How long an answer may take while many units or settings are tried.
+fn trial(line: &LineDef, args: &Args) -> Duration {
+    if args.port.is_timed() { line.timeout } else { line.timeout.min(TRIAL) }
 }
 
 /// Settings and unit on a serial line: unit 1 with every usual setting, then the others.
@@ -206,18 +219,12 @@ async fn find_serial(line: LineDef, serial: Serial, args: &Args) -> Result<(Line
         usual.filter(|serial| args.port.fits(*serial)).collect()
     };
     // With other settings the line rests for the timeout: no longer than what is tried.
-    let trial = LineDef { timeout: line.timeout.min(TRIAL), ..line.clone() };
+    let trial = LineDef { timeout: trial(&line, args), ..line.clone() };
     let (mut bench, mut came) = (Bench::new(&trial), String::new());
     let stages = args.unit.map_or(USUAL_SERIAL_UNITS.to_vec(), |unit| vec![(unit, unit, USUAL.len())]);
     for (first, last, most) in stages {
         let scan = Scan { first, last, serials: serials(most), timeout: trial.timeout };
-        let (units, settings) = (
-            if first == last { format!("unit {first}") } else { format!("units {first} to {last}") },
-            scan.serials.len(),
-        );
-        let seconds = scan::time_max(&trial, &scan).1.as_secs_f64().ceil();
-        say(&format!("trying {units} at {settings} settings, at most {seconds} s; Ctrl-C ends it"));
-        match first_answer(&mut bench, &trial, (first, last), scan.serials).await? {
+        match first_answer(&mut bench, &trial, scan).await? {
             Ok((unit, serial, words)) => {
                 let serial = serial.unwrap_or(serial_of(&line));
                 say(&format!("unit {unit} answers at {serial}: {words}"));
@@ -231,7 +238,7 @@ async fn find_serial(line: LineDef, serial: Serial, args: &Args) -> Result<(Line
         "{}: {} at none of the usual settings{came}. In the order of likelihood:\n\
          A and B exchanged, the device without power or not set to Modbus RTU,\n\
          no common ground or termination, other settings (`sightglass scan {0} --bauds all --parities all`), another \
-         master on the line.\n\
+         master on the line, answers that take longer (`--timeout 2000`).\n\
          `--baud`, `--parity` and `--unit` together open the line without trying",
         port_of(&line),
         args.unit.map_or("no unit answers".to_owned(), |unit| format!("unit {unit} answers"))
@@ -243,11 +250,10 @@ async fn find_serial(line: LineDef, serial: Serial, args: &Args) -> Result<(Line
 async fn first_answer(
     bench: &mut Bench,
     line: &LineDef,
-    (first, last): (u8, u8),
-    serials: Vec<Serial>,
+    scan: Scan,
 ) -> Result<Result<(u8, Option<Serial>, String), String>, CliError> {
-    let scan = Diagnostic::Scan(Scan { first, last, serials, timeout: line.timeout.min(TRIAL) });
-    let run = tools::search(bench, scan, |run| answer(run).is_some()).await?;
+    say(&announced(line, &scan));
+    let run = tools::search(bench, Diagnostic::Scan(scan), |run| answer(run).is_some()).await?;
     let deaf = |finding: &&Finding| matches!(finding, Finding::Conclusion(Conclusion::Deaf(_)));
     run.findings.iter().find(deaf).into_iter().flat_map(tools::scan::describe).for_each(|words| say(&words));
     match &run.state {
@@ -256,6 +262,19 @@ async fn first_answer(
             Ok(answer(&run).ok_or_else(|| trace(&run).map_or(String::new(), |trace| format!(", {trace}"))))
         }
     }
+}
+
+/// `trying units 2 to 16 at 14 settings, at most 53 s; Ctrl-C ends it`.
+fn announced(line: &LineDef, scan: &Scan) -> String {
+    let Scan { first, last, serials, .. } = scan;
+    let units = if first == last { format!("unit {first}") } else { format!("units {first} to {last}") };
+    let settings = match &serials[..] {
+        [] => String::new(),
+        [one] => format!(" at {one}"),
+        many => format!(" at {} settings", many.len()),
+    };
+    let seconds = scan::time_max(line, scan).1.as_secs_f64().ceil();
+    format!("trying {units}{settings}, at most {seconds} s; Ctrl-C ends it")
 }
 
 fn answer(run: &DiagnosticRun) -> Option<(u8, Option<Serial>, String)> {
@@ -315,6 +334,23 @@ fn with_serial(line: LineDef, wanted: Serial) -> LineDef {
 mod tests {
     use super::*;
     use crate::plant::{command::CommandId, diagnostics::UnitReply};
+
+    #[test]
+    fn units_are_tried_with_the_time_that_is_given() {
+        let scans = |words: &str| {
+            let args = Args::from_words(words.split(' ').map(str::to_owned).collect()).expect("arguments");
+            let line = args.line().expect("a line");
+            let tried = unit_scans(&line, &args).into_iter().map(|scan| (scan.first, scan.timeout.as_millis()));
+            let announced = unit_scans(&line, &args).iter().map(|scan| announced(&line, scan)).collect::<Vec<_>>();
+            (tried.collect::<Vec<_>>(), announced)
+        };
+        let (tried, announced) = scans("open 10.0.0.7");
+        assert_eq!(tried[..5], [(1, 500), (255, 500), (0, 500), (126, 500), (2, 250)]);
+        assert_eq!(announced[0], "trying unit 1, at most 6 s; Ctrl-C ends it");
+        assert_eq!(announced[6], "trying units 17 to 247, at most 67 s; Ctrl-C ends it");
+        assert!(scans("open 10.0.0.7 --timeout 2000").0.iter().all(|(_, timeout)| *timeout == 2_000));
+        assert!(scans("open 10.0.0.7 --timeout 100").0.iter().all(|(_, timeout)| *timeout == 100));
+    }
 
     #[test]
     fn corrupt_bytes_at_a_setting_are_no_answer() {

@@ -70,7 +70,7 @@ fn written(log: &Path) -> String {
     match fs::read(log) {
         Ok(bytes) => {
             let rows = bytes.iter().filter(|byte| **byte == b'\n').count().saturating_sub(1);
-            format!("{}: {rows} rows written", log.display())
+            format!("{}: rows written: {rows}", log.display())
         }
         Err(error) => format!("{}: nothing was written: {error}", log.display()),
     }

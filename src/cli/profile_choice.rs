@@ -5,11 +5,11 @@ use std::{collections::BTreeSet, sync::Arc};
 use super::{
     CliError,
     prompt::{ask_until, selection},
-    recognition::FoundKind,
+    recognition::{FoundKind, sunspec_words},
     say,
 };
 use crate::{
-    bus::recognise::{Miss, Ranked},
+    bus::recognise::Ranked,
     plant::{
         PlantDef,
         tag::{Access, Poll, TagDef},
@@ -48,8 +48,7 @@ fn sunspec(
     made: &mut Vec<String>,
     mut names: impl Iterator<Item = String>,
 ) -> String {
-    let [vendor, model, _] = device.identity();
-    say(&format!("unit {unit}: {vendor} {model}, {} SunSpec models", device.models.len()));
+    say(&sunspec_words(unit, device));
     let name = names.find(|name| profiles.text(name).is_none()).unwrap_or_else(|| "sunspec".to_owned());
     profiles.add(&name, &profile_text(device));
     made.push(name.clone());
@@ -64,18 +63,10 @@ fn likeliest(unit: u8, ranked: &[Ranked]) -> String {
     }
     say(&format!("unit {unit}: not recognised"));
     for Ranked { def, fit, misses } in ranked.iter().filter(|ranked| 0 < ranked.fit.fits).take(NEAR_MAX) {
-        let why = misses.first().map_or_else(|| "too few different numbers".to_owned(), miss);
+        let why = misses.first().map_or_else(|| "too few different numbers".to_owned(), ToString::to_string);
         say(&format!("  not {} ({}): {} of {} probes fit; {why}", def.name, model_of(def), fit.fits, fit.of));
     }
     "none".to_owned()
-}
-
-/// `P-DP is 7, expected 0, 1, 2`.
-fn miss(Miss { tag, read, expected }: &Miss) -> String {
-    match read {
-        Some(read) => format!("{tag} is {read}, expected {expected}"),
-        None => format!("{tag} cannot be read"),
-    }
 }
 
 /// A profile by its name; words are searched for, and what was found is said.
@@ -110,7 +101,7 @@ pub async fn kept_models(def: &PlantDef) -> Result<(Vec<TagDef>, bool), CliError
     }
     for (n, name) in names.iter().enumerate() {
         let count = def.tags.iter().filter(|tag| tag.group == *name).count();
-        say(&format!("  {:>3} {name:24} {count} values", n + 1));
+        say(&format!("  {:>3} {name:24} values {count}", n + 1));
     }
     let chosen = ask_until("  models to keep", "all", |answer| selection(answer, &names)).await?;
     let kept: BTreeSet<&str> = chosen.iter().filter_map(|at| names.get(*at)).map(String::as_str).collect();
@@ -141,9 +132,9 @@ mod tests {
 
     #[test]
     fn a_profile_that_nearly_fits_says_which_probe_does_not() {
-        use crate::bus::recognise::Expected;
+        use crate::bus::recognise::{Expected, Miss};
         let missed = |read| Miss { tag: "P-DP".into(), read, expected: Expected::Ranges(vec![(0.0, 0.0), (1.0, 9.0)]) };
-        assert_eq!(miss(&missed(Some(77.0))), "P-DP is 77, expected 0, 1…9");
-        assert_eq!(miss(&missed(None)), "P-DP cannot be read");
+        assert_eq!(missed(Some(77.0)).to_string(), "P-DP is 77, expected 0, 1…9");
+        assert_eq!(missed(None).to_string(), "P-DP cannot be read");
     }
 }

@@ -228,6 +228,9 @@ impl DeviceDef {
     }
 }
 
+/// Registers of one read (Modbus application protocol V1.1b3, 6.3).
+pub const READ_REGISTERS_MAX: u16 = 125;
+
 /// What one request to a device may hold, and how blocks are cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
@@ -253,7 +256,7 @@ impl Limits {
 
     /// What the standard allows (Modbus application protocol V1.1b3, section 6), one request at a time.
     pub const STANDARD: Limits = Limits {
-        read_registers_max: 125,
+        read_registers_max: READ_REGISTERS_MAX,
         read_bits_max: 2_000,
         write_registers_max: 123,
         gap_registers_max: 8,

@@ -16,7 +16,7 @@ use super::{
 /// Most spans of one live read.
 pub const SPANS_MAX: usize = 64;
 /// Most registers and bits of one live read.
-const CELLS_MAX: u32 = 4_000;
+pub const CELLS_MAX: u32 = 4_000;
 
 /// Registers or bits of one table that stand together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

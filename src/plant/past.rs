@@ -98,5 +98,6 @@ impl Past {
 /// Whether the device was asked for a value of this quality.
 fn is_of_requests(quality: Quality) -> bool {
     let unasked = [Cause::NotRead, Cause::NotConnected, Cause::StationOff, Cause::Reloaded, Cause::NotStored];
-    quality.cause().is_none_or(|cause| cause != Cause::Unreadable && !unasked.contains(&cause))
+    quality != Quality::Bad(Cause::OnRequest)
+        && quality.cause().is_none_or(|cause| cause != Cause::Unreadable && !unasked.contains(&cause))
 }

@@ -18,7 +18,7 @@ use super::{
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
-    tag::{Decimals, Poll, StorePolicy, TagDef},
+    tag::{Access, Decimals, Poll, StorePolicy, TagDef},
 };
 use crate::plant::time::elapsed;
 
@@ -75,10 +75,14 @@ impl ProcessImage {
                 dependents[from.index()].push(tag.id);
             }
         }
+        let unread = |tag: &TagDef| match tag.access == Access::Write || tag.is_read() || def.listens_to(tag.id) {
+            true => Cause::NotRead,
+            false => Cause::OnRequest,
+        };
         let mut image = ProcessImage {
             raw: vec![None; count],
             waiting: vec![None; count],
-            samples: vec![Sample::bad(Cause::NotRead, at); count],
+            samples: def.tags.iter().map(|tag| Sample::bad(unread(tag), at)).collect(),
             texts: Arc::new(vec![None; count]),
             decimals_seen: vec![0; count],
             heard: vec![Heard::default(); count],
@@ -160,7 +164,7 @@ impl ProcessImage {
     /// may go before it is read again.
     fn doubt(&mut self, tag: TagId, cause: Cause, at: Timestamp) {
         match self.sample(tag).quality {
-            Quality::Bad(Cause::NotRead | Cause::Reloaded) => self.set(tag, Sample::bad(cause, at)),
+            Quality::Bad(Cause::NotRead | Cause::OnRequest | Cause::Reloaded) => self.set(tag, Sample::bad(cause, at)),
             Quality::Bad(_) => {
                 if let Some(reading) = &mut self.raw[tag.index()] {
                     reading.uncertain = Some(cause);

@@ -65,7 +65,7 @@ keyword_enum! {
         Reloaded = 18 => "plant file reloaded",
         /// The master of a line that is only listened to was heard reading it for the first time.
         Unproven = 19 => "heard, not proven",
-        /// It is read on request only, and that was some time ago.
+        /// It is read on request only, and that was some time ago or never.
         OnRequest = 20 => "read on request",
     }
 }

@@ -37,6 +37,8 @@ pub struct Named {
     pub unit: String,
     /// `SV`.
     pub name: String,
+    /// `Setpoint`; empty for none.
+    pub label: String,
     /// Names of the numbers of an enumeration, before scaling; empty for a quantity.
     pub enum_labels: Vec<(i128, String)>,
     /// Only these bits of its registers, lowest and number.
@@ -78,6 +80,7 @@ impl Named {
             decimals: 0,
             unit: String::new(),
             name: name.to_owned(),
+            label: String::new(),
             enum_labels: Vec::new(),
             field: None,
             bit_labels: Vec::new(),
@@ -98,15 +101,19 @@ impl Named {
     /// and says so.
     pub fn of_tag(tag: &TagDef, scaling: Option<(i8, String)>) -> Named {
         let point = tag.point;
-        let plain = Named::new(point.table, point.address, point.kind, point.order, &tag.short);
+        let plain = Named {
+            label: if tag.label == tag.short { String::new() } else { tag.label.clone() },
+            enum_labels: tag.enum_labels.clone(),
+            bit_labels: tag.bit_labels.clone(),
+            bad_if: tag.bad_if.clone(),
+            field: point.field,
+            ..Named::new(point.table, point.address, point.kind, point.order, &tag.short)
+        };
         let Some((decimals, unit)) = scaling else { return Named { unit: t!("raw").to_owned(), ..plain } };
         let power = if tag.decimals.source().is_some() { -decimals } else { 0 };
         // As a person would write the product.
         let scale = format!("{}e{power}", tag.scale).parse().unwrap_or(tag.scale);
-        let decimals = Decimals::shown(decimals);
-        let (enum_labels, bit_labels, bad_if) = (tag.enum_labels.clone(), tag.bit_labels.clone(), tag.bad_if.clone());
-        let field = tag.point.field;
-        Named { scale, offset: tag.offset, decimals, unit, enum_labels, bit_labels, bad_if, field, ..plain }
+        Named { scale, offset: tag.offset, decimals: Decimals::shown(decimals), unit, ..plain }
     }
 
     /// The same as a tag that is called so.
@@ -115,7 +122,10 @@ impl Named {
         let plain = TagDef::new(TagId(0), DeviceId(0), name, self.point());
         TagDef {
             short: name.to_owned(),
-            label: if self.name == name { String::new() } else { self.name.clone() },
+            label: match self.label.as_str() {
+                "" if self.name != name => self.name.clone(),
+                label => label.to_owned(),
+            },
             scale: self.scale,
             offset: self.offset,
             decimals: Decimals::Fixed(self.decimals),
@@ -148,21 +158,25 @@ impl Named {
 
     /// Its value, of the words from its address on; `None` where there are too few or they hold no number.
     pub fn value(&self, words: &[u16]) -> Option<Exact> {
-        let raw = self.raw(words).filter(|raw| !self.bad_if.contains(raw))?;
+        let raw = self.raw(words).filter(|raw| !self.is_bad(*raw))?;
         Some(scale::scaled(raw, self.scale, self.offset, 0))
     }
 
-    /// `70.0 °C`, `RUN`; `None` as for [`Named::value`].
+    fn is_bad(&self, raw: Exact) -> bool {
+        self.bad_if.iter().any(|bad| is_same(*bad, raw))
+    }
+
+    /// `70.0 °C`, `RUN`, `no value`; `None` where there are too few words or they hold no number.
     pub fn text(&self, words: &[u16]) -> Option<String> {
         if self.kind.is_text() {
             return codec::decode_text(self.point(), words.get(..usize::from(self.count()))?);
         }
-        let raw = self.raw(words).filter(|raw| !self.bad_if.iter().any(|bad| is_same(*bad, *raw)))?;
+        let raw = self.raw(words)?;
+        if self.is_bad(raw) {
+            return Some(t!("no value").to_owned());
+        }
         if let Some((_, label)) = self.enum_labels.iter().find(|(number, _)| Exact::whole(*number) == raw) {
             return Some(label.clone());
-        }
-        if self.bad_if.contains(&raw) {
-            return Some(t!("no value").to_owned());
         }
         if !self.bit_labels.is_empty() {
             let word = raw.as_whole().unwrap_or_default();
@@ -237,6 +251,8 @@ mod tests {
         assert_eq!(scaled.text(&[]), None);
         let state = Named { enum_labels: vec![(0, "RUN".into())], ..plain.clone() };
         assert_eq!((state.text(&[0]).as_deref(), state.text(&[7]).as_deref()), (Some("RUN"), Some("7")));
+        let marked = Named { bad_if: vec![Exact::whole(-1)], ..scaled };
+        assert_eq!((marked.text(&[0xFFFF]).as_deref(), marked.value(&[0xFFFF])), (Some("no value"), None));
         let float = Named { kind: DataType::F32, decimals: 2, ..plain.clone() };
         assert_eq!((float.text(&[0x42D1, 0x6353]).as_deref(), float.text(&[0x42D1])), (Some("104.69"), None));
         let bit = Named { table: Table::Coil, kind: DataType::Bool, ..plain };

@@ -36,7 +36,7 @@ use crate::{
     access::SessionRequest,
     history::{HistoryError, Query, io::QueryRequest},
     profile::OwnProfiles,
-    station::{Request, Session, io::report_files::write_checksum},
+    station::{Request, Session},
     t,
     text::Language,
 };
@@ -285,6 +285,7 @@ impl Loop {
                 Effect::Query(id, query) => self.ask(id, query),
                 Effect::Extension(message) => self.extension.iter().for_each(|port| (port.send)(message.clone())),
                 Effect::SaveReport { tab, path, bytes, new } => self.save(tab, path, bytes, new),
+                Effect::SaveNew { tab, files } => self.save_new(tab, files),
                 Effect::Load { tab, path } => self.load(tab, path),
                 Effect::Append { tab, path, bytes, new } => self.appender.append(tab, path, bytes, new),
                 Effect::KeepPreferences(user, chosen) => self.keep_preferences(user, chosen),
@@ -331,25 +332,6 @@ impl Loop {
             let answer = session.request(request).await;
             // A terminal that has left needs no answer.
             let _ = outbox.send((plants, Msg::RequestDone(id, answer))).await;
-        });
-    }
-
-    fn save(&self, tab: Option<Tab>, path: PathBuf, bytes: Vec<u8>, new: bool) {
-        let (outbox, plants) = (self.outbox.clone(), self.model.plants);
-        let exists = self.model.locale().within(|| t!("a file of this name is there already"));
-        tokio::task::spawn_blocking(move || {
-            let why = |error: io::Error| match error.kind() {
-                io::ErrorKind::AlreadyExists => exists.to_owned(),
-                _ => error.to_string(),
-            };
-            let checksum = |saved| {
-                let wanted = tab == Some(Tab::Reports);
-                if wanted { write_checksum(&path, &bytes) } else { Ok(()) }.map(|()| saved)
-            };
-            let saved = files::save(&path, &bytes, new)
-                .and_then(checksum)
-                .map_err(|error| format!("{}: {}", path.display(), why(error)));
-            let _ = outbox.blocking_send((plants, Msg::Saved(tab, saved)));
         });
     }
 

@@ -87,6 +87,13 @@ pub enum Effect {
         /// Never over a file that is there.
         new: bool,
     },
+    /// Write files that are not there yet, all or none; answered by [`Msg::Saved`] with the last of them.
+    SaveNew {
+        /// The tab that wants them.
+        tab: Tab,
+        /// Where, relative to the working folder, and what.
+        files: Vec<(PathBuf, Vec<u8>)>,
+    },
     /// Read a file of the user; answered by [`Msg::Loaded`].
     Load {
         /// The tab that wants it.
@@ -214,9 +221,12 @@ impl UiAction {
             UiAction::KeepPreferences(_)
             | UiAction::Bookmark(..)
             | UiAction::SessionRequest(_, SessionRequest::Exported { .. })
-            | UiAction::Do(Effect::SaveReport { .. } | Effect::Append { new: true, .. } | Effect::Load { .. }) => {
-                Scope::Files
-            }
+            | UiAction::Do(
+                Effect::SaveReport { .. }
+                | Effect::SaveNew { .. }
+                | Effect::Append { new: true, .. }
+                | Effect::Load { .. },
+            ) => Scope::Files,
             UiAction::Show(_)
             | UiAction::ShowOverview
             | UiAction::ShowDevice(_)

@@ -75,6 +75,7 @@ pub fn sent_kind(effects: &[Effect]) -> Option<&CommandKind> {
         Effect::Query(..)
         | Effect::Extension(_)
         | Effect::SaveReport { .. }
+        | Effect::SaveNew { .. }
         | Effect::Load { .. }
         | Effect::Append { .. }
         | Effect::Bell

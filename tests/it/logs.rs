@@ -98,7 +98,7 @@ fn a_log_says_in_the_end_how_many_rows_it_has() {
     terminal.keys("q");
     terminal.wait_for("Quit?");
     terminal.keys("\r");
-    terminal.wait_for("rows written");
+    terminal.wait_for("rows written:");
     assert_eq!(terminal.end(), 0);
     let text = std::fs::read_to_string(&log).unwrap();
     assert!(text.starts_with("\u{feff}time_utc,T1 °C,T1 quality,T2 °C,T2 quality\r\n"), "{text}");

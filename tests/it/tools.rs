@@ -277,3 +277,17 @@ fn what_standard_output_does_not_take_is_a_failure() {
         assert!(said.contains("standard output: No space left on device"), "{args:?}: {said}");
     }
 }
+
+#[test]
+fn a_walk_over_models_says_why_it_found_none() {
+    // Nothing is there, and nothing is said.
+    let closed = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().to_string();
+    let (code, said) = run(&["probe", &closed, "--sunspec"]);
+    assert!(code == Some(1) && said.contains("refused") && !said.contains("SunSpec models at"), "{code:?} {said}");
+    let silent = peer(answers(|_| Vec::new()));
+    let (code, said) = run(&["probe", &silent, "--sunspec", "--timeout", "50"]);
+    assert!(code == Some(1) && said.contains("response timeout") && said.contains("not known"), "{code:?} {said}");
+    let refusing = peer(answers(|request| [&request[..4], &[0, 3, request[6], request[7] | 0x80, 2]].concat()));
+    let (code, said) = run(&["probe", &refusing, "--sunspec"]);
+    assert!(code == Some(1) && said.contains("has no SunSpec models"), "{code:?} {said}");
+}

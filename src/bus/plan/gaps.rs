@@ -5,11 +5,11 @@
 
 use std::collections::BTreeMap;
 
-use super::Block;
-use crate::plant::{event::ExceptionCode, line_finding::DeviceFinding, live::AddressSpan, number::to_u16, tag::Table};
-
-/// Registers of one request (Modbus application protocol V1.1b3, 6.3).
-const USUAL_MOST: u16 = 125;
+use super::{Block, refused::RefusedPages};
+use crate::plant::{
+    def::READ_REGISTERS_MAX, event::ExceptionCode, line_finding::DeviceFinding, live::AddressSpan, number::to_u16,
+    tag::Table,
+};
 
 /// May the exception mean that too much is asked for, or what is not there? Busy, away and broken memory do not.
 pub fn may_be_cut(code: ExceptionCode) -> bool {
@@ -24,6 +24,8 @@ pub struct UnreadableRanges {
     ends: BTreeMap<(u8, Table, u32), u32>,
     /// Most registers or bits of one request, and how many were refused.
     most: BTreeMap<(u8, Table), (u16, u16)>,
+    /// What live reads found refused throughout.
+    pub refused: RefusedPages,
 }
 
 impl UnreadableRanges {
@@ -89,7 +91,7 @@ impl UnreadableRanges {
             }
             // What has grown together of several was never asked for at once.
             DeviceFinding::Unreadable { table, address, count } => {
-                Some(AddressSpan { table, address, count }).filter(|span| span.count <= USUAL_MOST)
+                Some(AddressSpan { table, address, count }).filter(|span| span.count <= READ_REGISTERS_MAX)
             }
             DeviceFinding::InFlight { .. } | DeviceFinding::RequestGap { .. } => None,
         };
@@ -100,6 +102,7 @@ impl UnreadableRanges {
     pub fn forget(&mut self, unit: u8) {
         self.ends.retain(|(gap, ..), _| *gap != unit);
         self.most.retain(|(other, _), _| *other != unit);
+        self.refused.forget(unit);
     }
 
     /// A block was read. If it lay on a gap, what is known of its unit no longer holds, and `true` says so.
@@ -114,7 +117,7 @@ impl UnreadableRanges {
 
     /// The requests that read a span around what is unreadable.
     pub fn requests(&self, unit: u8, span: AddressSpan) -> Vec<AddressSpan> {
-        let usual = if span.table.is_bits() { 2_000 } else { USUAL_MOST };
+        let usual = if span.table.is_bits() { 2_000 } else { READ_REGISTERS_MAX };
         let most = self.most(unit, span.table).unwrap_or(usual).max(1);
         let (mut from, range) = (span.range().start, span.range());
         let mut requests = Vec::new();

@@ -30,6 +30,9 @@ use crate::{
 
 use super::{CliError, menu, runtime, say, say_error};
 
+/// How long an answer may take where nothing is said of it.
+const TIMEOUT_MS: u64 = 500;
+
 /// The port that a diagnostic works on.
 #[derive(Debug, Clone, clap::Args)]
 pub struct PortArgs {
@@ -51,9 +54,9 @@ pub struct PortArgs {
     /// Stop bits
     #[arg(long, value_name = "BITS", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     stop: u8,
-    /// How long an answer may take, in milliseconds
-    #[arg(long, value_name = "MS", default_value = "500", value_parser = clap::value_parser!(u64).range(10..=60_000))]
-    timeout: u64,
+    /// How long an answer may take, in milliseconds [default: 500]
+    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(10..=60_000))]
+    timeout: Option<u64>,
 }
 
 /// A unit on a port.
@@ -153,7 +156,10 @@ impl PortArgs {
             })?;
             Transport::Tcp { host: host.to_owned(), port: tcp_port.unwrap_or(502), framing }
         };
-        Ok(LineDef { timeout: Duration::from_millis(self.timeout), ..LineDef::new(LineId(0), "line", transport) })
+        Ok(LineDef {
+            timeout: Duration::from_millis(self.timeout.unwrap_or(TIMEOUT_MS)),
+            ..LineDef::new(LineId(0), "line", transport)
+        })
     }
 
     fn serial(&self, framing: Framing) -> Result<Serial, CliError> {
@@ -169,6 +175,11 @@ impl PortArgs {
     pub(super) fn log(&self) -> Option<&Path> {
         let path = Path::new(&self.port);
         (menu::is_log(&self.port) || path.is_file()).then_some(path)
+    }
+
+    /// Is it given how long an answer may take?
+    pub(super) fn is_timed(&self) -> bool {
+        self.timeout.is_some()
     }
 
     /// Are baud rate and parity both given?

@@ -80,8 +80,7 @@ fn sunspec(line: &LineDef, unit: u8) -> Result<(), CliError> {
     let Some(device) = found else {
         return Err(CliError::Failed(format!("unit {unit} has no SunSpec models at 0, 40000 or 50000")));
     };
-    let [vendor, model, _] = device.identity();
-    say_error(&format!("unit {unit}: {vendor} {model}, {} SunSpec models", device.models.len()));
+    say_error(&recognition::sunspec_words(unit, &device));
     say(&profile_text(&device));
     Ok(())
 }

@@ -64,6 +64,12 @@ fn a_value_that_is_read_on_request_is_never_called_stale() {
     let mut def = fixture::plant();
     def.tags[SV.index()].poll = Poll::Never;
     let mut image = ProcessImage::new(Arc::new(def), at(0));
+    let causes = [SV, DP].map(|tag| image.sample(tag).quality.cause());
+    assert_eq!(
+        causes,
+        [Some(Cause::OnRequest), Some(Cause::NotRead)],
+        "what is not polled does not wait for its first read"
+    );
     image.read(&[(SV, 700.0), (DP, 1.0), (FAULT, 0.0)], at(0));
     for (second, quality) in [(60, Quality::Good), (61, Quality::Uncertain(Cause::OnRequest))] {
         image.age(at(second));

@@ -71,6 +71,18 @@ pub fn write_new(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_placed(path, bytes, 0o640, |_, new| fs::hard_link(new, path)).map(drop)
 }
 
+/// Files that were not there before, all or none; an error names the one that could not be written.
+pub fn write_all_new(files: &[(PathBuf, Vec<u8>)]) -> Result<(), (PathBuf, io::Error)> {
+    for (n, (path, bytes)) in files.iter().enumerate() {
+        if let Err(error) = write_new(path, bytes) {
+            // Each of those before was made here.
+            files[..n].iter().for_each(|(path, _)| drop(fs::remove_file(path)));
+            return Err((path.clone(), error));
+        }
+    }
+    Ok(())
+}
+
 /// Where a file is written before it takes the place of `path`. What killed processes have left there is removed.
 pub fn beside(path: &Path) -> PathBuf {
     let mut start = path.file_name().map(OsString::from).unwrap_or_default();
@@ -148,5 +160,19 @@ mod tests {
         fs::create_dir(folder.path().join("taken")).unwrap();
         write_atomic(&folder.path().join("taken"), b"x", 0o640).unwrap_err();
         assert!(names().iter().all(|name| !name.starts_with("taken.new-")), "nothing is left of a try in vain");
+    }
+
+    #[test]
+    fn several_new_files_are_written_all_or_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let files = ["profile", "plant"].map(|name| (folder.path().join(name), name.into()));
+        fs::write(&files[1].0, "another").unwrap();
+        let (path, error) = write_all_new(&files).unwrap_err();
+        assert_eq!((&path, error.kind()), (&files[1].0, io::ErrorKind::AlreadyExists));
+        assert!(!files[0].0.exists(), "a profile without its plant is of no use");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "another");
+        fs::remove_file(&path).unwrap();
+        write_all_new(&files).unwrap();
+        assert!(files.iter().all(|(path, _)| path.exists()));
     }
 }

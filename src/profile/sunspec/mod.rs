@@ -11,7 +11,7 @@ pub(crate) use self::{
     models::{Kind, kind_of},
     text::profile_text,
 };
-use crate::plant::tag::Table;
+use crate::{plant::tag::Table, profile::new_plant::plain_name};
 
 /// `SunS`, with which the models of a device begin.
 pub(crate) const MARKER: [u16; 2] = [0x5375, 0x6E53];
@@ -31,7 +31,7 @@ pub(crate) struct SunSpecDevice {
     pub base: u16,
     /// What follows it.
     pub models: Vec<FoundModel>,
-    /// There may be more of them.
+    /// There may be more of them, or of what they hold.
     pub is_cut: bool,
 }
 
@@ -59,6 +59,11 @@ impl FoundModel {
     pub(crate) fn end(&self) -> u32 {
         u32::from(self.address) + u32::from(self.length)
     }
+}
+
+/// The name of the profile of a device, for a plant file that is called so.
+pub(crate) fn profile_name(plant: &str) -> String {
+    format!("{}_sunspec", plain_name(plant).replace('.', "_"))
 }
 
 impl SunSpecDevice {

@@ -7,27 +7,26 @@ use super::{
     models::{Kind, ModelPoint},
     text::Place,
 };
-use crate::plant::tag::DataType;
+use crate::plant::{def::READ_REGISTERS_MAX, tag::DataType};
 
 /// Models of what is measured: read often.
 const MEASURED: [RangeInclusive<u16>; 10] =
     [101..=113, 160..=160, 201..=220, 302..=308, 401..=404, 501..=502, 601..=601, 701..=701, 713..=714, 802..=809];
 /// Not at all.
 pub(super) const NEVER: &str = "never";
-/// Models up to this length are read with one request, their powers of ten with the values that they scale.
-const ONE_REQUEST: u16 = 125;
 
 /// How often a point at an address is read; `None`: slow.
 pub(super) fn poll_of(point: &ModelPoint, address: u32, place: &Place) -> Option<&'static str> {
     let id = place.found.id;
     let power = place.known.get(point.scale).and_then(|(_, at)| place.found.word(*at));
-    // Without a power of ten a value is none. Of one that every device has, the marker may stand for now only.
+    // A value without its power of ten is none. One that every device has may hold the marker for a while, as at night.
     if power == Some(0x8000) || (!point.is_mandatory && is_marked(point, address, place)) {
         return Some(NEVER);
     }
     if point.kind == Kind::Power {
-        // As often as the values; where these are read with another request, they wait for it.
-        return (place.found.length <= ONE_REQUEST).then_some("once");
+        // In a model of one request it is read with the values that it scales; in a longer one it may be in another request, and is
+        // read as often.
+        return (place.found.length <= READ_REGISTERS_MAX).then_some("once");
     }
     if (point.is_static || id == COMMON) && point.scale.is_empty() {
         return Some("once");
@@ -47,7 +46,9 @@ fn is_marked(point: &ModelPoint, address: u32, place: &Place) -> bool {
         }
         Kind::Number(DataType::F32 | DataType::F64) => first & 0x7FC0 == 0x7FC0,
         Kind::Number(_) | Kind::Enum(_) | Kind::Bits(_) => all(u16::MAX),
-        Kind::NotZero(_) | Kind::Wide | Kind::Text => all(0),
+        // It may count, or be set, from now on.
+        Kind::NotZero(_) => false,
+        Kind::Wide | Kind::Text => all(0),
         Kind::Power => *first == 0x8000,
         Kind::Pad => true,
     }

@@ -171,3 +171,13 @@ fn a_hostile_device_makes_a_bounded_profile() {
     assert_eq!(odd.identity()[0].chars().filter(|c| c.is_control()).count(), 0);
     profile(&odd);
 }
+
+#[test]
+fn an_optional_counter_that_stands_at_0_is_polled() {
+    let found = device(&[(103, 50), (203, 105)], 0);
+    let def = profile(&found);
+    for name in ["inverter.WH", "meter.TotWhExp", "meter.TotVAhImpPhA"] {
+        assert_ne!(tag(&def, name).poll, crate::plant::tag::Poll::Never, "{name}");
+    }
+    assert!(!profile_text(&found).contains("not polled"), "{}", profile_text(&found));
+}

@@ -9,14 +9,15 @@ use super::{
     models::{Count, Group, Kind, ModelPoint, model},
     poll::{NEVER, poll_of},
 };
-use crate::{plant::tag::Decimals, profile::tag_text::quoted};
+use crate::{
+    plant::{def::READ_REGISTERS_MAX, tag::Decimals},
+    profile::tag_text::quoted,
+};
 
 /// Most tags of a profile; the rest is left out, and its notes say so.
 const TAGS_MAX: usize = 4_000;
 /// Most registers of models that are not known.
 const UNKNOWN_MAX: u32 = 250;
-/// Most registers of a text: those of one request.
-const TEXT_REGISTERS_MAX: u16 = 125;
 /// The text of a profile that is all that this device has.
 pub(crate) fn profile_text(device: &SunSpecDevice) -> String {
     let mut rows = Rows::default();
@@ -135,7 +136,7 @@ impl Rows {
                 self.row(place, &format!("{name}.high"), address, "uint64", &half("upper half"));
                 return self.row(place, &format!("{name}.low"), address + 4, "uint64", &half("lower half"));
             }
-            Kind::Text => format!("cstring({})", 2 * point.registers.min(TEXT_REGISTERS_MAX)),
+            Kind::Text => format!("cstring({})", 2 * point.registers.min(READ_REGISTERS_MAX)),
             Kind::Power => "int16".to_owned(),
             Kind::Number(kind) | Kind::NotZero(kind) | Kind::Enum(kind) | Kind::Bits(kind) => kind.to_string(),
         };
@@ -226,13 +227,13 @@ impl Rows {
         }
         let mut notes = format!("Models: {}.", listed.join(", "));
         if device.is_cut {
-            notes += " There may be more: reading ended there.";
+            notes += " Not all could be read: there may be more.";
         }
         if 0 < self.missing {
-            notes += &format!(" Not implemented, and not polled: {} values.", self.missing);
+            notes += &format!(" Values not implemented, and not polled: {}.", self.missing);
         }
         if 0 < self.left_out {
-            notes += &format!(" {} values are left out: there are more than a profile holds.", self.left_out);
+            notes += &format!(" Values left out, because a profile holds no more: {}.", self.left_out);
         }
         writeln!(
             out,

@@ -5,16 +5,58 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use super::Loop;
 use crate::{
     profile::io::{
-        atomic::{write_for_user, write_new},
+        atomic::{write_all_new, write_for_user, write_new},
         regular,
     },
     register_map,
+    station::io::report_files::write_checksum,
+    t,
+    ui::{Msg, tabs::Tab},
 };
 
 /// Most bytes of a file that is loaded.
 const LOAD_MAX: u64 = register_map::BYTES_MAX;
+
+/// The file that could not be written, and why.
+type Failed = (PathBuf, io::Error);
+
+impl Loop {
+    pub(super) fn save(&self, tab: Option<Tab>, path: PathBuf, bytes: Vec<u8>, new: bool) {
+        self.write(tab, move || {
+            let checksum = |saved| {
+                let wanted = tab == Some(Tab::Reports);
+                if wanted { write_checksum(&path, &bytes) } else { Ok(()) }.map(|()| saved)
+            };
+            save(&path, &bytes, new).and_then(checksum).map_err(|error| (path, error))
+        });
+    }
+
+    /// Files that are not there yet, all or none.
+    pub(super) fn save_new(&self, tab: Tab, files: Vec<(PathBuf, Vec<u8>)>) {
+        self.write(Some(tab), move || {
+            write_all_new(&files)?;
+            let last = files.last().map(|(path, _)| path.clone()).unwrap_or_default();
+            std::path::absolute(&last).map_err(|error| (last, error))
+        });
+    }
+
+    /// Writes beside the screen, and answers what came of it.
+    fn write(&self, tab: Option<Tab>, write: impl FnOnce() -> Result<PathBuf, Failed> + Send + 'static) {
+        let (outbox, plants) = (self.outbox.clone(), self.model.plants);
+        let exists = self.model.locale().within(|| t!("a file of this name is there already"));
+        tokio::task::spawn_blocking(move || {
+            let why = |error: io::Error| match error.kind() {
+                io::ErrorKind::AlreadyExists => exists.to_owned(),
+                _ => error.to_string(),
+            };
+            let saved = write().map_err(|(path, error)| format!("{}: {}", path.display(), why(error)));
+            let _ = outbox.blocking_send((plants, Msg::Saved(tab, saved)));
+        });
+    }
+}
 
 /// A file of the user.
 pub(super) fn load(path: &Path) -> io::Result<Vec<u8>> {

@@ -66,8 +66,10 @@ pub struct Registers {
     names: Names,
     /// What the plant file calls the registers of this unit.
     names_of_plant: Names,
-    /// Names of the units that were shown before.
-    names_of: BTreeMap<u8, Names>,
+    /// What the profile that was taken calls them.
+    names_of_profile: Names,
+    /// Names of the units that were shown before, and those of their profiles.
+    names_of: BTreeMap<u8, (Names, Names)>,
     recognition: Recognition,
     /// Of the user.
     pub profiles: OwnProfiles,
@@ -75,9 +77,7 @@ pub struct Registers {
     picking: Option<lists::Picking>,
     listed_spans: Vec<AddressSpan>,
     /// The read of a map of addresses, and the number that is looked for in it.
-    hunt: Option<(u32, String)>,
-    /// A file that is written once the one before it is: the plant file behind its profile.
-    saved_next: Option<(PathBuf, Vec<u8>)>,
+    value_search: Option<(u32, String)>,
     /// What came of a log, said with the next snapshot.
     said: Option<UiAction>,
     /// A list that was loaded and is not taken yet.
@@ -137,13 +137,13 @@ impl TabView for Registers {
             cells: Cells::default(),
             names: Names::default(),
             names_of_plant: Names::default(),
+            names_of_profile: Names::default(),
             names_of: BTreeMap::new(),
             recognition: Recognition::default(),
             profiles: OwnProfiles::default(),
             picking: None,
             listed_spans: Vec::new(),
-            hunt: None,
-            saved_next: None,
+            value_search: None,
             said: None,
             preview: None,
             pasted: None,
@@ -221,13 +221,13 @@ impl TabView for Registers {
 
     fn awaits(&self, number: u32) -> bool {
         self.on_way.is_some_and(|(on_way, ..)| on_way == number)
-            || self.hunt.as_ref().is_some_and(|(hunt, _)| *hunt == number)
+            || self.value_search.as_ref().is_some_and(|(search, _)| *search == number)
             || self.recognition.awaits(number)
             || self.comparison.as_ref().is_some_and(|comparison| comparison.awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if let Some((_, text)) = self.hunt.take_if(|(hunt, _)| *hunt == number) {
+        if let Some((_, text)) = self.value_search.take_if(|(search, _)| *search == number) {
             reading_of(answer).iter().for_each(|reading| self.cells.on_reading(reading));
             return self.list_of(cx, lists::What::Hits(text));
         }
@@ -253,6 +253,7 @@ impl TabView for Registers {
         self.reads += 1;
         reading.response_time.into_iter().for_each(|reply| self.replies.see(reply));
         self.cells.on_reading(&reading);
+        self.name_by_profile();
         self.follow_list(cx);
         let began = reading.began;
         let early = self.due.filter(|due| began + self.period / 2 < *due && *due <= began + self.period);

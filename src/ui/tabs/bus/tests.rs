@@ -112,6 +112,7 @@ fn frames_are_saved_as_text_and_for_wireshark() {
             | Effect::SessionRequest(..)
             | Effect::Query(..)
             | Effect::Extension(_)
+            | Effect::SaveNew { .. }
             | Effect::Load { .. }
             | Effect::Append { .. }
             | Effect::Bell

@@ -4,11 +4,14 @@ use std::collections::{BTreeMap, VecDeque};
 
 use jiff::Timestamp;
 
-use crate::plant::{
-    event::Fault,
-    live::{AddressSpan, LiveReading},
-    number::to_u16,
-    tag::Table,
+use crate::{
+    bus::live::Outcome,
+    plant::{
+        event::Fault,
+        live::{AddressSpan, LiveReading},
+        number::to_u16,
+        tag::Table,
+    },
 };
 
 /// Values of a cell that are remembered.
@@ -56,6 +59,17 @@ impl Cells {
         let at = self.get(table, address)?.at;
         let word = |address: u32| self.get(table, u16::try_from(address).ok()?).filter(|cell| cell.at == at)?.word;
         AddressSpan { table, address, count }.range().map(word).collect()
+    }
+
+    /// What the last read of an address has brought.
+    pub fn outcome(&self, table: Table, address: u32) -> Outcome {
+        let cell = u16::try_from(address).ok().and_then(|address| self.get(table, address));
+        Outcome::of(cell.and_then(|cell| cell.fault.map(Err).or(cell.word.map(Ok))))
+    }
+
+    /// Did some of these registers not come, although the unit may have them?
+    pub fn is_lost(&self, span: AddressSpan) -> bool {
+        span.range().any(|address| self.outcome(span.table, address) == Outcome::Lost)
     }
 
     /// Everything good, in the order of tables and addresses.

@@ -36,7 +36,7 @@ const LOOK: &[Key] = &[
     Key::new(char('j'), "go to", "go to an address: 1002, 0x3EA, 41003, input:1000", |registers, _| {
         registers.ask_text(Asking::Address, t!("go to address"), t!("1002, 0x3EA, 41003, or input:1000"))
     }),
-    Key::new(char('v'), "values", "list everything that has a name, with its value", Registers::toggle_values),
+    Key::new(char('v'), "values", "list everything that has a name, with its value", Registers::list_values),
     Key::new(char('/'), "find", "find a value: every place, type, order and scale that it may have", |registers, _| {
         let hint = t!("a number, as it is or scaled: 702, 70.2, 0x2BE");
         registers.ask_text(Asking::Value, t!("find a value in what was read"), hint)
@@ -119,7 +119,7 @@ impl KeyTable for Registers {
             (true, true) => Keys::below(&GRAPH).and(Keys::of(&[LOG, BACK])),
             (true, false) => Keys::below(&GRAPH).and(Keys::of(&[BACK])),
             (false, _) if self.preview.is_some() => Keys::of(preview::KEYS),
-            (false, _) if self.picking.is_some() => listing::all_keys(Keys::of(&[lists::KEYS])),
+            (false, _) if self.picking.is_some() => Keys::of(&[lists::KEYS]),
             (false, true) => Keys::of(BENCH),
             (false, false) => Keys::of(PLANT),
         }

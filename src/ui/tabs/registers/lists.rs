@@ -1,12 +1,16 @@
 //! What can be chosen from a list: every value that has a name, a device profile, a place that holds what is looked for.
 
-use std::sync::Arc;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 use super::{Registers, find, view::named_text};
 use crate::bus::recognise;
 use crate::plant::{
     PlantDef,
     address::AddressBase,
+    def::READ_REGISTERS_MAX,
     live::{AddressSpan, LiveRead, SPANS_MAX},
     tag::{ByteOrder, Table},
 };
@@ -19,8 +23,6 @@ const READ_MAX: usize = 40;
 const GAP_MAX: u32 = 8;
 /// Columns of a value or a model: a text, the names of many bits or of a whole family are cut.
 const VALUE_WIDTH: u16 = 28;
-/// Registers of one request.
-const REQUEST_MAX: u32 = 125;
 
 /// The page.
 pub type Picking = List<Picks>;
@@ -49,6 +51,8 @@ pub struct Pick {
     id: usize,
     group: String,
     name: String,
+    /// In words; empty for none.
+    label: String,
     value: String,
     note: String,
     target: Target,
@@ -92,12 +96,15 @@ impl Listing for Picks {
             What::Profiles => [t!("model"), t!("profile"), t!("probes fit"), t!("why not")],
             What::Hits(_) => [t!("address"), t!("type"), t!("likelihood"), t!("as")],
         };
-        vec![
-            Column::words(group, |_, row: &Pick| row.group.clone()),
-            Column::words(name, |_, row: &Pick| row.name.clone()),
-            Column::number(value, |_, row: &Pick| row.value.clone()),
-            rest(10, note, |_, row: &Pick, room| fit(&row.note, room)),
-        ]
+        let label = Column::words(t!("label"), |_, row: &Pick| row.label.clone()).rank(1);
+        let columns = [
+            Some(Column::words(group, |_, row: &Pick| row.group.clone())),
+            Some(Column::words(name, |_, row: &Pick| row.name.clone())),
+            (self.what == What::Values).then_some(label),
+            Some(Column::number(value, |_, row: &Pick| row.value.clone())),
+            Some(rest(10, note, |_, row: &Pick, room| fit(&row.note, room))),
+        ];
+        columns.into_iter().flatten().collect()
     }
 }
 
@@ -111,8 +118,8 @@ pub const KEYS: &[Key] = &[
 ];
 
 impl Registers {
-    /// Shows everything that has a name, or goes back.
-    pub(super) fn toggle_values(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+    /// Shows everything that has a name.
+    pub(super) fn list_values(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         self.list_of(cx, What::Values)
     }
 
@@ -148,12 +155,30 @@ impl Registers {
 
     fn picks(&self, cx: &ViewContext, what: &What) -> Vec<Pick> {
         let mut rows = match what {
-            What::Values => self.names.iter().map(|named| self.value_row(cx, named)).collect(),
+            What::Values => self.value_rows(cx),
             What::Profiles => self.profile_rows(),
             What::Hits(text) => self.hit_rows(text),
         };
         rows.iter_mut().enumerate().for_each(|(n, row)| row.id = n);
         rows
+    }
+
+    /// In the order of their registers, but powers of ten behind the rest of their group.
+    fn value_rows(&self, cx: &ViewContext) -> Vec<Pick> {
+        let def = self.recognition.applied();
+        let sources =
+            def.iter().flat_map(|def| def.tags.iter().filter_map(|tag| Some(def.tag(tag.decimals.source()?))));
+        let sources: BTreeSet<(Table, u16)> = sources.map(|tag| (tag.point.table, tag.point.address)).collect();
+        let mut order: BTreeMap<String, usize> = BTreeMap::new();
+        let row = |named: &Named| {
+            let row = self.value_row(cx, named);
+            let next = order.len();
+            let group = *order.entry(row.group.clone()).or_insert(next);
+            ((group, sources.contains(&(named.table, named.address))), row)
+        };
+        let mut rows: Vec<((usize, bool), Pick)> = self.names.iter().map(row).collect();
+        rows.sort_by_key(|(place, _)| *place);
+        rows.into_iter().map(|(_, row)| row).collect()
     }
 
     fn value_row(&self, cx: &ViewContext, named: &Named) -> Pick {
@@ -163,6 +188,7 @@ impl Registers {
             id: 0,
             group: group.to_owned(),
             name: name.to_owned(),
+            label: fit(&named.label, VALUE_WIDTH),
             value: fit(&named_text(self, cx, named).0, VALUE_WIDTH),
             note: self.place_words(span.table, span.address),
             target: Target::Place(span, None),
@@ -173,16 +199,21 @@ impl Registers {
         let row = |ranked: recognise::Ranked| {
             let recognise::Ranked { def, fit, misses } = ranked;
             let note = match misses.first() {
+                _ if self.is_in_use(&def) => t!("in use").to_owned(),
                 _ if fit.of == 0 => t!("it has no signature").to_owned(),
-                None => String::new(),
-                Some(recognise::Miss { tag, read: Some(read), expected }) => {
-                    t!("{tag} is {read}, expected {expected}", tag, read, expected)
-                }
-                Some(recognise::Miss { tag, read: None, .. }) => t!("{tag} cannot be read", tag),
+                miss => miss.map_or(String::new(), ToString::to_string),
             };
             let value = if fit.of == 0 { "–".to_owned() } else { t!("{fits} of {of}", fits = fit.fits, of = fit.of) };
             let group = def.devices.first().map(|device| text::fit(&device.model, VALUE_WIDTH)).unwrap_or_default();
-            Pick { id: 0, group, name: def.name.clone(), value, note, target: Target::Profile(def) }
+            Pick {
+                id: 0,
+                group,
+                name: def.name.clone(),
+                label: String::new(),
+                value,
+                note,
+                target: Target::Profile(def),
+            }
         };
         self.ranked().into_iter().map(row).collect()
     }
@@ -196,6 +227,7 @@ impl Registers {
                 id: 0,
                 group: self.place_words(hit.table, hit.address),
                 name: format!("{} {}{scale}", hit.kind, hit.order.word()),
+                label: String::new(),
                 value: format!("{} %", hit.likelihood),
                 note: hit.shown,
                 target: Target::Place(span, Some(hit.order)),
@@ -220,7 +252,7 @@ impl Registers {
             return Ok(self.list_of(cx, What::Hits(text.to_owned())));
         }
         self.number = self.number.wrapping_add(1);
-        self.hunt = Some((self.number, text.to_owned()));
+        self.value_search = Some((self.number, text.to_owned()));
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
         Ok(vec![UiAction::query(self.tab, self.number, Query::Registers(read))])
     }
@@ -244,14 +276,16 @@ impl Registers {
     }
 }
 
-/// As few spans as these registers need, in the order of their addresses.
-fn joined(mut spans: Vec<AddressSpan>) -> Vec<AddressSpan> {
+/// As few requests as these registers need, in the order of their addresses.
+pub fn joined(mut spans: Vec<AddressSpan>) -> Vec<AddressSpan> {
     spans.sort_unstable();
     let mut all: Vec<AddressSpan> = Vec::new();
     for span in spans {
         let joins = |last: &AddressSpan| {
             let whole = span.range().end.max(last.range().end) - last.range().start;
-            last.table == span.table && span.range().start <= last.range().end + GAP_MAX && whole <= REQUEST_MAX
+            last.table == span.table
+                && span.range().start <= last.range().end + GAP_MAX
+                && whole <= READ_REGISTERS_MAX.into()
         };
         match all.last_mut() {
             Some(last) if joins(last) => {

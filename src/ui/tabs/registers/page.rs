@@ -42,12 +42,7 @@ impl Registers {
         let before = std::mem::take(&mut self.names_of_plant);
         for tag in snapshot.def.tags.iter().filter(of_unit) {
             let named = Named::of_tag(tag, scaling(snapshot, tag));
-            let (table, address) = (named.table, named.address);
-            let held = self.names.get(table, address);
-            if held == before.get(table, address) && held != Some(&named) {
-                self.names.put(named.clone());
-                self.watch.restart((table, address));
-            }
+            self.give(&named, before.get(named.table, named.address));
             self.names_of_plant.put(named);
         }
     }

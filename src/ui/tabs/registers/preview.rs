@@ -164,7 +164,7 @@ impl Registers {
         list.named = named;
         let only = |named: Named| t!("{name}: only a profile has several at one address", name = named.name);
         list.problems.extend(Vec::into_iter(others).map(only));
-        let taken = t!("{count} names taken", count = list.named.len());
+        let taken = t!("names taken: {count}", count = list.named.len());
         if let Some(first) = list.named.first() {
             (self.table, self.first, self.selected) = (first.table, first.address, first.address);
         }
@@ -200,7 +200,8 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let Preview { context, list, column, top, .. } = preview;
     let room = canvas.width().saturating_sub(2);
     let (count, left) = (list.named.len(), list.problems.len());
-    let words = t!("{count} registers can be taken, {left} lines cannot. Are the values right?", count, left);
+    let words =
+        t!("Registers that can be taken: {count}, lines that cannot: {left}. Are the values right?", count, left);
     canvas.text(1, 0, &fit_words(&words, room), theme.strong());
     let (words, style) = match &list.unclear {
         Some(Unclear { written, modicon, sent }) => {

@@ -7,13 +7,13 @@ use super::{LOST_AFTER, Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{
+        live::Retries,
         recognise::{self, Fit},
         sunspec::Walk,
     },
     plant::{
         PlantDef,
         live::{AddressSpan, LiveRead, LiveReading},
-        tag::TagDef,
     },
     profile::sunspec::profile_text,
     register_map::named::Named,
@@ -21,6 +21,8 @@ use crate::{
 
 /// The name of the profile that was made of the SunSpec models, until it is saved.
 pub const SUNSPEC: &str = "sunspec";
+/// Spans that are read with the window for the scaling of names.
+const UNSCALED_MAX: usize = 16;
 
 /// How far it is.
 #[derive(Debug, Default)]
@@ -31,9 +33,7 @@ pub enum Recognition {
     /// Its SunSpec models; number and steady time of the read.
     Walking { walk: Walk, on_way: Option<(u32, Timestamp)> },
     /// The signature at work, of these; number and steady time of its read.
-    Asking { known: Vec<Arc<PlantDef>>, at: usize, on_way: Option<(u32, Timestamp)> },
-    /// What this profile needs to show its values, which was chosen by hand; number and steady time of the read.
-    Choosing { def: Arc<PlantDef>, on_way: Option<(u32, Timestamp)>, is_read: bool },
+    Asking { known: Vec<Arc<PlantDef>>, at: usize, retries: Retries, on_way: Option<(u32, Timestamp)> },
     /// The profile that fits; `None`: no profile fits.
     Done(Option<Recognised>),
 }
@@ -52,8 +52,11 @@ pub struct Recognised {
 #[derive(Debug, Clone, Copy)]
 enum How {
     Probes(Fit),
-    /// The device has said so many models.
-    SunSpec(usize),
+    /// The device has said so many models, and perhaps not all of it was read.
+    SunSpec {
+        count: usize,
+        is_cut: bool,
+    },
     /// It was chosen by hand.
     Chosen,
 }
@@ -62,9 +65,7 @@ impl Recognition {
     /// Is this its read?
     pub fn awaits(&self, number: u32) -> bool {
         let on_way = match self {
-            Recognition::Walking { on_way, .. }
-            | Recognition::Asking { on_way, .. }
-            | Recognition::Choosing { on_way, .. } => *on_way,
+            Recognition::Walking { on_way, .. } | Recognition::Asking { on_way, .. } => *on_way,
             Recognition::Waiting | Recognition::Done(_) => None,
         };
         on_way.is_some_and(|(own, _)| own == number)
@@ -74,11 +75,9 @@ impl Recognition {
     pub fn applied(&self) -> Option<&Arc<PlantDef>> {
         match self {
             Recognition::Done(Some(Recognised { def, is_taken: true, .. })) => Some(def),
-            Recognition::Waiting
-            | Recognition::Walking { .. }
-            | Recognition::Asking { .. }
-            | Recognition::Choosing { .. }
-            | Recognition::Done(_) => None,
+            Recognition::Waiting | Recognition::Walking { .. } | Recognition::Asking { .. } | Recognition::Done(_) => {
+                None
+            }
         }
     }
 
@@ -88,12 +87,11 @@ impl Recognition {
             Recognition::Waiting => String::new(),
             Recognition::Walking { walk, .. } => match walk.count() {
                 0 => t!("looking for SunSpec").to_owned(),
-                count => t!("SunSpec, {count} models so far", count),
+                count => t!("SunSpec models so far: {count}", count),
             },
             Recognition::Asking { known, at, .. } => {
                 t!("recognising, {at} of {count} profiles", at, count = known.len())
             }
-            Recognition::Choosing { def, .. } => t!("reading what {profile} needs", profile = def.name),
             Recognition::Done(None) => t!("not recognised: f chooses a profile").to_owned(),
             Recognition::Done(Some(Recognised { def, how, is_taken })) => {
                 let model = def.devices.first().map_or("", |device| device.model.as_str());
@@ -105,7 +103,10 @@ impl Recognition {
                         t!("names of {model}: {fits} of {of} probes fit", model, fits, of)
                     }
                     (How::Chosen, _) => t!("names of {model}, as chosen", model),
-                    (How::SunSpec(count), _) => t!("{model}: {count} SunSpec models", model, count),
+                    (How::SunSpec { count, is_cut: false }, _) => t!("{model}: SunSpec models {count}", model, count),
+                    (How::SunSpec { count, is_cut: true }, _) => {
+                        t!("{model}: SunSpec models {count}, not all could be read", model, count)
+                    }
                 }
             }
         }
@@ -125,11 +126,7 @@ impl Registers {
         let now = cx.monotonic_now();
         let (spans, on_way) = match &mut self.recognition {
             Recognition::Walking { walk, on_way } => (walk.next(), on_way),
-            Recognition::Asking { known, at, on_way } => (asked_by(known, *at), on_way),
-            Recognition::Choosing { def, on_way, is_read } => {
-                let spans = asked_by(std::slice::from_ref(def), 0);
-                (spans.filter(|spans| !*is_read && !spans.is_empty()), on_way)
-            }
+            Recognition::Asking { known, at, on_way, .. } => (asked_by(known, *at), on_way),
             Recognition::Waiting | Recognition::Done(_) => return Vec::new(),
         };
         if on_way.is_some_and(|(_, sent)| now.duration_since(sent) < LOST_AFTER) {
@@ -147,14 +144,16 @@ impl Registers {
         if let Some(reading) = reading {
             self.cells.on_reading(&reading);
         }
-        let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
         match &mut self.recognition {
             Recognition::Walking { walk, on_way } => {
-                walk.on_words(&words);
+                walk.on_outcomes(&|table, address| self.cells.outcome(table, address));
                 *on_way = None;
             }
-            Recognition::Asking { at, on_way, .. } => (*at, *on_way) = (*at + 1, None),
-            Recognition::Choosing { on_way, is_read, .. } => (*on_way, *is_read) = (None, true),
+            Recognition::Asking { known, at, retries, on_way } => {
+                let is_lost = asked_by(known, *at).iter().flatten().any(|span| self.cells.is_lost(*span));
+                *at += usize::from(!retries.again(is_lost));
+                *on_way = None;
+            }
             Recognition::Waiting | Recognition::Done(_) => {}
         }
         self.recognise(cx)
@@ -165,15 +164,15 @@ impl Registers {
         match &self.recognition {
             Recognition::Walking { walk, .. } => match walk.found() {
                 Some(found) => {
-                    let (text, count) = (profile_text(found), found.models.len());
+                    let how = How::SunSpec { count: found.models.len(), is_cut: found.is_cut };
+                    let text = profile_text(found);
                     self.profiles.add(SUNSPEC, &text);
                     if let Some(def) = self.profiles.device(SUNSPEC) {
-                        let how = How::SunSpec(count);
                         self.recognition = Recognition::Done(Some(Recognised { def, how, is_taken: false }));
                         // The device itself has said what its registers are.
                         let is_untouched = (self.first, self.selected) == (0, 0) && self.picking.is_none();
                         self.apply_names(cx);
-                        return if is_untouched { self.toggle_values(cx) } else { self.read_now(cx) };
+                        return if is_untouched { self.list_values(cx) } else { self.read_now(cx) };
                     }
                     self.ask_signatures(cx)
                 }
@@ -187,38 +186,38 @@ impl Registers {
                 self.recognition = Recognition::Done(best);
                 Vec::new()
             }
-            Recognition::Choosing { def, .. } => {
-                let chosen = Recognised { def: Arc::clone(def), how: How::Chosen, is_taken: false };
-                self.recognition = Recognition::Done(Some(chosen));
-                self.apply_names(cx);
-                self.read_now(cx)
-            }
             Recognition::Waiting | Recognition::Done(_) => Vec::new(),
         }
     }
 
-    /// Takes a profile that was chosen by hand, in place of the one before.
+    /// Takes a profile that was chosen by hand, in place of the one before; what its values need is read with the next window.
     pub(super) fn choose_profile(&mut self, cx: &ViewContext, def: Arc<PlantDef>) -> Vec<UiAction> {
-        let before = self.recognition.applied().cloned();
-        for tag in before.iter().flat_map(|before| &before.tags) {
-            let (table, address) = (tag.point.table, tag.point.address);
-            if self.names.get(table, address).is_some_and(|named| named.name == tag.short) {
-                self.names.remove(table, address);
+        for named in std::mem::take(&mut self.names_of_profile).iter() {
+            if self.names.get(named.table, named.address) == Some(named) {
+                self.names.remove(named.table, named.address);
             }
         }
-        self.recognition = Recognition::Choosing { def, on_way: None, is_read: false };
-        self.recognise(cx)
+        self.recognition = Recognition::Done(Some(Recognised { def, how: How::Chosen, is_taken: false }));
+        self.apply_names(cx);
+        self.read_now(cx)
     }
 
-    /// All profiles, the one that fits best first.
+    /// All profiles, the one that is in use first, then the one that fits best.
     pub(super) fn ranked(&self) -> Vec<recognise::Ranked> {
         let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
-        recognise::ranking(&self.profiles.all(), &words)
+        let mut ranked = recognise::ranking(&self.profiles.all(), &words);
+        ranked.sort_by_key(|one| !self.is_in_use(&one.def));
+        ranked
+    }
+
+    /// Were the names of this profile taken?
+    pub(super) fn is_in_use(&self, def: &PlantDef) -> bool {
+        self.recognition.applied().is_some_and(|applied| applied.name == def.name)
     }
 
     fn ask_signatures(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let known = self.profiles.recognisable();
-        self.recognition = Recognition::Asking { known, at: 0, on_way: None };
+        self.recognition = Recognition::Asking { known, at: 0, retries: Retries::default(), on_way: None };
         self.recognise(cx)
     }
 
@@ -227,21 +226,47 @@ impl Registers {
         let Recognition::Done(Some(recognised)) = &mut self.recognition else { return };
         recognised.is_taken = true;
         let def = Arc::clone(&recognised.def);
-        for tag in def.tags.iter().filter(|tag| tag.point.field.is_none() && tag.calculation.is_none()) {
-            if self.names.get(tag.point.table, tag.point.address).is_none() {
-                let named = self.named(&def, tag);
-                self.names.put(named);
-            }
-        }
+        self.name_by_profile();
         if let Some(first) = def.tags.first().filter(|_| self.picking.is_none()) {
             (self.table, self.first, self.selected) = (first.point.table, first.point.address, first.point.address);
             self.keep_in_sight(cx);
         }
     }
 
-    fn named(&self, def: &PlantDef, tag: &TagDef) -> Named {
-        let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
-        Named::of_tag(tag, recognise::scaling(def, tag, &words))
+    /// Calls the registers what the profile that was taken calls them, with the scaling that the device has said by now; a name
+    /// that was given by hand stays.
+    pub(super) fn name_by_profile(&mut self) {
+        let Some(def) = self.recognition.applied().cloned() else { return };
+        let mut given = std::mem::take(&mut self.names_of_profile);
+        for tag in def.tags.iter().filter(|tag| tag.point.field.is_none() && tag.calculation.is_none()) {
+            let before = given.get(tag.point.table, tag.point.address);
+            let is_fixed = tag.decimals.source().is_none() && tag.unit_from.is_none();
+            let is_settled = |before: &Named| is_fixed || before.name != tag.short;
+            if before.is_some_and(is_settled) {
+                continue;
+            }
+            let words = |span: AddressSpan| self.cells.words(span.table, span.address, span.count);
+            let named = Named::of_tag(tag, recognise::scaling(&def, tag, &words));
+            self.give(&named, before);
+            given.put(named);
+        }
+        self.names_of_profile = given;
+    }
+
+    /// Gives a name where no other stands than what was given `before`.
+    pub(super) fn give(&mut self, named: &Named, before: Option<&Named>) {
+        let held = self.names.get(named.table, named.address);
+        if held == before && held != Some(named) {
+            self.names.put(named.clone());
+            self.watch.restart((named.table, named.address));
+        }
+    }
+
+    /// What the names of the profile need for their scaling, and what did not come so far.
+    pub(super) fn unscaled_spans(&self) -> Vec<AddressSpan> {
+        let def = self.recognition.applied();
+        let spans = def.and_then(|def| Some(recognise::spans(def, def.devices.first()?))).unwrap_or_default();
+        spans.into_iter().filter(|span| self.cells.is_lost(*span)).take(UNSCALED_MAX).collect()
     }
 }
 

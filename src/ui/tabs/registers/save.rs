@@ -14,6 +14,7 @@ use crate::{
     profile::{
         new_plant::{NewAlarm, NewDevice, NewPlant, of_interest, plain_name, usual_shifts},
         suggested_alarms::{plausible_alarms, suggested_alarms},
+        sunspec,
     },
     register_map::{self, named::Named},
     ui::Effect,
@@ -52,24 +53,20 @@ impl Registers {
         let mut plant = self.new_plant(cx, &stem).ok_or_else(|| t!("there is no line").to_owned())?;
         let Some(made) = made else {
             let bytes = plant.text(&self.profiles)?.into_bytes();
-            return Ok(vec![save_new(path, bytes)]);
+            return Ok(vec![save_new(vec![(path, bytes)])]);
         };
-        let name = format!("{}_{SUNSPEC}", plain_name(&stem).replace('.', "_"));
+        let name = sunspec::profile_name(&stem);
         let mut profiles = self.profiles.clone();
         profiles.add(&name, &made);
         plant.devices.iter_mut().filter_map(|device| device.profile.as_mut()).for_each(|of| of.0.clone_from(&name));
         let bytes = plant.text(&profiles)?.into_bytes();
         let profile = path.with_file_name(format!("{name}.toml"));
-        self.saved_next = Some((path, bytes));
-        Ok(vec![save_new(profile, made.into_bytes())])
+        Ok(vec![save_new(vec![(profile, made.into_bytes()), (path, bytes)])])
     }
 
-    /// A file was written, or not; behind a profile the plant file that names it.
-    pub(super) fn on_written(&mut self, result: Result<PathBuf, String>) -> Vec<UiAction> {
-        match (self.saved_next.take(), result) {
-            (Some((path, bytes)), Ok(_)) => vec![save_new(path, bytes)],
-            (_, result) => vec![outcome(result, self.asking == Asking::Profile)],
-        }
+    /// Files were written, or not.
+    pub(super) fn on_written(&self, result: Result<PathBuf, String>) -> Vec<UiAction> {
+        vec![outcome(result, self.asking == Asking::Profile)]
     }
 
     fn new_plant(&self, cx: &ViewContext, stem: &str) -> Option<NewPlant> {
@@ -148,8 +145,7 @@ impl Registers {
         let list =
             self.preview.as_ref().map(preview::Preview::list).ok_or_else(|| t!("there is nothing in it").to_owned())?;
         let written = register_map::profile::written(list, &plain_name(&stem), t!("a list"))?;
-        let save = Effect::SaveReport { tab: Some(Tab::Registers), path, bytes: written.text.into_bytes(), new: true };
-        let mut actions = vec![UiAction::Do(save)];
+        let mut actions = vec![save_new(vec![(path, written.text.into_bytes())])];
         if !written.problems.is_empty() {
             actions.push(UiAction::Open(Modal::Notice(Notice::list(t!("save as device profile"), written.problems))));
         }
@@ -157,9 +153,9 @@ impl Registers {
     }
 }
 
-/// Writes a file that is not there yet.
-fn save_new(path: PathBuf, bytes: Vec<u8>) -> UiAction {
-    UiAction::Do(Effect::SaveReport { tab: Some(Tab::Registers), path, bytes, new: true })
+/// Writes files that are not there yet.
+fn save_new(files: Vec<(PathBuf, Vec<u8>)>) -> UiAction {
+    UiAction::Do(Effect::SaveNew { tab: Tab::Registers, files })
 }
 
 /// Why nothing is loaded.

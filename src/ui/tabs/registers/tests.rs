@@ -4,6 +4,7 @@ mod compare;
 mod keep;
 mod lists;
 mod map;
+mod named;
 mod watch;
 
 use std::sync::Arc;
@@ -95,11 +96,23 @@ impl Bench {
     }
 
     fn respond(&mut self, seconds: i64, id: QueryId, read: &LiveRead, value: impl Fn(Table, u16) -> Option<u16>) {
+        self.respond_or_lose(seconds, id, read, |table, address| {
+            value(table, address).ok_or(Fault::Exception(ExceptionCode(2)))
+        });
+    }
+
+    fn respond_or_lose(
+        &mut self,
+        seconds: i64,
+        id: QueryId,
+        read: &LiveRead,
+        value: impl Fn(Table, u16) -> Result<u16, Fault>,
+    ) {
         let at = now() + SignedDuration::from_secs(seconds);
         let part = |span: &AddressSpan, address: u32| LivePart {
             at,
             span: AddressSpan { address: to_u16(address), count: 1, ..*span },
-            words: value(span.table, to_u16(address)).map(|word| vec![word]).ok_or(Fault::Exception(ExceptionCode(2))),
+            words: value(span.table, to_u16(address)).map(|word| vec![word]),
         };
         let parts = read.spans.iter().flat_map(|span| span.range().map(|address| part(span, address))).collect();
         let reading = LiveReading { began: at, parts, response_time: Some(Duration::from_micros(6_600)), requests: 2 };

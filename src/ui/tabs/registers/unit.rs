@@ -29,8 +29,10 @@ impl Registers {
 
     /// Nothing that was read of one unit is shown of another, and each has names of its own.
     pub(super) fn show_unit(&mut self, cx: &ViewContext, unit: u8) {
-        let names = self.names_of.remove(&unit).unwrap_or_default();
-        self.names_of.insert(self.unit, std::mem::replace(&mut self.names, names));
+        let (names, of_profile) = self.names_of.remove(&unit).unwrap_or_default();
+        let names = std::mem::replace(&mut self.names, names);
+        let of_profile = std::mem::replace(&mut self.names_of_profile, of_profile);
+        self.names_of.insert(self.unit, (names, of_profile));
         (self.unit, self.reads) = (unit, 0);
         (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
         self.watch.clear();

@@ -7,7 +7,7 @@ use crate::{
     access::right::needs_for_query,
     plant::{
         command::Refusal,
-        live::{AddressSpan, LiveRead, SPANS_MAX},
+        live::{AddressSpan, CELLS_MAX, LiveRead, SPANS_MAX},
         number::to_u32,
     },
     ui::{rights, tabs::prelude::*},
@@ -15,7 +15,8 @@ use crate::{
 
 /// Periods to choose from.
 const PERIODS_MS: [i64; 8] = [200, 500, 1_000, 2_000, 5_000, 10_000, 30_000, 60_000];
-/// Words behind the window that are read with it: the last row may be the first word of a 64-bit value.
+/// Words behind the window that are read with it: the last row may be the first word of a 64-bit value. What has a name and reaches
+/// further is read with a request of its own.
 const BEHIND: u32 = 3;
 
 impl Registers {
@@ -30,6 +31,16 @@ impl Registers {
         let rows = self.rows(cx);
         let count = to_u16((rows.end + BEHIND).min(0x1_0000) - rows.start);
         AddressSpan { table: self.table, address: self.first, count }
+    }
+
+    /// Values with names that begin in the window and end behind what is read with it.
+    fn values_behind(&self, span: AddressSpan) -> Vec<AddressSpan> {
+        let reaches = |address: u32| {
+            let named = self.names.get(self.table, to_u16(address))?;
+            let value = AddressSpan { address: named.address, count: named.count(), ..span };
+            (span.range().end < value.range().end && value.range().end <= 0x1_0000).then_some(value)
+        };
+        span.range().filter_map(reaches).collect()
     }
 
     pub(super) fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
@@ -65,9 +76,15 @@ impl Registers {
         }
         let span = self.span(cx);
         let relearn = std::mem::take(&mut self.relearn);
-        let spans = std::iter::once(span).chain(self.watched_spans(span));
+        let spans = std::iter::once(span).chain(self.values_behind(span)).chain(self.watched_spans(span));
         let spans = spans.chain(self.preview.iter().flat_map(Preview::spans));
-        let spans = spans.chain(self.listed_spans.iter().copied()).take(SPANS_MAX).collect();
+        let spans = spans.chain(self.unscaled_spans()).chain(self.listed_spans.iter().copied());
+        let mut room = CELLS_MAX;
+        let fits = |span: &AddressSpan| {
+            let left = room.checked_sub(span.count.into());
+            left.inspect(|left| room = *left).is_some()
+        };
+        let spans = spans.take(SPANS_MAX).filter(fits).collect();
         let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
         let silent = cx.def().listens_on(self.line).then(|| Refusal::OnlyListens.to_string());
         if let Some(why) = silent.or_else(|| rights::lacks(cx, needs_for_query(&query))) {

@@ -70,6 +70,7 @@ impl Stand {
                 Effect::Query(..)
                 | Effect::SessionRequest(..)
                 | Effect::Extension(_)
+                | Effect::SaveNew { .. }
                 | Effect::Load { .. }
                 | Effect::Append { .. }
                 | Effect::Bell

@@ -3,7 +3,7 @@
 use super::*;
 
 /// A controller that holds what a PXR holds.
-fn pxr(table: Table, address: u16) -> Option<u16> {
+pub fn pxr(table: Table, address: u16) -> Option<u16> {
     match (table, address) {
         (Table::Input, 1000) => Some(696),
         (Table::Input, 1003) => Some(4_500),
@@ -78,11 +78,11 @@ impl Bench {
         let mut effects = type_keys(&mut self.model, "S");
         effects.extend(type_keys(&mut self.model, "⏎"));
         let written = effects.into_iter().find_map(|effect| match effect {
-            Effect::SaveReport { path, bytes, new, .. } => Some((path, bytes, new)),
+            Effect::SaveNew { files, .. } => files.into_iter().next(),
             _ => None,
         });
-        let (path, bytes, new) = written.unwrap_or_else(|| panic!("{}", self.screen(120, 40)));
-        assert_eq!((path.to_str(), new), (Some("bench.toml"), true), "never over an existing file");
+        let (path, bytes) = written.unwrap_or_else(|| panic!("{}", self.screen(120, 40)));
+        assert_eq!(path.to_str(), Some("bench.toml"));
         let text = String::from_utf8(bytes).expect("a text");
         let loaded = crate::profile::OwnProfiles::default()
             .check("bench", &text)
@@ -143,11 +143,14 @@ fn a_list_from_a_manual_gives_names() {
     let read = bench.answer(1, |address| device_of_a_manual(Table::Holding, address));
     assert!(read.spans.iter().any(|span| span.address == 1002), "what the list names is read: {read:?}");
     let shown = bench.screen(80, 24);
-    assert!(shown.contains("1 registers can be taken, 1 lines cannot") && shown.contains("70.0 °C"), "{shown}");
+    assert!(
+        shown.contains("Registers that can be taken: 1, lines that cannot: 1") && shown.contains("70.0 °C"),
+        "{shown}"
+    );
     assert!(shown.contains("41003: holding 1002 (Modicon) or holding 41003 (as sent)? b says which"), "{shown}");
     assert!(shown.contains("line 3: ") && bench.model.tabs.registers.names.is_empty(), "nothing is taken yet: {shown}");
     bench.keys("b⏎");
-    assert!(bench.screen(80, 24).contains("1 names taken"), "{}", bench.screen(80, 24));
+    assert!(bench.screen(80, 24).contains("names taken: 1"), "{}", bench.screen(80, 24));
     bench.keys("⎋");
     bench.answer(1, |address| device_of_a_manual(Table::Holding, address));
     assert!(bench.screen(80, 24).contains("SV  70.0 °C"), "{}", bench.screen(80, 24));
@@ -194,9 +197,13 @@ fn a_configuration_of_another_program_is_saved_as_a_profile() {
     let text = "modbus:\n  - sensors:\n    - { name: Flow rate, slave: 3, address: 5, scale: 0.1 }\n    - { name: Own, slave: 3, address: 6, structure: \">h\", data_type: custom }\n";
     bench.send(Msg::Loaded(Tab::Registers, Ok(text.into())));
     let shown = bench.screen(120, 24);
-    assert!(shown.contains("1 registers can be taken, 1 lines cannot") && shown.contains("S profile"), "{shown}");
+    assert!(
+        shown.contains("Registers that can be taken: 1, lines that cannot: 1") && shown.contains("S profile"),
+        "{shown}"
+    );
     let effects = type_keys(&mut bench.model, &format!("S{}meter⏎", "\u{8}".repeat(11)));
-    let [Effect::SaveReport { path, bytes, new: true, .. }] = &effects[..] else { panic!("{effects:?}") };
+    let [Effect::SaveNew { files, .. }] = &effects[..] else { panic!("{effects:?}") };
+    let [(path, bytes)] = &files[..] else { panic!("{files:?}") };
     let saved = String::from_utf8_lossy(bytes).into_owned();
     assert_eq!(path.to_str(), Some("meter.toml"));
     assert!(saved.contains("name = \"Flow_rate\"") && saved.contains("label = \"Flow rate\""), "{saved}");
