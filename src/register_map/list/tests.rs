@@ -157,7 +157,7 @@ fn a_power_of_ten_is_never_taken_for_a_factor() {
         read("address,name,type,SF\n1,W,int16,-1\n2,b,int16,2\n").0,
         ["40002 W int16 ABCD 0.1 1 ", "40003 b int16 ABCD 100 0 "]
     );
-    let said = ListContext { means: BTreeMap::from([(3, Some(Column::Scale))]), ..context() };
+    let said = ListContext { means: Said::from([("Scale Factor".to_owned(), Some(Column::Scale))]), ..context() };
     let list = parse("address,name,type,scale factor\n1,a,int16,-1\n", &said);
     assert_eq!(list.named[0].scale, -1.0, "as its reader has said");
 }
