@@ -93,6 +93,8 @@ pub struct List {
     pub warnings: Vec<String>,
     /// It is a list of a known program, in which nothing is assumed of its factors.
     pub is_sure: bool,
+    /// What is assumed of rows that are taken, and of how many.
+    pub assumed: BTreeMap<String, usize>,
     /// What is not kept of rows that are taken: how often, and in which line first.
     pub notes: BTreeMap<String, (usize, usize)>,
 }
@@ -163,6 +165,9 @@ impl List {
         self.problems.extend(other.problems.into_iter().map(|problem| format!("{place}{problem}")));
         self.unclear = self.unclear.take().or(other.unclear);
         self.station = self.station.or(other.station);
+        for (what, count) in other.assumed {
+            *self.assumed.entry(what).or_default() += count;
+        }
         for (what, (count, line)) in other.notes {
             self.notes.entry(what).or_insert((0, line)).0 += count;
         }
@@ -183,12 +188,13 @@ impl List {
         }
     }
 
-    /// What is not kept of the rows that are taken, in words.
-    pub fn said_notes(&self) -> impl Iterator<Item = String> {
+    /// What is assumed of the rows that are taken, and what of them is not kept, in words.
+    pub fn said_of_rows(&self) -> impl Iterator<Item = String> {
+        let assumed = |(what, count): (&String, &usize)| t!("assumed: {what} ({count} rows)", what, count = *count);
         let said = |(what, (count, line)): (&String, &(usize, usize))| {
             t!("not kept: `{what}` of {count} rows, first in line {line}", what, count = *count, line = *line)
         };
-        self.notes.iter().map(said)
+        self.assumed.iter().map(assumed).chain(self.notes.iter().map(said))
     }
 
     /// Counts something of a row that is not kept, although the row is.
@@ -262,51 +268,31 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
     list.unclear = unclear;
     let order = context.order.unwrap_or(if is_nibe(&list.columns) { ByteOrder::Cdab } else { ByteOrder::Abcd });
     let assumed = Assumed { table: context.table, is_stated: context.is_table_stated, base, order };
-    let mut said = AssumedRows::default();
     for row in rows {
         let taken = row.named(assumed);
         let count = list.named.len();
-        let flags = taken.as_ref().ok().map(|Taken { named, is_base_assumed, is_order_assumed, is_type_assumed }| {
-            let is_scaled_twice = named.offset != 0.0 && named.scale != 1.0;
-            [*is_base_assumed, *is_order_assumed, *is_type_assumed, is_scaled_twice]
-        });
+        let what = taken.as_ref().map(|taken| assumptions(taken, context, list.is_sure)).unwrap_or_default();
         let named = taken.map(|taken| Named { line: row.line, ..taken.named });
         list.push_of(context, row.device.map(|unit| (0, unit)), row.line, named);
         if count < list.named.len() {
-            said.add(flags.unwrap_or_default());
+            what.into_iter().for_each(|what| *list.assumed.entry(what).or_default() += 1);
             row.unused.into_iter().for_each(|heading| list.note(heading, row.line));
         }
     }
-    said.warn(&mut list, context, order);
     list
 }
 
-/// How many rows were taken by what was assumed: how numbers count, the order, the type, and that the offset comes last.
-#[derive(Default)]
-struct AssumedRows([usize; 4]);
-
-impl AssumedRows {
-    fn add(&mut self, flags: [bool; 4]) {
-        self.0.iter_mut().zip(flags).for_each(|(count, flag)| *count += usize::from(flag));
-    }
-
-    fn warn(&self, list: &mut List, context: &ListContext, order: ByteOrder) {
-        let [base, orders, types, offsets] = self.0;
-        let mut say = |count: usize, words: &dyn Fn(usize) -> String| {
-            list.warnings.extend((0 < count).then(|| words(count)));
-        };
-        if context.base.is_none() {
-            say(base, &|count| t!("assumed: plain numbers are addresses as sent, from 0 ({count} rows)", count));
-        }
-        if context.order.is_none() {
-            let word = order.word();
-            say(orders, &|count| t!("assumed: byte order {order} ({count} rows)", order = word, count));
-        }
-        say(types, &|count| t!("assumed: type uint16 ({count} rows)", count));
-        if !list.is_sure {
-            say(offsets, &|count| t!("assumed: the offset is added after the factor ({count} rows)", count));
-        }
-    }
+/// What neither the list nor its reader has said of a row.
+fn assumptions(taken: &Taken, context: &ListContext, is_sure: bool) -> Vec<String> {
+    let Taken { named, is_base_assumed, is_order_assumed, is_type_assumed } = taken;
+    let is_scaled_twice = named.offset != 0.0 && named.scale != 1.0;
+    let all = [
+        (*is_base_assumed && context.base.is_none(), t!("plain numbers are addresses as sent, from 0").to_owned()),
+        (*is_order_assumed && context.order.is_none(), t!("byte order {order}", order = named.order.word())),
+        (*is_type_assumed, t!("type uint16").to_owned()),
+        (is_scaled_twice && !is_sure, t!("the offset is added after the factor").to_owned()),
+    ];
+    all.into_iter().filter(|(is, _)| *is).map(|(_, what)| what).collect()
 }
 
 /// The lists of NIBE, whose 32-bit values have the low word first.

@@ -226,7 +226,7 @@ fn say_rows(title: &str, list: &List, written: Option<&Written>) {
     if SAID_MAX < problems.len() {
         say(&format!("  and {} more", problems.len() - SAID_MAX));
     }
-    list.said_notes().for_each(|note| say(&format!("  {note}")));
+    list.said_of_rows().for_each(|note| say(&format!("  {note}")));
     if let Some((_, unit)) = list.station {
         say(&format!("  the rows of unit {unit} are taken"));
     }

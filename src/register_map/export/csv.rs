@@ -89,6 +89,17 @@ fn cell(tag: &TagDef, column: Column) -> String {
             let usual = TagDef::new(TagId(0), DeviceId(0), "", point).poll;
             if tag.poll == usual { String::new() } else { poll_text(tag.poll) }
         }
-        _ => String::new(),
+        // Said otherwise.
+        Column::HexAddress
+        | Column::Signed
+        | Column::Length
+        | Column::Bytes
+        | Column::Width
+        | Column::Divisor
+        | Column::Exponent
+        | Column::Places
+        | Column::Area
+        | Column::Device
+        | Column::Formula => String::new(),
     }
 }

@@ -181,12 +181,14 @@ fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
         let is_above =
             !cells.is_empty() && 100 == share(cells, |cell| number_of(cell).is_some_and(|number| 1.0 <= number));
         let is_hex = column == Column::Address && is_of_hex(&words, cells);
-        return Some(match column {
-            _ if is_gain && is_above => Column::Divisor,
-            _ if is_hex => Column::HexAddress,
-            Column::Length if words.has(&["bytes"]) => Column::Bytes,
-            _ => column,
-        });
+        let is_of_bytes = column == Column::Length && words.has(&["bytes"]);
+        let found = match (is_gain && is_above, is_hex, is_of_bytes) {
+            (true, _, _) => Column::Divisor,
+            (_, true, _) => Column::HexAddress,
+            (_, _, true) => Column::Bytes,
+            (false, false, false) => column,
+        };
+        return Some(found);
     }
     // A column of types that are all unknown says so row by row; without it each would be taken for a whole number.
     candidates.into_iter().find(|column| *column == Column::Type && !words.has(&["size", "signed", "sign", "typ"]))
@@ -194,15 +196,16 @@ fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
 
 /// Does a cell fit below the heading of an export?
 fn fits_exactly(exact: Column, cell: &str) -> bool {
-    match exact {
-        Column::Access => matches!(cell, "r" | "rw" | "w"),
-        Column::Min | Column::Max | Column::Decimals => number_of(cell).is_some(),
-        Column::Labels | Column::Bits => labels_of(cell).is_some(),
-        Column::Field => field_of(cell).is_some(),
-        Column::Bad => bad_of(cell).is_some(),
-        Column::Group => true,
-        _ => false,
+    if matches!(exact, Column::Min | Column::Max | Column::Decimals) {
+        return number_of(cell).is_some();
     }
+    if matches!(exact, Column::Labels | Column::Bits) {
+        return labels_of(cell).is_some();
+    }
+    exact == Column::Access && matches!(cell, "r" | "rw" | "w")
+        || exact == Column::Field && field_of(cell).is_some()
+        || exact == Column::Bad && bad_of(cell).is_some()
+        || exact == Column::Group
 }
 
 /// Can what is in it be of a meaning that its heading has?
@@ -226,7 +229,22 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
             60 <= share(cells, |cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number)))
         }
         Column::Name | Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
-        _ => false,
+        Column::HexAddress
+        | Column::Bytes
+        | Column::Places
+        | Column::Area
+        | Column::Access
+        | Column::Min
+        | Column::Max
+        | Column::Decimals
+        | Column::Labels
+        | Column::Bits
+        | Column::Bad
+        | Column::Group
+        | Column::Label
+        | Column::WriteAt
+        | Column::WriteWith
+        | Column::Poll => false,
     }
 }
 

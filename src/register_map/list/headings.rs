@@ -167,7 +167,7 @@ impl Heading {
 
     /// Nothing in its column matters to how a number is read.
     pub fn is_harmless(&self) -> bool {
-        self.has(&HARMLESS)
+        !self.0.is_empty() && self.0.iter().all(|word| HARMLESS.contains(&word.as_str()))
     }
 
     /// Its column says how many decimals a number has.

@@ -45,14 +45,14 @@ impl Question {
 /// What a number is multiplied by, if its column means this.
 fn effect(column: Column, cell: &str) -> Option<f64> {
     let number = number_of(cell)?;
-    match column {
-        Column::Scale => Some(number),
-        Column::Divisor => Some(1.0 / number),
-        Column::Exponent => Some(power_of_ten(number)),
-        Column::Places => Some(power_of_ten(-number)),
-        Column::Decimals => Some(1.0),
-        _ => None,
-    }
+    let of = [
+        (Column::Scale, number),
+        (Column::Divisor, 1.0 / number),
+        (Column::Exponent, power_of_ten(number)),
+        (Column::Places, power_of_ten(-number)),
+        (Column::Decimals, 1.0),
+    ];
+    of.into_iter().find(|(known, _)| *known == column).map(|(_, effect)| effect)
 }
 
 /// The questions that columns leave open, unless their reader has answered them.
@@ -100,7 +100,7 @@ pub fn of(
             None if heading.is_harmless() || cells.is_empty() => Vec::new(),
             None if !is_typed && 60 <= share(cells, |cell| kind_of(cell).is_some()) => vec![Column::Type],
             None if is_of_factors(cells) => vec![Column::Scale, Column::Divisor],
-            _ => Vec::new(),
+            None | Some(_) => Vec::new(),
         }
     };
     let open: Vec<Question> = (0..means.len())
@@ -166,5 +166,5 @@ fn is_of_letters(cell: &str) -> bool {
 }
 
 fn is_places(cells: &[&str]) -> bool {
-    !cells.is_empty() && 80 <= share(cells, |cell| cell.parse::<u8>().is_ok_and(|places| places <= 6))
+    !cells.is_empty() && 50 <= share(cells, |cell| cell.parse::<u8>().is_ok_and(|places| places <= 6))
 }

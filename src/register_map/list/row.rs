@@ -200,15 +200,19 @@ impl<'a> Reader<'a> {
 
 /// Why a cell of a column makes its row none.
 fn unfit(column: Column, cell: &str) -> String {
-    match column {
-        Column::Scale | Column::Divisor | Column::Exponent | Column::Places => {
-            t!("`{wrong}` is not a scale", wrong = cell)
-        }
-        Column::Offset => t!("`{offset}` is not an offset", offset = cell),
-        Column::Order => t!("`{order}` is no byte order", order = cell),
-        Column::Table | Column::Area => t!("`{table}` is no table", table = cell),
-        _ => t!("`{cell}` is not understood below {column}", cell, column = translate(column.word())),
+    if matches!(column, Column::Scale | Column::Divisor | Column::Exponent | Column::Places) {
+        return t!("`{wrong}` is not a scale", wrong = cell);
     }
+    if matches!(column, Column::Table | Column::Area) {
+        return t!("`{table}` is no table", table = cell);
+    }
+    if column == Column::Offset {
+        return t!("`{offset}` is not an offset", offset = cell);
+    }
+    if column == Column::Order {
+        return t!("`{order}` is no byte order", order = cell);
+    }
+    t!("`{cell}` is not understood below {column}", cell, column = translate(column.word()))
 }
 
 impl Row {
@@ -319,11 +323,8 @@ impl Row {
         if let Some(bits) = self.width.filter(|bits| *bits != u16::from(kind.bits()) && !kind.is_text()) {
             return Err(t!("`{word}` does not have {bits} bits", word, bits));
         }
-        let is_other = match kind.encoding() {
-            Encoding::Signed => self.signed == Some(false),
-            Encoding::Unsigned => self.signed == Some(true),
-            _ => false,
-        };
+        let is_signed = kind.encoding() == Encoding::Signed;
+        let is_other = kind.is_binary() && self.signed.is_some_and(|signed| signed != is_signed);
         if is_other {
             return Err(t!("`{word}` is not what its sign says", word));
         }
@@ -345,11 +346,13 @@ impl Row {
         let (kind, order) = if table.is_bits() { (DataType::Bool, None) } else { self.kind().map_err(because)? };
         let stated = self.order.or(order);
         let is_in_order = table.is_bits() || kind.is_text() || kind.is_half() || kind.registers() == 1;
-        let order = stated.unwrap_or(if kind.is_text() || kind.is_half() { ByteOrder::Abcd } else { assumed.order });
+        let order = stated.unwrap_or(ByteOrder::Abcd);
         let scale = self.scale.unwrap_or(1.0);
         let decimals = decimals_of(scale, kind).max(decimals_of(self.offset, DataType::U16));
         let named = Named::new(table, address, kind, order, &self.name);
         let named = Named { scale, offset: self.offset, decimals, unit: self.unit.clone(), ..named };
+        let is_free = stated.is_none() && !kind.is_text() && !kind.is_half();
+        let named = if is_free { named.ordered(assumed.order) } else { named };
         let first = first_of(written);
         let is_plain = first.bytes().all(|byte| byte.is_ascii_digit());
         Ok(Taken {

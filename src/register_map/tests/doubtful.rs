@@ -66,8 +66,9 @@ fn a_column_that_may_change_values_is_asked_about() {
 fn a_column_that_is_not_used_is_said() {
     let text = "address;name;type;Default value;Comment;Description\n5;a;int16;2.5;see 4;long\n6;b;int16;3.5;;\n";
     check(text, &["40006 a int16 ABCD x1", "40007 b int16 ABCD x1"], &[], &[]);
-    let notes: Vec<String> = list_of(text).said_notes().collect();
+    let notes: Vec<String> = list_of(text).said_of_rows().collect();
     let expect = [
+        "assumed: plain numbers are addresses as sent, from 0 (2 rows)",
         "not kept: `Comment` of 1 rows, first in line 2",
         "not kept: `Default value` of 2 rows, first in line 2",
         "not kept: `Description` of 1 rows, first in line 2",
@@ -118,12 +119,17 @@ fn plain_numbers_without_a_heading_are_no_factors() {
 
 #[test]
 fn a_cell_that_does_not_fit_leaves_out_its_row_alone() {
-    let rows = "5;a;int16;0;10;1;rw\n6;b;int16;0;ten;1;rw\n7;c;int16;0;30;1;?\n8;d;int16;1;30;one;r\n";
-    let text = format!("address;name;type;min;max;decimals;access\n{rows}");
+    let rows = "5;a;int16;0.1;0;10;1;rw\n6;b;int16;;0;ten;1;rw\n7;c;int16;;0;30;1;?\n8;d;int16;;1;30;one;r\n";
+    let text = format!("address;name;type;scale;min;max;decimals;access\n{rows}");
     let left_out = ["6: `ten` is not understood below greatest", "7: `?`", "8: `one`"];
-    check(&text, &["40006 a int16 ABCD x1 rw min0 max10"], &left_out, &[]);
-    let bad = "address;name;type;bad if\n5;a;float32;-9999.5 0x7FC00000\n6;b;uint16;65535\n7;c;uint16;n/a\n";
-    check(bad, &["40006 a float32 ABCD x1 !-9999.5 !NaN", "40007 b uint16 ABCD x1 !65535"], &["7: `n/a`"], &[]);
+    check(&text, &["40006 a int16 ABCD x0.1 rw min0 max10"], &left_out, &[]);
+    let bad = "address;name;type;bad if\n5;a;float32;-9999.5 0x7F7FFFFF\n7;b;uint16;65535\n8;c;uint16;n/a\n";
+    check(
+        bad,
+        &["40006 a float32 ABCD x1 !-9999.5 !340282346638528860000000000000000000000", "40008 b uint16 ABCD x1 !65535"],
+        &["8: `n/a`"],
+        &[],
+    );
     let length = "address;name;type;registers\n5;a;int16;1\n6;b;int16;one\n7;c;int;2\n";
     check(length, &["40006 a int16 ABCD x1", "40008 c int32 ABCD x1"], &["6: `one`"], &[]);
     let units: String = (5..10).map(|n| format!("{n};a{n};3\n")).collect();
@@ -179,9 +185,9 @@ fn a_bit_is_a_part_of_its_register() {
         &[],
     );
     check(
-        "address;bit;name;type\n5;3;a;bool\n5;16;b;uint16\n",
+        "address;bit;name;type\n5;3;a;bool\n5;20;b;uint16\n",
         &["40006 a uint16[3+1] ABCD x1"],
-        &["no bits 16 to 16"],
+        &["no bits 20 to 20"],
         &[],
     );
     let from_one: String = (1..=16).map(|bit| format!("5;{bit};b{bit}\n")).collect();
@@ -209,7 +215,7 @@ fn a_number_of_no_table_proves_nothing_of_others() {
 
 #[test]
 fn what_is_assumed_is_said() {
-    let warnings = |text: &str| list_of(text).warnings;
+    let warnings = |text: &str| list_of(text).said_of_rows().collect::<Vec<_>>();
     let plain = "assumed: plain numbers are addresses as sent, from 0 (1 rows)".to_owned();
     assert_eq!(warnings("address;name;type\n5;a;int16\n"), [plain.clone()]);
     assert_eq!(warnings("address;name;type\n0x5;a;int32\n"), ["assumed: byte order ABCD (1 rows)"]);

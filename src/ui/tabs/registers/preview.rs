@@ -184,7 +184,7 @@ impl Registers {
 
 /// What is odd about a list, what of its rows is not kept, and the lines that are left out.
 fn said(list: &List) -> Vec<String> {
-    list.warnings.iter().cloned().chain(list.said_notes()).chain(list.problems.iter().cloned()).collect()
+    list.warnings.iter().cloned().chain(list.said_of_rows()).chain(list.problems.iter().cloned()).collect()
 }
 
 fn unclear() -> UiAction {
