@@ -3,7 +3,6 @@
 use super::{Exported, decimals};
 use crate::{
     plant::{
-        id::{DeviceId, TagId},
         role::Role,
         tag::{Access, Bound, TagDef},
     },
@@ -31,6 +30,9 @@ pub fn write(tags: &[&TagDef], exported: &mut Exported) {
                 (is_open(tag.min) || is_open(tag.max), "limits from another tag"),
                 (tag.confirm.is_some(), "the question before it is written"),
                 (tag.role != Role::Technician || tag.reauthenticate.is_some(), "who may write it"),
+                (!tag.meaning.is_empty(), "what it means"),
+                (tag.normal.is_some(), "where it usually lies"),
+                (tag.counter.is_some() || tag.modulus.is_some() || tag.max_rate.is_some(), "how it counts"),
             ],
         );
     }
@@ -85,10 +87,8 @@ fn cell(tag: &TagDef, column: Column) -> String {
             None => String::new(),
         },
         Column::WriteWith => tag.write_fc.filter(|_| is_written).map_or(String::new(), |function| function.to_string()),
-        Column::Poll => {
-            let usual = TagDef::new(TagId(0), DeviceId(0), "", point).poll;
-            if tag.poll == usual { String::new() } else { poll_text(tag.poll) }
-        }
+        // What is usual depends on the profile.
+        Column::Poll => poll_text(tag.poll),
         // Said otherwise.
         Column::HexAddress
         | Column::Signed

@@ -102,7 +102,7 @@ fn separated(text: &str, separator: char) -> Vec<Cells> {
 }
 
 fn one_line(cell: &str) -> String {
-    cell.split_whitespace().collect::<Vec<_>>().join(" ")
+    cell.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 /// The cells of a line of a PDF: at two blanks, else at every blank; or at what separates them in this line alone.

@@ -217,6 +217,11 @@ max_from = "UNLOCK"
     let formulas = exported.text.split([',', '\n']).filter(|cell| cell.starts_with(['=', '@', '+']));
     assert_eq!(formulas.count(), 0, "{}", exported.text);
     assert!(exported.text.contains("input:2,") && exported.text.contains("holding:7"), "{}", exported.text);
+    assert!(
+        exported.text.lines().all(|line| !line.ends_with(',')),
+        "each says how often it is read: {}",
+        exported.text
+    );
     assert_eq!(exported.lost, ["LOCKED: writing it, which needs more than a list can say, limits from another tag"]);
 }
 
