@@ -91,7 +91,7 @@ pub fn of(
                 vec![Column::Field]
             }
             Some(Column::Length) if is_of_bytes(&heading, cells, &kinds) => vec![Column::Length, Column::Bytes],
-            Some(Column::Address) if cells.iter().any(|cell| is_of_letters(cell)) => {
+            Some(Column::Address) if is_half_hex(cells) => {
                 vec![Column::Address, Column::HexAddress]
             }
             None | Some(Column::Decimals) if heading.is_places() && !is_scaled && is_places(cells) => {
@@ -156,6 +156,12 @@ fn is_of_bytes(heading: &Heading, cells: &[&str], kinds: &[&str]) -> bool {
     !is_stated
         && !kinds.iter().any(|kind| is_sized_type(kind))
         && !cells.iter().any(|cell| length_of(cell, false) == Some(1))
+}
+
+/// Some of its cells may be hexadecimal numbers; a single word such as `AC` stands above others.
+fn is_half_hex(cells: &[&str]) -> bool {
+    let has_digit = |cell: &&str| is_of_letters(cell) && cell.bytes().any(|byte| byte.is_ascii_digit());
+    cells.iter().any(has_digit) || 20 <= share(cells, is_of_letters) && !cells.is_empty()
 }
 
 /// `A0`, which may be a number or a name.
