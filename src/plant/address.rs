@@ -5,6 +5,7 @@
 //!   0x3EA  03EAH        as sent on the wire
 //!   holding:1002        as sent, with its table
 //!   41003               a Modicon number, or as sent: the same digits, two registers
+//!   4x1003              a Modicon number for sure; `0x` is hexadecimal
 //! ```
 
 use super::tag::Table;
@@ -44,7 +45,9 @@ impl AddressContext {
         if let Some(address) = hexadecimal(text) {
             return Some((self.table, address));
         }
-        let number: u32 = plain(text)?;
+        let Some(number) = plain(text) else {
+            return of_modicon(text).filter(|(table, _)| !self.is_stated || *table == self.table);
+        };
         let first = if self.base == AddressBase::One { 1 } else { 0 };
         let counted = number.checked_sub(first).and_then(|address| Some((self.table, u16::try_from(address).ok()?)));
         let modicon = of_modicon(text).filter(|(table, _)| !self.is_stated || *table == self.table);
@@ -71,11 +74,13 @@ pub fn wire(text: &str) -> Option<u16> {
     hexadecimal(text).or_else(|| u16::try_from(plain(text)?).ok())
 }
 
-/// Table and wire address of a Modicon number of five or six digits.
+/// Table and wire address of a Modicon number of five or six digits, or `4x1`.
 pub fn of_modicon(text: &str) -> Option<(Table, u16)> {
     TABLES.into_iter().find_map(|table| {
-        let digits = text.strip_prefix(char::from(b'0' + table.digit())).filter(|digits| plain(digits).is_some())?;
-        let number: u32 = digits.parse().ok().filter(|number| matches!(digits.len(), 4 | 5) && *number != 0)?;
+        let digits = text.strip_prefix(char::from(b'0' + table.digit()))?;
+        let marked = digits.strip_prefix(['x', 'X']).filter(|_| table != Table::Coil);
+        let is_long = marked.is_some() || matches!(digits.len(), 4 | 5);
+        let number = plain(marked.unwrap_or(digits)).filter(|number| is_long && *number != 0)?;
         Some((table, u16::try_from(number - 1).ok()?))
     })
 }
@@ -120,7 +125,12 @@ mod tests {
             check("input:0x3EA", None, base, Some((Table::Input, 1002)));
             check("0X03EA", None, base, Some((Table::Holding, 1002)));
             check("03eah", None, base, Some((Table::Holding, 1002)));
-            for wrong in ["", "+5", "4+003", "70000", "register:5", "holding:", "0x10000", "1.5", "BEEFH"] {
+            check("4x1003", None, base, Some((Table::Holding, 1002)));
+            check("3X0001", None, base, Some((Table::Input, 0)));
+            check("0x0010", None, base, Some((Table::Holding, 16)));
+            check("3x0001", Some(Table::Holding), base, None);
+            for wrong in ["", "+5", "4+003", "70000", "register:5", "holding:", "0x10000", "1.5", "BEEFH", "4x0", "5x1"]
+            {
                 check(wrong, None, base, None);
             }
         }

@@ -3,7 +3,7 @@
 use super::{
     exact::Exact,
     half,
-    number::to_u16,
+    number::{to_f32, to_u16},
     tag::{DataType, Encoding, Point},
 };
 
@@ -49,6 +49,20 @@ impl Point {
     /// Lowest and highest raw number; `None` for floats and texts.
     pub fn raw_range(self) -> Option<(i128, i128)> {
         self.kind.raw_range(self.field.map(|(_, bits)| bits))
+    }
+
+    /// A raw number as a profile and a list write it: one that is not whole as the pattern of its bits.
+    pub fn raw_text(self, raw: Exact) -> String {
+        let is_minus_zero = raw.near() == 0.0 && raw.near().is_sign_negative();
+        if raw.as_whole().is_some() && !is_minus_zero {
+            return raw.to_string();
+        }
+        match self.kind.bits() {
+            16 if is_minus_zero => "0x8000".to_owned(),
+            16 => format!("0x{:04X}", half::bits(raw.near()).unwrap_or(0x7E00)),
+            32 => format!("0x{:08X}", to_f32(raw.near()).to_bits()),
+            _ => format!("0x{:016X}", raw.near().to_bits()),
+        }
     }
 
     /// What a number means here: `-32768`, `32768` and the pattern `0x8000` are one for an int16. Of a float and a BCD
@@ -104,7 +118,7 @@ impl Point {
                     (true, Ok(pattern), 16) => half::value(to_u16(pattern)),
                     (true, Ok(pattern), _) => f64::from_bits(pattern),
                     (_, _, 16) => half::rounded(Exact::whole(written).near()),
-                    (_, _, 32) => f64::from(super::number::to_f32(Exact::whole(written).near())),
+                    (_, _, 32) => f64::from(to_f32(Exact::whole(written).near())),
                     _ => Exact::whole(written).near(),
                 };
                 let is_held = is_pattern || Exact::from(number) == Exact::whole(written);

@@ -72,13 +72,16 @@ use std::{
 
 pub(crate) use self::io::scenario;
 pub(crate) use self::raw_pattern::sunspec_marker;
-pub(crate) use self::units::{is_known as is_known_unit, of as unit_of};
 pub use self::{
     diagnostic::{Errors, render},
     io::{PlantFile, Search, list, text_of},
     library::{Card, find_cards},
     set_file::{read_set, text_of_set},
     user_profiles::OwnProfiles,
+};
+pub(crate) use self::{
+    reader::duration as duration_of,
+    units::{is_known as is_known_unit, of as unit_of},
 };
 pub use crate::plant::line_check::{BAUD_RANGE, BAUDS};
 use crate::plant::{def::PlantDef, keyword::keyword_enum};

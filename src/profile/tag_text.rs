@@ -56,7 +56,7 @@ fn number_keys(tag: &TagDef, keys: &mut Vec<String>) {
         keys.push(format!("bits = {{ {} }}", labels.collect::<Vec<_>>().join(", ")));
     }
     if !tag.bad_if.is_empty() {
-        let numbers = tag.bad_if.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let numbers = tag.bad_if.iter().map(|bad| tag.point.raw_text(*bad)).collect::<Vec<_>>();
         keys.push(format!("bad_if = [{}]", numbers.join(", ")));
     }
     for (key, bound) in [("min", tag.min), ("max", tag.max)] {

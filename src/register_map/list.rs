@@ -3,16 +3,22 @@
 
 pub mod cells;
 mod columns;
+mod form;
+pub mod headings;
+mod questions;
 mod row;
 pub mod words;
 
 use std::collections::BTreeMap;
 
-pub use self::columns::Column;
 use self::{
     cells::Cells,
     columns::{Columns, first_of, is_address, is_heading},
-    row::{Assumed, Row},
+    row::{Assumed, Row, Taken},
+};
+pub use self::{
+    columns::{Column, Said},
+    questions::Question,
 };
 use super::{Format, named::Named};
 use crate::{
@@ -34,16 +40,16 @@ pub struct ListContext {
     pub is_table_stated: bool,
     /// How plain numbers count; `None`: that is not said.
     pub base: Option<AddressBase>,
-    /// Order of what takes several registers.
-    pub order: ByteOrder,
+    /// Order of what takes several registers; `None`: that is not said.
+    pub order: Option<ByteOrder>,
     /// The unit whose registers are wanted; `None`: the first that the file has.
     pub unit: Option<u8>,
     /// Where the first register of a map without addresses of its own stands.
     pub start: Option<u16>,
     /// Which of several models is meant, in a file that has a value for each, from 0.
     pub variant: Option<usize>,
-    /// What columns mean other than it seems.
-    pub means: BTreeMap<usize, Option<Column>>,
+    /// What columns mean other than it seems, by heading.
+    pub means: Said,
 }
 
 impl Default for ListContext {
@@ -53,11 +59,11 @@ impl Default for ListContext {
             table: Table::Holding,
             is_table_stated: false,
             base: None,
-            order: ByteOrder::Abcd,
+            order: None,
             unit: None,
             start: None,
             variant: None,
-            means: BTreeMap::new(),
+            means: Said::new(),
         }
     }
 }
@@ -75,6 +81,8 @@ pub struct List {
     pub unclear: Option<Unclear>,
     /// Heading of each column, and what it means.
     pub columns: Vec<(String, Option<Column>)>,
+    /// Columns of which only the reader of the list can say what they mean; rows with something in them are left out.
+    pub questions: Vec<Question>,
     /// What it is.
     pub format: Option<Format>,
     /// Maker and model, where the file names them.
@@ -83,6 +91,10 @@ pub struct List {
     pub station: Option<(usize, u8)>,
     /// What is assumed, or is odd about the file, beside its rows.
     pub warnings: Vec<String>,
+    /// It is a list of a known program, in which nothing is assumed of its factors.
+    pub is_sure: bool,
+    /// What is assumed of rows that are taken, and of how many.
+    pub assumed: BTreeMap<String, usize>,
     /// What is not kept of rows that are taken: how often, and in which line first.
     pub notes: BTreeMap<String, (usize, usize)>,
 }
@@ -153,9 +165,36 @@ impl List {
         self.problems.extend(other.problems.into_iter().map(|problem| format!("{place}{problem}")));
         self.unclear = self.unclear.take().or(other.unclear);
         self.station = self.station.or(other.station);
-        if self.columns.is_empty() {
-            self.columns = other.columns;
+        for (what, count) in other.assumed {
+            *self.assumed.entry(what).or_default() += count;
         }
+        for (what, (count, line)) in other.notes {
+            self.notes.entry(what).or_insert((0, line)).0 += count;
+        }
+        self.add_columns(other.columns, other.questions);
+    }
+
+    /// Columns of another heading, each once.
+    fn add_columns(&mut self, columns: Vec<(String, Option<Column>)>, questions: Vec<Question>) {
+        for column in columns {
+            if self.columns.iter().all(|(heading, _)| *heading != column.0) {
+                self.columns.push(column);
+            }
+        }
+        for question in questions {
+            if self.questions.iter().all(|known| known.heading != question.heading) {
+                self.questions.push(question);
+            }
+        }
+    }
+
+    /// What is assumed of the rows that are taken, and what of them is not kept, in words.
+    pub fn said_of_rows(&self) -> impl Iterator<Item = String> {
+        let assumed = |(what, count): (&String, &usize)| t!("assumed: {what} ({count} rows)", what, count = *count);
+        let said = |(what, (count, line)): (&String, &(usize, usize))| {
+            t!("not kept: `{what}` of {count} rows, first in line {line}", what, count = *count, line = *line)
+        };
+        self.assumed.iter().map(assumed).chain(self.notes.iter().map(said))
     }
 
     /// Counts something of a row that is not kept, although the row is.
@@ -222,16 +261,45 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
         },
     };
     let stated = Some(context.table).filter(|_| context.is_table_stated);
+    let written = rows.iter().filter(|row| row.base.is_none());
     let written: Vec<(&str, Option<Table>)> =
-        rows.iter().filter_map(|row| Some((first_of(row.address.as_ref()?), row.table.or(stated)))).collect();
+        written.filter_map(|row| Some((first_of(row.address.as_ref()?), row.table.or(stated)))).collect();
     let (base, unclear) = base_of(&written, context);
     list.unclear = unclear;
-    let assumed = Assumed { table: context.table, is_stated: context.is_table_stated, base, order: context.order };
+    let order = context.order.unwrap_or(if is_nibe(&list.columns) { ByteOrder::Cdab } else { ByteOrder::Abcd });
+    let assumed = Assumed { table: context.table, is_stated: context.is_table_stated, base, order };
     for row in rows {
-        let named = row.named(assumed).map(|named| Named { line: row.line, ..named });
+        let taken = row.named(assumed);
+        let count = list.named.len();
+        let what = taken.as_ref().map(|taken| assumptions(taken, context, list.is_sure)).unwrap_or_default();
+        let named = taken.map(|taken| Named { line: row.line, ..taken.named });
         list.push_of(context, row.device.map(|unit| (0, unit)), row.line, named);
+        if count < list.named.len() {
+            what.into_iter().for_each(|what| *list.assumed.entry(what).or_default() += 1);
+            row.unused.into_iter().for_each(|heading| list.note(heading, row.line));
+        }
     }
     list
+}
+
+/// What neither the list nor its reader has said of a row.
+fn assumptions(taken: &Taken, context: &ListContext, is_sure: bool) -> Vec<String> {
+    let Taken { named, is_base_assumed, is_order_assumed, is_type_assumed } = taken;
+    let is_scaled_twice = named.offset != 0.0 && named.scale != 1.0;
+    let all = [
+        (*is_base_assumed && context.base.is_none(), t!("plain numbers are addresses as sent, from 0").to_owned()),
+        (*is_order_assumed && context.order.is_none(), t!("byte order {order}", order = named.order.word())),
+        (*is_type_assumed, t!("type uint16").to_owned()),
+        (is_scaled_twice && !is_sure, t!("the offset is added after the factor").to_owned()),
+    ];
+    all.into_iter().filter(|(is, _)| *is).map(|(_, what)| what).collect()
+}
+
+/// The lists of NIBE, whose 32-bit values have the low word first.
+fn is_nibe(columns: &[(String, Option<Column>)]) -> bool {
+    ["Title", "Register type", "Register", "Division factor", "Size of variable"]
+        .iter()
+        .all(|heading| columns.iter().any(|(known, _)| known == heading))
 }
 
 /// The rows below each heading.
@@ -241,22 +309,17 @@ fn below_headings(all: &[Cells], is_separated: bool, context: &ListContext, list
     for (n, start) in starts.iter().enumerate() {
         let end = starts.get(n + 1).copied().unwrap_or(all.len());
         let (heading, below) = (&all[*start].cells, &all[start + 1..end]);
-        let mut columns = Columns::new(heading, below);
-        for (place, mean) in &context.means {
-            columns.means.iter_mut().skip(*place).take(1).for_each(|old| *old = *mean);
-        }
-        let undecided = columns.undecided_factor(below, &context.means);
-        if n == 0 {
-            list.columns = columns.headings.iter().cloned().zip(columns.means.iter().copied()).collect();
-        }
+        let columns = Columns::new(heading, below, &context.means);
+        list.is_sure |= columns.is_sure;
+        let named = columns.headings.iter().cloned().zip(columns.means.iter().copied());
+        list.add_columns(named.collect(), columns.open.clone());
         for row in below {
             // A line of a PDF with other columns than the heading is taken by its form.
-            let read = if is_separated || row.cells.len() == heading.len() {
+            rows.push(if is_separated || row.cells.len() == heading.len() {
                 Row::headed(&columns, row)
             } else {
                 Row::by_form(row.line, &row.cells)
-            };
-            rows.push(if undecided { read.with_undecided_factor() } else { read });
+            });
         }
     }
     rows
@@ -284,10 +347,10 @@ pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (Add
         return (base, None);
     }
     let is_plain = |text: &str| text.len() == 5 && text.bytes().all(|byte| byte.is_ascii_digit());
-    let is_of =
-        |text: &str, of: Option<Table>| of_modicon(text).is_some_and(|(table, _)| of.is_none_or(|of| of == table));
-    // 52000 is no Modicon number, and 16299 none of a holding register.
-    let is_sent = written.iter().any(|(text, of)| is_plain(text) && !is_of(text, *of));
+    let is_of_other =
+        |text: &str, of: Option<Table>| of_modicon(text).is_some_and(|(table, _)| of.is_some_and(|of| of != table));
+    // 16299 is no Modicon number of a holding register. One of no table at all, such as 50001, proves nothing of others.
+    let is_sent = written.iter().any(|(text, of)| is_plain(text) && is_of_other(text, *of));
     // Six digits are too many for what is sent.
     let is_modicon = written.iter().any(|(text, _)| text.len() == 6 && of_modicon(text).is_some());
     match (is_sent, is_modicon) {

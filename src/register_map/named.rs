@@ -1,7 +1,7 @@
 //! What registers are called and how their numbers become values: the one place for names of a unit, wherever they come
 //! from (a device profile, a list from a manual, by hand).
 
-use std::{collections::BTreeMap, time::Duration};
+use std::collections::BTreeMap;
 
 use crate::{
     bus::codec,
@@ -37,7 +37,7 @@ pub struct Named {
     pub unit: String,
     /// `SV`.
     pub name: String,
-    /// `Setpoint`; empty for none.
+    /// `Setpoint`: what it is called at length, where that is not its name; empty for none.
     pub label: String,
     /// Names of the numbers of an enumeration, before scaling; empty for a quantity.
     pub enum_labels: Vec<(i128, String)>,
@@ -60,7 +60,7 @@ pub struct Named {
     /// Where it is written, if not where it is read.
     pub write_at: Option<(Table, u16)>,
     /// How often it is read, where that is said.
-    pub poll: Option<Duration>,
+    pub poll: Option<Poll>,
     /// Where a power of ten stands by which it is multiplied besides.
     pub power_at: Option<u16>,
     /// The line of the file that it comes from; 0 for none.
@@ -140,7 +140,7 @@ impl Named {
             write_fc: self.write_fc,
             write_at: self.write_at,
             read_modify_write: self.access != Access::Read && self.point().part().is_some(),
-            poll: self.poll.map_or(plain.poll, Poll::Every),
+            poll: self.poll.unwrap_or(plain.poll),
             ..plain
         }
     }

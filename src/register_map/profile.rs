@@ -5,7 +5,10 @@ use std::{
     fmt::Write,
 };
 
-use super::{list::List, named::Named};
+use super::{
+    list::{List, words::poll_text},
+    named::Named,
+};
 use crate::{
     plant::tag::{Access, TagDef},
     profile::{
@@ -110,7 +113,7 @@ fn row(named: &Named, taken: &mut BTreeSet<String>) -> Row {
     let table = format!("{plain}_{}_{}", named.table.word(), named.address);
     let numbered = (2..).map(|n| format!("{plain}_{n}"));
     let mut names = [Some(plain.clone()), Some(place), bit, Some(table)].into_iter().flatten().chain(numbered);
-    let short = names.find(|name| taken.insert(name.clone())).unwrap_or(plain);
+    let short = names.find(|name| taken.insert(name.clone())).expect("the numbers do not end");
     Row { tag: named.tag(&short), named: named.clone(), is_bare: false }
 }
 
@@ -138,7 +141,7 @@ fn text(list: &List, rows: &[Row], name: &str, source: &str) -> (String, Vec<usi
     let mut line = out.matches('\n').count();
     for Row { named, tag, .. } in rows {
         let mut keys = tag_keys(tag);
-        keys.extend(named.poll.map(|period| format!("poll = \"{}s\"", period.as_secs())));
+        keys.extend(named.poll.map(|poll| format!("poll = \"{}\"", poll_text(poll))));
         if let Some(power) = named.power_at.and_then(|at| powers.get(&(named.table, at))) {
             keys.retain(|key| !key.starts_with("decimals = "));
             keys.push(format!("scale_from = {}", quoted(power)));

@@ -85,3 +85,44 @@ fn an_export_is_imported_again() {
     assert_eq!(code, Some(0), "{said}");
     assert!(fs::read_to_string(folder.path().join("m.toml")).unwrap().contains("name = \"V.L1\""));
 }
+
+#[test]
+fn a_column_that_may_mean_two_things_is_asked_about() {
+    let folder = folder();
+    let list = b"address;name;type;Ratio\n5;a;int16;10\n6;b;int16;1\n";
+    let import = ["profile", "import", "-"];
+    let (code, said) = run(folder.path(), &import, list);
+    let words =
+        "Ratio (10): factor / divisor? --column \"Ratio=factor\", --column \"Ratio=divisor\", --column \"Ratio=none\"";
+    assert!(code == Some(2) && said.contains(words), "{said}");
+    let (code, said) = run(folder.path(), &[&import[..], &["--column", "Rate=factor"]].concat(), list);
+    assert!(code == Some(2) && said.contains("no column `Rate`: it has address, name, type, Ratio"), "{said}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    let (code, said) = run(folder.path(), &[&import[..], &["--column", "Ratio=divisor"]].concat(), list);
+    assert!(code == Some(0) && said.contains("assumed: plain numbers are addresses as sent"), "{said}");
+    let text = fs::read_to_string(folder.path().join("imported.toml")).unwrap();
+    assert!(text.contains("scale = 0.1"), "{text}");
+    let (code, said) = run(folder.path(), &[&import[..], &["--force", "--column", "Ratio=none"]].concat(), list);
+    assert!(code == Some(0) && said.contains("not kept: `Ratio` of 2 rows, first in line 2"), "{said}");
+}
+
+#[test]
+fn what_is_written_is_two_files_and_neither_is_a_pipe() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let args = ["profile", "import", "-", "--output", "a.toml", "--plant", "./a.toml", "--force"];
+    let (code, said) = run(folder.path(), &args, LIST.as_bytes());
+    assert!(code == Some(2) && said.contains("the profile and the plant file"), "{said}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    let mode = rustix::fs::Mode::from_raw_mode(0o600);
+    rustix::fs::mknodat(rustix::fs::CWD, at("pipe.toml"), rustix::fs::FileType::Fifo, mode, 0).unwrap();
+    let (code, said) =
+        run(folder.path(), &["profile", "import", "-", "--output", "pipe.toml", "--force"], LIST.as_bytes());
+    assert!(code == Some(1) && said.contains("not a regular file"), "{said}");
+    let (code, said) = run(folder.path(), &["profile", "import", "pipe.toml", "--output", "b.toml"], b"");
+    assert!(code == Some(1) && said.contains("not a regular file"), "{said}");
+    fs::write(at("file"), "").unwrap();
+    let args = ["profile", "import", "-", "--output", "c.toml", "--plant", "file/p.toml"];
+    let (code, said) = run(folder.path(), &args, LIST.as_bytes());
+    assert!(code == Some(1) && !at("c.toml").exists(), "nothing is left half done: {said}");
+}

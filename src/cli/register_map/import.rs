@@ -9,6 +9,7 @@ use crate::{
     cli::{CliError, say},
     plant::{
         address::{AddressBase, of_modicon},
+        keyword::Keyword,
         live::ReplyTimes,
         tag::{ByteOrder, Table},
     },
@@ -19,7 +20,7 @@ use crate::{
     },
     register_map::{
         self, BYTES_MAX, Format,
-        list::{List, ListContext, Unclear},
+        list::{Column, List, ListContext, Question, Unclear},
         profile::{self, Written},
     },
 };
@@ -48,9 +49,12 @@ pub struct Args {
     /// How plain numbers count: modicon (40001 is the first), 0 (as sent), 1 (from 1) [default: as the file shows; else it is asked]
     #[arg(long, value_parser = base_of)]
     base: Option<AddressBase>,
-    /// Byte order of the rows that name none: ABCD, CDAB, BADC, DCBA
-    #[arg(long, default_value = "ABCD", value_parser = super::words::<ByteOrder>)]
-    order: ByteOrder,
+    /// Byte order of the rows that name none: ABCD, CDAB, BADC, DCBA [default: ABCD; of a list of NIBE CDAB]
+    #[arg(long, value_parser = super::words::<ByteOrder>)]
+    order: Option<ByteOrder>,
+    /// What a column of a list means, such as `Ratio=divisor`; `none`: it is not used. May be given several times
+    #[arg(long, value_name = "HEADING=MEANING", value_parser = meaning_of)]
+    column: Vec<(String, Option<Column>)>,
     /// The unit whose rows are taken, in a file of several [default: the first]
     #[arg(long, short)]
     unit: Option<u8>,
@@ -63,6 +67,13 @@ pub struct Args {
     /// Overwrite existing files
     #[arg(long)]
     force: bool,
+}
+
+fn meaning_of(text: &str) -> Result<(String, Option<Column>), String> {
+    let (heading, word) = text.rsplit_once('=').ok_or("expected HEADING=MEANING")?;
+    let means = if word == "none" { Some(None) } else { Column::from_word(word).map(Some) };
+    let words = Column::ALL.map(Column::word).join(", ");
+    means.map(|means| (heading.to_owned(), means)).ok_or_else(|| format!("expected none, or one of: {words}"))
 }
 
 fn base_of(text: &str) -> Result<AddressBase, String> {
@@ -87,7 +98,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
         unit: args.unit,
         start: args.start,
         variant: args.variant,
-        ..ListContext::default()
+        means: args.column.iter().cloned().collect(),
     };
     let list = register_map::read(&bytes, &context);
     if let Some(why) = &list.refused {
@@ -97,17 +108,37 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     let path = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}.toml")));
     let name = name_of(&path);
     check_free(&path, args)?;
-    args.plant.as_ref().map_or(Ok(()), |plant| check_free(plant, args))?;
+    if let Some(plant) = &args.plant {
+        check_free(plant, args)?;
+        if is_same_file(&path, plant) {
+            return Err(CliError::Usage(format!("{} would be the profile and the plant file", plant.display())));
+        }
+    }
     if let Some(unclear) = &list.unclear {
         return Err(CliError::Usage(format!("{title}: {}", two_readings(unclear))));
+    }
+    let known = |heading: &str| list.columns.iter().any(|(known, _)| known.to_lowercase() == heading.to_lowercase());
+    if let Some((heading, _)) = args.column.iter().find(|(heading, _)| !known(heading)) {
+        let all: Vec<&str> = list.columns.iter().map(|(heading, _)| heading.as_str()).collect();
+        return Err(CliError::Usage(format!("{title}: no column `{heading}`: it has {}", all.join(", "))));
+    }
+    if !list.questions.is_empty() {
+        let all: Vec<String> = list.questions.iter().map(question).collect();
+        return Err(CliError::Usage(format!("{title}: say what a column means:\n  {}", all.join("\n  "))));
     }
     let written = profile::written(&list, &name, &title);
     say_rows(&title, &list, written.as_ref().ok());
     let written = written.map_err(|why| CliError::Usage(format!("{title}: nothing of it can be taken: {why}")))?;
     let text = with_plant(args, &list, &name, &written)?;
+    let was_there = path.exists();
     write(&path, written.text.as_bytes(), args.force)?;
     if let (Some(plant), Some(text)) = (&args.plant, text) {
-        write(plant, text.as_bytes(), args.force)?;
+        write(plant, text.as_bytes(), args.force).inspect_err(|_| {
+            // What was not there before is not left half done.
+            if !was_there {
+                let _ = std::fs::remove_file(&path);
+            }
+        })?;
     }
     say_next(args, &path, &name, &written);
     Ok(())
@@ -144,6 +175,7 @@ fn check_free(path: &Path, args: &Args) -> Result<(), CliError> {
             path.display()
         )));
     }
+    regular::check(path).map_err(CliError::io(path.display().to_string()))?;
     if path.extension().is_none_or(|extension| extension != "toml") {
         return Err(CliError::Usage(format!(
             "found `{}`, expected the name of a file such as meter.toml",
@@ -151,6 +183,17 @@ fn check_free(path: &Path, args: &Args) -> Result<(), CliError> {
         )));
     }
     Ok(())
+}
+
+/// Would both be one file, by whatever path?
+fn is_same_file(one: &Path, other: &Path) -> bool {
+    let place = |path: &Path| {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        path.canonicalize()
+            .unwrap_or_else(|_| path.file_name().map_or_else(|| path.to_owned(), |name| folder.join(name)))
+    };
+    place(one) == place(other)
 }
 
 fn two_readings(unclear: &Unclear) -> String {
@@ -161,6 +204,13 @@ fn two_readings(unclear: &Unclear) -> String {
         place(unclear.modicon),
         place(unclear.sent)
     )
+}
+
+/// `Ratio (10): factor or divisor? --column "Ratio=factor", …`
+fn question(question: &Question) -> String {
+    let words = question.may_be.iter().map(|column| column.word()).chain(["none"]);
+    let options: Vec<String> = words.map(|word| format!("--column \"{}={word}\"", question.heading)).collect();
+    format!("{} {}", question.words(), options.join(", "))
 }
 
 /// What was taken, each row that was not, and what is lost of others.
@@ -176,9 +226,7 @@ fn say_rows(title: &str, list: &List, written: Option<&Written>) {
     if SAID_MAX < problems.len() {
         say(&format!("  and {} more", problems.len() - SAID_MAX));
     }
-    for (what, (count, line)) in &list.notes {
-        say(&format!("  not kept: `{what}` of {count} rows, first in line {line}"));
-    }
+    list.said_of_rows().for_each(|note| say(&format!("  {note}")));
     if let Some((_, unit)) = list.station {
         say(&format!("  the rows of unit {unit} are taken"));
     }

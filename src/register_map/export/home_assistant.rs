@@ -110,11 +110,17 @@ fn register(tag: &TagDef, keys: &mut Vec<String>) -> Result<(), &'static str> {
     keys.extend((tag.offset != 0.0).then(|| format!("offset: {}", tag.offset)));
     keys.push(format!("precision: {}", decimals(tag)));
     keys.extend((!tag.unit.is_empty()).then(|| format!("unit_of_measurement: {}", quoted(&tag.unit))));
-    keys.extend(tag.bad_if.first().map(|bad| format!("nan_value: {bad}")));
+    keys.extend(whole_bad(tag).next().map(|bad| format!("nan_value: {bad}")));
     Ok(())
 }
 
+/// It takes whole numbers alone for "no value", and by itself what is not a number.
+fn whole_bad(tag: &TagDef) -> impl Iterator<Item = i128> {
+    tag.bad_if.iter().filter_map(|bad| bad.as_whole())
+}
+
 fn lose(tag: &TagDef, exported: &mut Exported) {
+    let is_fraction = tag.bad_if.iter().any(|bad| bad.as_whole().is_none() && !bad.near().is_nan());
     let is_written = tag.writable() && tag.point.table != Table::Coil;
     exported.lose(
         tag,
@@ -122,7 +128,8 @@ fn lose(tag: &TagDef, exported: &mut Exported) {
             (is_written, "writing it"),
             (!tag.enum_labels.is_empty(), "names of its numbers"),
             (!tag.bit_labels.is_empty(), "names of its bits"),
-            (1 < tag.bad_if.len(), "all numbers that are no value but the first"),
+            (1 < whole_bad(tag).count(), "all numbers that are no value but the first"),
+            (is_fraction, "a number that is no value and not whole"),
             (tag.quality_from.is_some(), "its quality from another tag"),
             (tag.unit_from.is_some(), "its unit from another tag"),
         ],

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::{missing, swapped, text_of, unsaid, wrong};
 use crate::{
-    plant::tag::{ByteOrder, DataType, Table},
+    plant::tag::{ByteOrder, DataType, Poll, Table},
     profile::unit_of,
     register_map::{
         container::node::{Node, Tree, Value},
@@ -95,7 +95,7 @@ fn row(list: &mut List, context: &ListContext, hub: usize, section: &str, item: 
     };
     let rows = rows.map_or_else(|why| vec![Err(why)], |rows| rows.into_iter().map(Ok).collect());
     let poll = item.get("scan_interval").and_then(Node::whole).and_then(|seconds| u64::try_from(seconds).ok());
-    let poll = poll.filter(|seconds| (1..=86_400).contains(seconds)).map(Duration::from_secs);
+    let poll = poll.filter(|seconds| (1..=86_400).contains(seconds)).map(Duration::from_secs).map(Poll::Every);
     let taken = list.named.len();
     for named in rows {
         let named = named.map(|named| Named { line: item.line, poll, ..named }).map_err(|why| because(item, &why));

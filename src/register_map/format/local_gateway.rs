@@ -6,7 +6,7 @@ use super::{swapped, text_of, unsaid, wrong};
 use crate::{
     plant::{
         number::to_u8,
-        tag::{Access, ByteOrder, DataType, Table},
+        tag::{Access, ByteOrder, DataType, Poll, Table},
     },
     profile::unit_of,
     register_map::{
@@ -83,7 +83,7 @@ fn entity(table: Table, key: &str, item: &Node) -> Result<Named, String> {
         matches!(table, Table::Holding | Table::Coil) && matches!(control, "number" | "select" | "switch" | "text");
     let access = if is_written { Access::ReadWrite } else { Access::Read };
     let poll = item.opt_whole("scan_interval")?.and_then(|seconds| u64::try_from(seconds).ok());
-    let poll = poll.filter(|seconds| (1..=86_400).contains(seconds)).map(Duration::from_secs);
+    let poll = poll.filter(|seconds| (1..=86_400).contains(seconds)).map(Duration::from_secs).map(Poll::Every);
     let named = Named { access, poll, ..Named::new(table, address, DataType::Bool, ByteOrder::Abcd, name) };
     if table.is_bits() {
         return Ok(named);

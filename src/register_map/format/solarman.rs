@@ -6,7 +6,7 @@ use super::{apart, field_of, missing, unsaid, wrong};
 use crate::{
     plant::{
         data_type::Clock,
-        tag::{Access, ByteOrder, DataType, Table},
+        tag::{Access, ByteOrder, DataType, Poll, Table},
     },
     profile::unit_of,
     register_map::{
@@ -102,7 +102,7 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
             let poll = item.get("update_interval").and_then(Node::whole);
             let poll =
                 poll.and_then(|seconds| u64::try_from(seconds).ok()).filter(|seconds| (1..=86_400).contains(seconds));
-            let poll = poll.map(Duration::from_secs);
+            let poll = poll.map(Duration::from_secs).map(Poll::Every);
             let title = item.word("name").unwrap_or("?");
             let named = named.map(|named| Named { line: item.line, group: name.to_owned(), poll, ..named });
             let named = named.map_err(|why| format!("{title}: {why}"));

@@ -1,5 +1,7 @@
 //! A text becomes rows of cells: at one separator for the whole text where its heading has one, else line by line.
 
+use super::headings::is_heading;
+
 /// Most rows of a list.
 pub const ROWS_MAX: usize = 10_000;
 /// A cell may have several lines; one with more has lost its closing quote.
@@ -16,16 +18,37 @@ pub struct Cells {
     pub is_unclosed: bool,
 }
 
-/// The separator that the rows have in common: tab, semicolon, bar or comma, as in most of its first lines.
+/// The separator that the rows have in common: tab, semicolon, bar or comma; that of a heading, else as in most of its first
+/// lines.
 pub fn separator(text: &str) -> Option<char> {
     let first: Vec<&str> =
         text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).take(20).collect();
-    ['\t', ';', '|', ','].into_iter().find(|separator| {
-        // A single comma may be that of a decimal number.
-        let least = if matches!(separator, ',' | '|') { 2 } else { 1 };
-        let has = first.iter().filter(|line| least <= line.matches(*separator).count()).count();
-        0 < has && first.len() <= 2 * has
+    let all = ['\t', ';', '|', ','];
+    let heads = |separator: char| {
+        let headings = first.iter().filter_map(|line| separated(line, separator).into_iter().next());
+        headings.filter(|row| is_heading(&row.cells)).map(|row| row.cells.len()).max().map(|count| (count, separator))
+    };
+    // Of several the one with most cells; `|` of Markdown and a tab come before what may stand within a cell.
+    let heading = all.into_iter().rev().filter_map(heads).max_by_key(|(count, _)| *count);
+    heading.map(|(_, separator)| separator).or_else(|| {
+        all.into_iter().find(|separator| {
+            // A single comma may be that of a decimal number.
+            let least = if matches!(separator, ',' | '|') { 2 } else { 1 };
+            let has = first.iter().filter(|line| least <= line.matches(*separator).count()).count();
+            0 < has && first.len() <= 2 * has
+        })
     })
+}
+
+/// A cell that a spreadsheet takes for a text, where it would take it for a formula.
+pub fn as_text(cell: String) -> String {
+    let is_formula = cell.starts_with(['=', '+', '-', '@', '\'', '\t']) && cell.parse::<f64>().is_err();
+    if is_formula { format!("'{cell}") } else { cell }
+}
+
+/// What [`as_text`] was given.
+pub fn of_text(cell: &str) -> &str {
+    cell.strip_prefix('\'').filter(|rest| rest.starts_with(['=', '+', '-', '@', '\'', '\t'])).unwrap_or(cell)
 }
 
 /// The rows of a text with what separates its cells; blank rows and those of Markdown's rule are left out.
@@ -37,11 +60,16 @@ pub fn rows(text: &str, separator: Option<char>) -> Vec<Cells> {
     without_rules(all)
 }
 
-/// The same rows without those that only draw a line, are blank or a comment.
+/// The same rows without those that only draw a line, are blank or a comment. A `#` may also head a column of numbers.
 pub fn without_rules(all: Vec<Cells>) -> Vec<Cells> {
     let is_rule = |cells: &[String]| cells.iter().all(|cell| cell.chars().all(|sign| "-: ".contains(sign)));
-    let is_comment = |cells: &[String]| cells.first().is_some_and(|cell| cell.starts_with('#'));
-    all.into_iter().filter(|row| !is_rule(&row.cells) && !is_comment(&row.cells)).take(ROWS_MAX).collect()
+    let is_marked = |row: &Cells| row.cells.first().is_some_and(|cell| cell.starts_with('#'));
+    let is_bare = |row: &Cells| row.cells.first().is_some_and(|cell| cell == "#");
+    let is_numbered = all.iter().any(|row| is_bare(row) && is_heading(&row.cells));
+    // `#address;name` heads the rows, unless another row does.
+    let is_only = !all.iter().any(|row| !is_marked(row) && is_heading(&row.cells));
+    let is_comment = |row: &Cells| is_marked(row) && !is_numbered && !(is_only && is_heading(&row.cells));
+    all.into_iter().filter(|row| !is_rule(&row.cells) && !is_comment(row)).take(ROWS_MAX).collect()
 }
 
 fn row(line: usize, cells: Vec<String>) -> Cells {
@@ -74,7 +102,7 @@ fn separated(text: &str, separator: char) -> Vec<Cells> {
 }
 
 fn one_line(cell: &str) -> String {
-    cell.split_whitespace().collect::<Vec<_>>().join(" ")
+    cell.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 /// The cells of a line of a PDF: at two blanks, else at every blank; or at what separates them in this line alone.

@@ -1,205 +1,44 @@
 //! What the columns of a list mean: by their heading, if what stands in them agrees, else by what stands in them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+pub use super::headings::{Column, is_heading};
 use super::{
     cells::Cells,
-    words::{bad_of, field_of, is_sized_type, kind_of, labels_of, number_of, table_of, type_of},
+    headings::{self, Heading},
+    questions::{self, Question},
+    words::{
+        bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, table_of, type_of,
+        width_of, yes_or_no,
+    },
 };
 use crate::plant::{
     address::{AddressBase, AddressContext},
     tag::Table,
 };
 
-/// What a column holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Column {
-    /// Of the first register.
-    Address,
-    /// What it is called.
-    Name,
-    /// Type of the raw value.
-    Type,
-    /// Registers.
-    Length,
-    /// It multiplies.
-    Scale,
-    /// It divides.
-    Divisor,
-    /// Of ten.
-    Exponent,
-    /// Added after scaling.
-    Offset,
-    /// `°C`.
-    Unit,
-    /// One of the four.
-    Table,
-    /// Of bytes and words.
-    Order,
-    /// Unit address.
-    Device,
-    /// More than a scale and an offset.
-    Formula,
-    /// `r`, `rw`, `w`.
-    Access,
-    /// Least value that may be written.
-    Min,
-    /// The greatest.
-    Max,
-    /// Decimals to show.
-    Decimals,
-    /// `0=off; 1=on`: names of numbers.
-    Labels,
-    /// The same of bits.
-    Bits,
-    /// `5-4`, `3`: bits of a register.
-    Field,
-    /// Raw numbers that mean "no value".
-    Bad,
-    /// What it belongs to.
-    Group,
-}
-
-impl Column {
-    /// In the order in which a key offers them.
-    pub const ALL: [Column; 22] = [
-        Column::Address,
-        Column::Name,
-        Column::Type,
-        Column::Length,
-        Column::Scale,
-        Column::Divisor,
-        Column::Exponent,
-        Column::Offset,
-        Column::Unit,
-        Column::Table,
-        Column::Order,
-        Column::Device,
-        Column::Formula,
-        Column::Access,
-        Column::Min,
-        Column::Max,
-        Column::Decimals,
-        Column::Labels,
-        Column::Bits,
-        Column::Field,
-        Column::Bad,
-        Column::Group,
-    ];
-
-    /// On the screen.
-    pub fn label(self) -> &'static str {
-        match self {
-            Column::Address => "address",
-            Column::Name => "name",
-            Column::Type => "type",
-            Column::Length => "registers",
-            Column::Scale => "factor",
-            Column::Divisor => "divisor",
-            Column::Exponent => "power of ten",
-            Column::Offset => "offset",
-            Column::Unit => "unit",
-            Column::Table => "table",
-            Column::Order => "byte order",
-            Column::Device => "unit address",
-            Column::Formula => "formula",
-            Column::Access => "access",
-            Column::Min => "least",
-            Column::Max => "greatest",
-            Column::Decimals => "decimals",
-            Column::Labels => "names of numbers",
-            Column::Bits => "names of bits",
-            Column::Field => "bits",
-            Column::Bad => "no value",
-            Column::Group => "group",
-        }
-    }
-}
-
-/// Words of headings, in small letters. Of several columns that a heading can be, the first that fits what is in it counts.
-#[rustfmt::skip]
-const HEADINGS: [(Column, &[&str]); 13] = [
-    (Column::Divisor, &["divisor", "divide", "divider", "division", "div"]),
-    (Column::Exponent, &["sf", "exponent"]),
-    (Column::Scale, &["scale", "scaling", "factor", "multiplier", "multiply", "gain", "resolution", "coefficient", "sf"]),
-    (Column::Order, &["order", "endian", "endianness", "swap"]),
-    (Column::Device, &["deviceid", "slave", "slaveid", "station", "unit"]),
-    (Column::Unit, &["unit", "units", "uom", "dimension"]),
-    (Column::Type, &["type", "format", "datatype", "encoding", "size"]),
-    (Column::Table, &["table", "function", "area", "fc", "type"]),
-    (Column::Length, &["len", "length", "size", "count", "quantity", "qty", "words", "registers"]),
-    (Column::Formula, &["formula", "expression"]),
-    (Column::Offset, &["offset"]),
-    (Column::Address, &["address", "addr", "addr.", "register", "reg", "reg.", "modicon", "pdu", "wire", "hex", "dec"]),
-    (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function"]),
-];
-/// Headings that are this word and no more: as the export writes them.
-const EXACT: [(Column, &str); 9] = [
-    (Column::Access, "access"),
-    (Column::Min, "min"),
-    (Column::Max, "max"),
-    (Column::Decimals, "decimals"),
-    (Column::Labels, "enum"),
-    (Column::Bits, "bits"),
-    (Column::Field, "field"),
-    (Column::Bad, "bad if"),
-    (Column::Group, "group"),
-];
-/// A heading with one of these alone is no column of addresses: tables of codes have them too.
-const WEAK: [&str; 2] = ["hex", "dec"];
+/// What readers have said about columns, by heading; `None`: it is not used.
+pub type Said = BTreeMap<String, Option<Column>>;
 
 /// The columns of some rows below one heading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
-    /// As they are called.
+    /// As they are called, each another name.
     pub headings: Vec<String>,
     /// What each means; `None`: nothing that is taken.
     pub means: Vec<Option<Column>>,
-    /// The list says itself that its factors multiply.
+    /// Those of which it is not known what they mean.
+    pub open: Vec<Question>,
+    /// Columns of addresses such as `4x0001`, in which `0x` is no mark of hexadecimal digits.
+    areas: BTreeSet<usize>,
+    /// It is a list of a known program: nothing is guessed.
     pub is_sure: bool,
-}
-
-/// Words of a heading in small letters.
-fn words(heading: &str) -> Vec<String> {
-    let heading = heading.to_lowercase();
-    heading
-        .split(|c: char| !c.is_alphanumeric() && c != '.')
-        .filter(|word| !word.is_empty())
-        .map(str::to_owned)
-        .collect()
-}
-
-fn candidates(heading: &str) -> Vec<Column> {
-    let words = words(heading);
-    let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
-    HEADINGS.iter().filter(|(_, known)| has(known)).map(|(column, _)| *column).collect()
-}
-
-/// Is it a heading: with an address and one more, and no number?
-pub fn is_heading(cells: &[String]) -> bool {
-    let all: Vec<Vec<Column>> = cells.iter().map(|cell| candidates(cell)).collect();
-    let known = all.iter().filter(|columns| !columns.is_empty()).count();
-    let is_strong = |cell: &String| {
-        let words = words(cell);
-        let is_weak =
-            words.iter().all(|word| !HEADINGS[11].1.contains(&word.as_str()) || WEAK.contains(&word.as_str()));
-        candidates(cell).contains(&Column::Address) && !is_weak
-    };
-    cells.iter().any(is_strong) && 2 <= known && !cells.iter().any(|cell| is_address(cell))
 }
 
 /// Is it an address in any reading?
 pub fn is_address(cell: &str) -> bool {
     let any = AddressContext { table: Table::Holding, is_stated: false, base: AddressBase::Modicon };
     any.parse(first_of(cell)).is_some()
-}
-
-/// A cell as an address: below `hex` digits are hexadecimal, with or without a mark.
-pub fn address_in(heading: &str, cell: &str) -> String {
-    let words = words(heading);
-    let has = |word: &str| words.iter().any(|one| one == word);
-    let is_bare = !cell.is_empty() && cell.bytes().all(|byte| byte.is_ascii_hexdigit());
-    if has("hex") && !has("dec") && is_bare { format!("0x{cell}") } else { cell.to_owned() }
 }
 
 /// Of `41003-41004` the first.
@@ -212,104 +51,213 @@ pub fn first_of(cell: &str) -> &str {
     }
 }
 
+/// Hexadecimal digits without a mark.
+fn is_bare_hex(cell: &str) -> bool {
+    !cell.is_empty() && cell.len() <= 4 && cell.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
 impl Columns {
-    /// What the columns of a heading mean, by what stands in the rows below it.
-    pub fn new(heading: &[String], rows: &[Cells]) -> Columns {
+    /// What the columns of a heading mean, by what stands in the rows below it and what its reader has said.
+    pub fn new(heading: &[String], rows: &[Cells], said: &Said) -> Columns {
+        let headings = distinct(heading);
+        let is_own = headings::is_own(heading);
         let is_iobroker = heading.first().is_some_and(|cell| cell == "_address");
-        let mut means: Vec<Option<Column>> = Vec::new();
-        for (n, heading) in heading.iter().enumerate() {
-            let cells: Vec<&str> = rows.iter().filter_map(|row| row.cells.get(n)).map(String::as_str).collect();
-            let cells: Vec<&str> = cells.into_iter().filter(|cell| !matches!(*cell, "" | "-" | "–")).collect();
-            means.push(meaning(heading, &cells));
+        let cells: Vec<Vec<&str>> = (0..heading.len()).map(|n| filled(rows, n)).collect();
+        let guess = |n: usize| if is_own { Heading::exact(&heading[n]) } else { meaning(&heading[n], &cells[n]) };
+        let mut means: Vec<Option<Column>> = (0..heading.len()).map(guess).collect();
+        if !is_own && !is_iobroker {
+            count_bytes(&mut means, rows);
         }
-        Columns { headings: heading.to_vec(), means, is_sure: is_iobroker }
+        let said: Vec<Option<Option<Column>>> = headings.iter().map(|heading| said_of(said, heading)).collect();
+        means.iter_mut().zip(&said).for_each(|(means, said)| *means = said.unwrap_or(*means));
+        let is_of_areas =
+            |n: &usize| means[*n] == Some(Column::Address) && cells[*n].iter().any(|cell| is_in_area(cell));
+        let areas = (0..means.len()).filter(is_of_areas).collect();
+        let mut columns = Columns { headings, means, open: Vec::new(), areas, is_sure: is_own || is_iobroker };
+        if !columns.is_sure {
+            columns.open = questions::of(&mut columns.means, &columns.headings, &cells, |n| said[n].is_some());
+        }
+        columns
     }
 
     /// The places of the columns of a meaning; those of an address with the surest first.
     pub fn places(&self, column: Column) -> Vec<usize> {
-        let mut places: Vec<usize> = (0..self.means.len()).filter(|n| self.means[*n] == Some(column)).collect();
+        let of = |n: &usize| match self.means[*n] {
+            Some(Column::HexAddress) => column == Column::Address,
+            means => means == Some(column),
+        };
+        let mut places: Vec<usize> = (0..self.means.len()).filter(of).collect();
         let rank = |n: &usize| {
-            let words = words(&self.headings[*n]);
-            let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+            let heading = Heading::new(&self.headings[*n]);
             if column == Column::Name {
-                return usize::from(has(&["description", "meaning"]));
+                return usize::from(heading.has(&["description", "meaning", "beschreibung", "bedeutung", "kommentar"]));
             }
-            let is_sent = has(&["pdu", "protocol", "wire", "hex"]);
-            [is_sent, has(&["address", "addr", "addr."])].iter().position(|is| *is).unwrap_or(2)
+            let is_sent = heading.has(&["pdu", "protocol", "wire", "hex"]);
+            [is_sent, heading.has(&["address", "addr", "addr.", "adresse"])].iter().position(|is| *is).unwrap_or(2)
         };
         places.sort_by_key(rank);
         places
     }
+
+    /// The cell of a column of addresses, and how it counts where its heading says that.
+    pub fn address(&self, place: usize, cell: &str) -> (String, Option<AddressBase>) {
+        let base = self.headings.get(place).and_then(|heading| Heading::new(heading).base());
+        if self.means[place] == Some(Column::HexAddress) && is_bare_hex(cell) {
+            return (format!("0x{cell}"), base);
+        }
+        let of_coil = cell
+            .strip_prefix(['0'])
+            .and_then(|rest| rest.strip_prefix(['x', 'X'])?.parse::<u16>().ok()?.checked_sub(1));
+        match of_coil.filter(|_| self.areas.contains(&place)) {
+            Some(address) => (format!("coil:{address}"), base),
+            None => (cell.to_owned(), base),
+        }
+    }
 }
 
-impl Columns {
-    /// Whole numbers around 0 as factors are powers of ten as well, unless the list or its reader says which.
-    pub fn undecided_factor(&self, rows: &[Cells], said: &BTreeMap<usize, Option<Column>>) -> bool {
-        let is_open = |place: &usize| !self.is_sure && !said.contains_key(place);
-        self.places(Column::Scale).iter().filter(|place| is_open(place)).any(|place| {
-            let cells = rows.iter().filter_map(|row| row.cells.get(*place)).filter(|cell| !cell.is_empty());
-            let numbers: Option<Vec<i8>> = cells.map(|cell| cell.parse().ok()).collect();
-            numbers.is_some_and(|numbers| numbers.iter().any(|number| *number <= 0))
-        })
+/// Lengths that fit the types of their rows as bytes, and none as registers, are bytes.
+fn count_bytes(means: &mut [Option<Column>], rows: &[Cells]) {
+    let at = |column: Column| means.iter().position(|means| *means == Some(column));
+    let (Some(kind), Some(length)) = (at(Column::Type), at(Column::Length)) else { return };
+    let sized = rows.iter().filter_map(|row| {
+        let kind = row.cells.get(kind).filter(|cell| is_sized_type(cell)).and_then(|cell| type_of(cell, None).ok())?;
+        Some((kind.0.registers(), row.cells.get(length)?.parse::<u16>().ok()?))
+    });
+    let sized: Vec<(u16, u16)> = sized.collect();
+    if !sized.is_empty() && sized.iter().all(|(registers, length)| 2 * registers == *length) {
+        means[length] = Some(Column::Bytes);
     }
+}
+
+/// What is said of a heading.
+fn said_of(said: &Said, heading: &str) -> Option<Option<Column>> {
+    let same = |(known, _): &(&String, &Option<Column>)| known.to_lowercase() == heading.to_lowercase();
+    said.get(heading).or_else(|| said.iter().find(same).map(|(_, means)| means)).copied()
+}
+
+/// `4x0001`, which is no hexadecimal number.
+fn is_in_area(cell: &str) -> bool {
+    let mut signs = cell.chars();
+    matches!((signs.next(), signs.next()), (Some('1' | '3' | '4'), Some('x' | 'X')))
+}
+
+/// Names of columns that are not the same twice.
+fn distinct(heading: &[String]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for (n, heading) in heading.iter().enumerate() {
+        let plain = if heading.is_empty() { format!("({})", n + 1) } else { heading.clone() };
+        let name = if names.contains(&plain) { format!("{plain} ({})", n + 1) } else { plain };
+        names.push(name);
+    }
+    names
+}
+
+/// What stands in a column, but for what only says that nothing does.
+fn filled(rows: &[Cells], n: usize) -> Vec<&str> {
+    let cells = rows.iter().filter_map(|row| row.cells.get(n)).map(String::as_str);
+    cells.filter(|cell| !matches!(*cell, "" | "-" | "–")).collect()
+}
+
+/// How many of a hundred cells fit.
+pub fn share(cells: &[&str], fits: impl Fn(&str) -> bool) -> usize {
+    if cells.is_empty() { 100 } else { 100 * cells.iter().filter(|cell| fits(cell)).count() / cells.len() }
 }
 
 /// What a column means: of what its heading can be, the first that what is in it can be too.
 fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
-    let share = |fits: &dyn Fn(&str) -> bool| {
-        let count = cells.iter().filter(|cell| fits(cell)).count();
-        if cells.is_empty() { 100 } else { 100 * count / cells.len() }
-    };
     // A type with its size stands in no other column, whatever that is called.
-    if !cells.is_empty() && 80 <= share(&is_sized_type) {
+    if !cells.is_empty() && 80 <= share(cells, is_sized_type) {
         return Some(Column::Type);
     }
-    let exact = EXACT.iter().find(|(_, word)| heading.trim().eq_ignore_ascii_case(word)).map(|(column, _)| *column);
-    let is_number = |cell: &str| number_of(cell).is_some();
-    let fits_exactly = match exact {
-        Some(Column::Access) => 100 == share(&|cell| matches!(cell, "r" | "rw" | "w")),
-        Some(Column::Min | Column::Max | Column::Decimals) => 100 == share(&is_number),
-        Some(Column::Labels | Column::Bits) => 100 == share(&|cell| labels_of(cell).is_some()),
-        Some(Column::Field) => 100 == share(&|cell| field_of(cell).is_some()),
-        Some(Column::Bad) => 100 == share(&|cell| bad_of(cell).is_some()),
-        Some(_) => true,
-        None => false,
-    };
-    if fits_exactly {
-        return exact;
+    // A cell that does not fit leaves out its row, not the column.
+    if let Some(exact) = Heading::exact(heading).filter(|exact| 50 <= share(cells, |cell| fits_exactly(*exact, cell))) {
+        return Some(exact);
     }
-    let is_whole = |cell: &str| cell.parse::<u32>().is_ok();
-    let fits = |column: Column| match column {
-        Column::Address => 40 <= share(&|cell| is_address(&address_in(heading, cell))),
-        Column::Type => {
-            1 <= share(&|cell| kind_of(cell).is_some() || type_of(cell, Some(1)).is_ok() || is_sized_type(cell))
+    let words = Heading::new(heading);
+    let candidates = words.candidates();
+    if let Some(column) = candidates.iter().copied().find(|column| fits(*column, &words, cells)) {
+        // What is more than 1 as a gain is what a maker has multiplied by.
+        let is_gain = column == Column::Scale && words.has(&["gain"]);
+        let is_above =
+            !cells.is_empty() && 100 == share(cells, |cell| number_of(cell).is_some_and(|number| 1.0 <= number));
+        let is_hex = column == Column::Address && is_of_hex(&words, cells);
+        let is_of_bytes = column == Column::Length && words.has(&["bytes"]);
+        let found = match (is_gain && is_above, is_hex, is_of_bytes) {
+            (true, _, _) => Column::Divisor,
+            (_, true, _) => Column::HexAddress,
+            (_, _, true) => Column::Bytes,
+            (false, false, false) => column,
+        };
+        return Some(found);
+    }
+    // A column of types that are all unknown says so row by row; without it each would be taken for a whole number.
+    candidates.into_iter().find(|column| *column == Column::Type && !words.has(&["size", "signed", "sign", "typ"]))
+}
+
+/// Does a cell fit below the heading of an export?
+fn fits_exactly(exact: Column, cell: &str) -> bool {
+    if matches!(exact, Column::Min | Column::Max | Column::Decimals) {
+        return number_of(cell).is_some();
+    }
+    if matches!(exact, Column::Labels | Column::Bits) {
+        return labels_of(cell).is_some();
+    }
+    exact == Column::Access && matches!(cell, "r" | "rw" | "w")
+        || exact == Column::Field && field_of(cell).is_some()
+        || exact == Column::Bad && bad_of(cell).is_some()
+        || exact == Column::Group
+}
+
+/// Can what is in it be of a meaning that its heading has?
+fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
+    match column {
+        Column::Address => {
+            let is_bare = is_of_hex(heading, cells);
+            40 <= share(cells, |cell| is_address(cell) || is_bare && is_bare_hex(cell))
         }
-        Column::Table => 60 <= share(&|cell| table_of(cell).is_some()),
-        Column::Device => 80 <= share(&|cell| cell.parse::<u8>().is_ok()) && !cells.is_empty(),
-        Column::Length => 60 <= share(&is_whole),
-        Column::Offset => 60 <= share(&|cell| number_of(cell).is_some()) && !is_rising(cells),
-        Column::Exponent => 60 <= share(&|cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number))),
-        Column::Name => true,
-        Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
-        Column::Access
+        Column::Type => 1 <= share(cells, |cell| kind_of(cell).is_some() || type_of(cell, Some(1)).is_ok()),
+        Column::Signed => !cells.is_empty() && 60 <= share(cells, |cell| yes_or_no(cell).is_some()),
+        Column::Table => 60 <= share(cells, |cell| table_of(cell).is_some()),
+        Column::Device => 80 <= share(cells, |cell| cell.parse::<u8>().is_ok()) && !cells.is_empty(),
+        Column::Width => {
+            80 <= share(cells, |cell| width_of(cell).is_some()) && cells.iter().any(|cell| width_of(cell) == Some(16))
+        }
+        Column::Field => !cells.is_empty() && 60 <= share(cells, |cell| bit_field_of(cell).is_some()),
+        Column::Length => 60 <= share(cells, |cell| length_of(cell, false).is_some()),
+        Column::Offset => 60 <= share(cells, |cell| number_of(cell).is_some()) && !is_rising(cells),
+        Column::Exponent => {
+            60 <= share(cells, |cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number)))
+        }
+        Column::Name | Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
+        Column::HexAddress
+        | Column::Bytes
+        | Column::Places
+        | Column::Area
+        | Column::Access
         | Column::Min
         | Column::Max
         | Column::Decimals
         | Column::Labels
         | Column::Bits
-        | Column::Field
         | Column::Bad
-        | Column::Group => false,
-    };
-    let candidates = candidates(heading);
-    if let Some(column) = candidates.iter().copied().find(|column| fits(*column)) {
-        // What is more than 1 as a gain is what a maker has multiplied by.
-        let is_gain = column == Column::Scale && words(heading).iter().any(|word| word == "gain");
-        let is_above = !cells.is_empty() && 100 == share(&|cell| number_of(cell).is_some_and(|number| 1.0 <= number));
-        return Some(if is_gain && is_above { Column::Divisor } else { column });
+        | Column::Group
+        | Column::Label
+        | Column::WriteAt
+        | Column::WriteWith
+        | Column::Poll => false,
     }
-    // A column of types that are all unknown says so row by row; without it each would be taken for a whole number.
-    candidates.into_iter().find(|column| *column == Column::Type && words(heading).iter().any(|word| word != "size"))
+}
+
+/// Do the digits of a column of addresses without a mark count as hexadecimal? One with a letter proves it of all.
+fn is_of_hex(heading: &Heading, cells: &[&str]) -> bool {
+    if heading.has(&["hex"]) {
+        return !heading.has(&["dec"]);
+    }
+    let with_letter = |cell: &&&str| cell.bytes().any(|byte| byte.is_ascii_alphabetic());
+    let bare: Vec<&&str> = cells.iter().filter(|cell| is_bare_hex(cell)).collect();
+    // `F1` may be the name of a parameter.
+    let is_number = |cell: &&str| cell.starts_with(|sign: char| sign.is_ascii_digit());
+    !heading.has(&["dec"]) && bare.iter().any(|cell| with_letter(&cell) && is_number(cell))
 }
 
 /// Does it rise from row to row? Then it counts registers.
@@ -326,7 +274,7 @@ mod tests {
         let rows = super::super::cells::rows(text, Some(';'));
         let (heading, rows) = rows.split_first().expect("a heading");
         assert!(is_heading(&heading.cells), "{text}");
-        assert_eq!(Columns::new(&heading.cells, rows).means, expect, "{text}");
+        assert_eq!(Columns::new(&heading.cells, rows, &Said::new()).means, expect, "{text}");
     }
 
     #[test]
@@ -346,5 +294,16 @@ mod tests {
         );
         check("Register;Gain;Quantity\n1;10;2\n", &[Some(Address), Some(Divisor), Some(Length)]);
         check("Register;Gain;Offset\n1;0.1;-5\n", &[Some(Address), Some(Scale), Some(Offset)]);
+        check(
+            "Registeradresse;Bezeichnung;Datentyp;Einheit;Skalierung\n1;Vorlauf;INT16;°C;0,1\n",
+            &[Some(Address), Some(Name), Some(Type), Some(Unit), Some(Scale)],
+        );
+        check("Adresse;Name;Typ;Faktor\n1;a;int;0,1\n", &[Some(Address), Some(Name), Some(Type), Some(Scale)]);
+        check("Address;Bit;Name\n1;0;a\n1;15;b\n", &[Some(Address), Some(Field), Some(Name)]);
+        check(
+            "Address;Bits;Name;Signed\n1;16;a;yes\n3;32;b;no\n",
+            &[Some(Address), Some(Width), Some(Name), Some(Signed)],
+        );
+        check("Address;Name\n0A;a\n1F;b\n10;c\n", &[Some(HexAddress), Some(Name)]);
     }
 }

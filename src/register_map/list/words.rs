@@ -1,12 +1,26 @@
 //! The words of a cell: types with their byte order, tables, factors.
 
 use crate::{
-    plant::tag::{ByteOrder, DataType, Table},
+    plant::{
+        address::TABLES,
+        exact::Exact,
+        number::to_f32,
+        tag::{ByteOrder, DataType, Point, Poll, Table},
+    },
+    profile::{duration_of, is_known_unit, unit_of},
     t,
 };
 
-/// `0.1`, `0,1`, `x0.1`, `/10`, `÷10`, `1/10`, `10^-1`.
+/// `0.1`, `0,1`, `x0.1`, `/10`, `÷10`, `1/10`, `10^-1`; `None` for `1,000`, which is one or a thousand.
 pub fn number_of(text: &str) -> Option<f64> {
+    let is_of_thousands = text.split_once(',').is_some_and(|(first, rest)| {
+        let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+        let first = first.trim().trim_start_matches(['-', '+']);
+        rest.trim().len() == 3 && is_digits(rest.trim()) && is_digits(first) && !first.starts_with('0')
+    });
+    if is_of_thousands {
+        return None;
+    }
     let text = text.trim().replace(',', ".");
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
     if let Some(exponent) = text.strip_prefix("10^") {
@@ -19,28 +33,72 @@ pub fn number_of(text: &str) -> Option<f64> {
     number(text.trim_start_matches(['x', 'X', '*', '×']))
 }
 
+/// Does a factor say itself whether it multiplies or divides?
+pub fn is_marked(text: &str) -> bool {
+    text.contains(['x', 'X', '*', '×', '/', '÷', ':', '^'])
+}
+
 /// As a person would write it: 0.001, not the nearest to it.
 pub fn power_of_ten(exponent: f64) -> f64 {
     format!("1e{exponent}").parse().unwrap_or(f64::NAN)
 }
 
-/// The table that a word or a function code means.
+/// The table that a word, an area such as `4x` or a function code means; `None` too where it has codes of several.
 pub fn table_of(text: &str) -> Option<Table> {
     let text = text.to_lowercase().replace('_', " ");
     let is = |words: &[&str]| words.iter().any(|word| text.contains(word));
-    let code = text.trim_start_matches("fc").trim();
-    let code = code.split(|sign: char| !sign.is_ascii_digit()).next().unwrap_or_default();
-    match code.trim_start_matches('0') {
-        "1" => Some(Table::Coil),
-        "2" => Some(Table::Discrete),
-        "3" => Some(Table::Holding),
-        "4" => Some(Table::Input),
-        _ if is(&["coil"]) => Some(Table::Coil),
-        _ if is(&["discrete"]) => Some(Table::Discrete),
-        _ if is(&["holding"]) => Some(Table::Holding),
-        _ if is(&["input reg"]) || text == "input" => Some(Table::Input),
+    let words = [
+        (Table::Coil, is(&["coil"])),
+        (Table::Discrete, is(&["discrete"])),
+        (Table::Holding, is(&["holding"])),
+        (Table::Input, is(&["input reg", "inputreg"]) || text == "input" || text == "inputs"),
+    ];
+    let named: Vec<Table> = words.into_iter().filter(|(_, is)| *is).map(|(table, _)| table).collect();
+    match named.as_slice() {
+        [] => area_of(&text).or_else(|| of_codes(&text)),
+        [table] => Some(*table),
         _ => None,
     }
+}
+
+/// `4x`, `4xxxx`, `3X0001`: the digit that the Modicon numbers of a table begin with.
+fn area_of(text: &str) -> Option<Table> {
+    let text = text.trim();
+    let (digit, rest) = text.split_at_checked(1)?;
+    let number = rest.strip_prefix('x')?;
+    let is_shown = number.bytes().all(|byte| byte == b'x')
+        || 4 <= number.len() && number.bytes().all(|byte| byte.is_ascii_digit());
+    area(digit).filter(|_| is_shown)
+}
+
+/// The table of an area digit.
+pub fn area(digit: &str) -> Option<Table> {
+    TABLES.into_iter().find(|table| table.digit().to_string() == digit.trim())
+}
+
+/// `03`, `FC04`, `0x04`, `03/06/16`: the table of all function codes in it.
+fn of_codes(text: &str) -> Option<Table> {
+    let text = text.trim().trim_start_matches("fc").trim();
+    let first = text.split(|sign: char| !sign.is_ascii_alphanumeric()).next()?;
+    let codes = text.split(|sign: char| !sign.is_ascii_alphanumeric()).map(|code| {
+        let code = code.trim_start_matches("fc");
+        match code.strip_prefix("0x") {
+            Some(digits) => u8::from_str_radix(digits, 16).ok(),
+            None => code.parse().ok(),
+        }
+    });
+    let mut found: Vec<Table> = Vec::new();
+    for code in codes.take_while(Option::is_some).flatten() {
+        found.push(match code {
+            1 | 5 | 15 => Table::Coil,
+            2 => Table::Discrete,
+            3 | 6 | 16 | 22 | 23 => Table::Holding,
+            4 => Table::Input,
+            _ => return None,
+        });
+    }
+    let table = *found.first().filter(|_| !first.is_empty())?;
+    found.iter().all(|other| *other == table).then_some(table)
 }
 
 /// The order of four letters.
@@ -139,13 +197,91 @@ pub fn type_of(word: &str, length: Option<u16>) -> Result<(DataType, Option<Byte
     }
 }
 
-/// `0=off; 1=on`.
+/// `2`, `2 registers`, `4 bytes`, `32 bit`: how many registers; a plain number counts bytes where its column does.
+pub fn length_of(cell: &str, is_bytes: bool) -> Option<u16> {
+    let cell = cell.trim().to_lowercase();
+    let digits = cell.len() - cell.trim_start_matches(|sign: char| sign.is_ascii_digit()).len();
+    let (number, word) = cell.split_at(digits);
+    let number: u16 = number.parse().ok()?;
+    let of_bytes = || if number == 1 { Some(1) } else { Some(number / 2).filter(|_| number % 2 == 0) };
+    match word.trim() {
+        "" if is_bytes => of_bytes(),
+        "" | "register" | "registers" | "reg" | "regs" | "word" | "words" | "wort" | "wörter" => Some(number),
+        "byte" | "bytes" => of_bytes(),
+        "bit" | "bits" => width_of(&cell).map(|bits| bits.div_ceil(16)),
+        _ => None,
+    }
+}
+
+/// `16`, `32 bit`: how many bits a number has.
+pub fn width_of(cell: &str) -> Option<u16> {
+    let cell = cell.trim().to_lowercase();
+    let number = cell.trim_end_matches("bits").trim_end_matches("bit").trim_end().trim_end_matches('-');
+    number.parse().ok().filter(|bits| [8, 16, 24, 32, 48, 64].contains(bits))
+}
+
+/// What a mark of a column such as `signed` says.
+pub fn yes_or_no(cell: &str) -> Option<bool> {
+    match cell.trim().to_lowercase().as_str() {
+        "yes" | "y" | "true" | "x" | "1" | "✓" | "✔" | "ja" | "j" | "signed" | "s" | "+/-" | "±" => Some(true),
+        "no" | "n" | "false" | "0" | "nein" | "unsigned" | "u" | "+" => Some(false),
+        _ => None,
+    }
+}
+
+/// A unit, and the factor in front of it: `0.1 kW`, `1/10 V`. `Err` where what else stands in it may be one, or may not.
+pub fn unit_with_factor(cell: &str) -> Result<(f64, String), String> {
+    let unclear = || Err(t!("`{cell}`: does its unit have a factor?", cell));
+    if let Some(number) = number_of(cell) {
+        return if number == 1.0 { Ok((1.0, unit_of(cell))) } else { unclear() };
+    }
+    if is_known_unit(cell) {
+        return Ok((1.0, unit_of(cell)));
+    }
+    let splits = cell.char_indices().skip(1).map(|(at, _)| cell.split_at(at));
+    let parts =
+        splits.filter_map(|(number, unit)| Some((number_of(number)?, unit)).filter(|(_, unit)| is_known_unit(unit)));
+    if let Some((factor, unit)) = parts.last() {
+        // 50 Hz is a frequency.
+        let is_factor = factor != 0.0 && (factor.abs() < 1.0 || factor.log10().fract() == 0.0);
+        return if is_factor { Ok((factor, unit_of(unit))) } else { unclear() };
+    }
+    let last = cell.rsplit(['*', '×', 'x', 'X', '/', '·', ' ', '(']).next().unwrap_or_default();
+    let begins = cell.trim_start_matches(['x', 'X', '*', '×', '/', '÷', '+']).trim_start();
+    let rest = begins.trim_start_matches(|sign: char| sign.is_ascii_digit());
+    // A range and names of numbers are neither.
+    let is_number = rest.len() < begins.len()
+        && !rest.trim_start().starts_with(['-', '–', '…', '=', ':'])
+        && !rest.starts_with("..");
+    if is_number || number_of(last.trim_end_matches(')')).is_some() { unclear() } else { Ok((1.0, unit_of(cell))) }
+}
+
+/// `0=off; 1=on`; a semicolon within a name has `\` in front.
 pub fn labels_of(cell: &str) -> Option<Vec<(i128, String)>> {
-    let label = |part: &str| {
+    let mut parts = vec![String::new()];
+    let mut signs = cell.chars();
+    while let Some(sign) = signs.next() {
+        let last = parts.last_mut()?;
+        match sign {
+            ';' => parts.push(String::new()),
+            '\\' => match signs.next()? {
+                'n' => last.push('\n'),
+                sign => last.push(sign),
+            },
+            sign => last.push(sign),
+        }
+    }
+    let label = |part: &String| {
         let (number, text) = part.split_once('=')?;
         Some((number.trim().parse().ok()?, text.trim().to_owned()))
     };
-    cell.split(';').map(label).collect()
+    parts.iter().map(label).collect()
+}
+
+/// Writes what [`labels_of`] reads.
+pub fn labels_text<'a>(labels: impl Iterator<Item = (i128, &'a str)>) -> String {
+    let escaped = |text: &str| text.replace('\\', "\\\\").replace(';', "\\;").replace('\n', "\\n");
+    labels.map(|(number, text)| format!("{number}={}", escaped(text))).collect::<Vec<_>>().join("; ")
 }
 
 /// `5-4` or `3`: the lowest bit and how many.
@@ -155,51 +291,70 @@ pub fn field_of(cell: &str) -> Option<(u8, u8)> {
     (low <= high && high < 64).then(|| (low, high - low + 1))
 }
 
+/// The same as manuals write it: `bit 3`, `0..3`, `7:4`.
+pub fn bit_field_of(cell: &str) -> Option<(u8, u8)> {
+    let cell = cell.to_lowercase();
+    let digits = cell
+        .trim_start_matches("bits")
+        .trim_start_matches("bit")
+        .trim_start_matches('b')
+        .trim_start_matches(['.', ' ', '#']);
+    let plain = ["..", "…", "–", ":", "~"].into_iter().fold(digits.to_owned(), |text, sign| text.replace(sign, "-"));
+    let turned = || plain.split_once('-').map(|(low, high)| format!("{high}-{low}"));
+    field_of(&plain).or_else(|| field_of(&turned()?))
+}
+
+/// A number that means "no value", as it is written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BadNumber {
+    /// A whole number, or the pattern of its bits.
+    Whole(i128, bool),
+    /// Any other.
+    Float(f64),
+}
+
+impl BadNumber {
+    /// What it is as a raw number of a point; `None` where it can never occur.
+    pub fn of(self, point: Point) -> Option<Exact> {
+        match self {
+            BadNumber::Whole(number, is_pattern) => point.raw_number(number, is_pattern).number(),
+            BadNumber::Float(number) if point.kind == DataType::F32 => Some(f64::from(to_f32(number)).into()),
+            BadNumber::Float(number) => Some(Exact::plain(number)),
+        }
+    }
+}
+
+/// `30s`, `500ms`, `once`, `never`: how often a register is read.
+pub fn poll_of(cell: &str) -> Option<Poll> {
+    match cell {
+        "once" => Some(Poll::Once),
+        "never" => Some(Poll::Never),
+        period => duration_of(period).filter(|period| !period.is_zero()).map(Poll::Every),
+    }
+}
+
+/// Writes what [`poll_of`] and a profile read.
+pub fn poll_text(poll: Poll) -> String {
+    match poll {
+        Poll::Once => "once".to_owned(),
+        Poll::Never => "never".to_owned(),
+        Poll::Every(period) if period.subsec_millis() == 0 => format!("{}s", period.as_secs()),
+        Poll::Every(period) => format!("{}ms", period.as_millis()),
+    }
+}
+
 /// Numbers with a blank between them.
-pub fn bad_of(cell: &str) -> Option<Vec<i128>> {
-    cell.split_whitespace().map(|number| number.parse().ok()).collect()
+pub fn bad_of(cell: &str) -> Option<Vec<BadNumber>> {
+    let number = |word: &str| {
+        let pattern = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X"));
+        if let Some(digits) = pattern {
+            return i128::from_str_radix(digits, 16).ok().map(|number| BadNumber::Whole(number, true));
+        }
+        let whole = word.parse().ok().map(|number| BadNumber::Whole(number, false));
+        whole.or_else(|| word.parse().ok().map(BadNumber::Float))
+    };
+    cell.split_whitespace().map(number).collect()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_type_fits_its_number_of_registers_or_is_refused() {
-        let check = |word: &str, length, expect: Option<(DataType, Option<ByteOrder>)>| {
-            assert_eq!(type_of(word, length).ok(), expect, "{word} {length:?}");
-        };
-        check("int16", None, Some((DataType::I16, None)));
-        check("int16", Some(2), None);
-        check("signed", Some(2), Some((DataType::I32, None)));
-        check("unsigned", Some(3), None);
-        check("string", Some(4), Some((DataType::Text(8), None)));
-        check("string", None, None);
-        check("uint16be", Some(1), Some((DataType::U16, Some(ByteOrder::Abcd))));
-        check("uint32sw", Some(2), Some((DataType::U32, Some(ByteOrder::Cdab))));
-        check("floatle", Some(2), Some((DataType::F32, Some(ByteOrder::Dcba))));
-        check("int16le", Some(1), Some((DataType::I16, Some(ByteOrder::Badc))));
-        check("uint32sb", Some(2), None);
-        check("s8", None, Some((DataType::I8, None)));
-        check("uint8le", Some(1), Some((DataType::U8, Some(ByteOrder::Badc))));
-        check("int8be", None, Some((DataType::I8, Some(ByteOrder::Abcd))));
-        check("uint48", Some(3), Some((DataType::U48, None)));
-        check("cstring(8)", None, Some((DataType::TextToNul(8), None)));
-        check("mod10k(2)", Some(2), Some((DataType::Mod10k(2), None)));
-    }
-
-    #[test]
-    fn tables_are_known_by_words_and_function_codes() {
-        for (word, table) in [
-            ("MODBUS_INPUT_REGISTER", Table::Input),
-            ("MODBUS_HOLDING_REGISTER", Table::Holding),
-            ("03/06/16", Table::Holding),
-            ("FC04", Table::Input),
-            ("Coil (0x)", Table::Coil),
-        ] {
-            assert_eq!(table_of(word), Some(table), "{word}");
-        }
-        assert_eq!(table_of("measured value"), None);
-        assert_eq!([number_of("10^-2"), number_of("0,1"), number_of("/10")], [Some(0.01), Some(0.1), Some(0.1)]);
-    }
-}
+mod tests;

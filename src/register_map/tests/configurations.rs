@@ -1,6 +1,9 @@
 //! Configurations of other programs.
 
+use std::time::Duration;
+
 use super::{list_of, read};
+use crate::plant::tag::Poll;
 
 #[test]
 fn home_assistant_sensors_keep_type_order_scale_and_unit() {
@@ -203,8 +206,8 @@ parameters:
     let list = crate::register_map::read(text.as_bytes(), &second);
     assert_eq!(list.named.last().map(super::shown).as_deref(), Some("30082 Model uint16 ABCD x10"));
     assert_eq!(
-        (list.named[0].group.as_str(), list.named[0].poll.map(|period| period.as_secs())),
-        ("Battery", Some(60))
+        (list.named[0].group.as_str(), list.named[0].poll),
+        ("Battery", Some(Poll::Every(Duration::from_secs(60))))
     );
 }
 

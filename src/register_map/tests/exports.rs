@@ -3,9 +3,11 @@
 use super::list_of;
 use crate::{
     plant::{
+        PlantDef,
         exact::Exact,
-        tag::{DataType, TagDef},
+        tag::{Access, Bound, DataType, TagDef},
     },
+    profile::{self, Kind, Search},
     register_map::export::{Target, export},
 };
 
@@ -118,9 +120,127 @@ fn essence(tag: &TagDef, target: Target) -> String {
         words.push_str(&format!(" {} {:?} {bad:?}", tag.unit, tag.decimals));
     }
     if target == Target::Csv {
-        words.push_str(&format!(" {:?} {:?} {:?} {:?} {}", tag.access, tag.min, tag.max, tag.bit_labels, tag.group));
+        let (labels, bits) = (&tag.enum_labels, &tag.bit_labels);
+        let is_sent = is_written(tag);
+        let access = if is_sent { tag.access } else { Access::Read };
+        let (place, function) = (tag.write_at.filter(|_| is_sent), tag.write_fc.filter(|_| is_sent));
+        let fixed = |bound: Option<Bound>| bound.filter(|bound| matches!(bound, Bound::Fixed(_)));
+        words.push_str(&format!(" {access:?} {:?} {:?} {place:?} {function:?}", fixed(tag.min), fixed(tag.max)));
+        words.push_str(&format!(" {} {} {labels:?} {bits:?} {} {:?}", tag.short, tag.label, tag.group, tag.poll));
     }
     words
+}
+
+/// Is it written without another register, or limits that one gives?
+fn is_written(tag: &TagDef) -> bool {
+    let is_open = |bound: Option<Bound>| matches!(bound, Some(bound) if !matches!(bound, Bound::Fixed(_)));
+    tag.writable() && tag.write_unlock.is_none() && !is_open(tag.min) && !is_open(tag.max)
+}
+
+/// What is left out of an export as a list, and what it is once it is read again.
+fn round_trip(name: &str, plant: &PlantDef) {
+    let exported = export(plant, Target::Csv);
+    let list = list_of(&exported.text);
+    let said: Vec<String> = list.problems.iter().cloned().chain(list.said_of_rows()).collect();
+    assert_eq!((&list.refused, &said, &list.questions), (&None, &Vec::new(), &Vec::new()), "{name}\n{}", exported.text);
+    let left_out: Vec<&str> = exported.left_out.iter().filter_map(|line| line.split(": ").next()).collect();
+    let kept = plant.tags.iter().filter(|tag| !left_out.contains(&tag.short.as_str()));
+    let read: Vec<String> = list.named.iter().map(|named| essence(&named.tag(&named.name), Target::Csv)).collect();
+    for (read, tag) in read.iter().zip(kept) {
+        assert_eq!(*read, essence(tag, Target::Csv), "{name}");
+    }
+    assert_eq!(read.len(), exported.count, "{name}");
+}
+
+#[test]
+fn every_shipped_profile_comes_back_from_a_list() {
+    let shipped = profile::list(&Search::shipped());
+    let devices = shipped.iter().filter(|listed| listed.kind == Kind::Device);
+    let mut count = 0;
+    for device in devices {
+        let text = profile::text_of(&device.name, &Search::shipped()).expect("it is shipped");
+        let checked = profile::check_text(&device.name, &text).unwrap_or_else(|errors| panic!("{errors}"));
+        if export(&checked.plant, Target::Csv).count != 0 {
+            round_trip(&device.name, &checked.plant);
+            count += 1;
+        }
+    }
+    assert!(100 < count, "{count} profiles");
+}
+
+#[test]
+fn a_list_keeps_what_a_spreadsheet_or_a_write_could_change() {
+    let text = r#"
+vendor = "a"
+model = "b"
+status = "manual"
+source = "none"
+address_base = 0
+[[tag]]
+name = "-1"
+table = "holding"
+address = 1
+type = "float32"
+scale = 10
+unit = "=A1"
+label = "@odd; 'label', and more"
+group = "+x"
+bad_if = [0x7FC00000, 0x7F7FFFFF, -9999]
+poll = "once"
+[[tag]]
+name = "SET"
+table = "input"
+address = 2
+type = "uint16"
+access = "rw"
+write_address = "holding:7"
+write_fc = 16
+enum = { 0 = "off; on", 1 = 'a\b = c', 2 = "d,e" }
+poll = "500ms"
+[[tag]]
+name = "UNLOCK"
+table = "holding"
+address = 8
+type = "uint16"
+access = "rw"
+[[tag]]
+name = "LOCKED"
+table = "holding"
+address = 9
+type = "uint16"
+access = "rw"
+max_from = "UNLOCK"
+"#;
+    let plant = profile::check_text("made_up", text).unwrap_or_else(|errors| panic!("{errors}")).plant;
+    round_trip("made_up", &plant);
+    let exported = export(&plant, Target::Csv);
+    let formulas = exported.text.split([',', '\n']).filter(|cell| cell.starts_with(['=', '@', '+']));
+    assert_eq!(formulas.count(), 0, "{}", exported.text);
+    assert!(exported.text.contains("input:2,") && exported.text.contains("holding:7"), "{}", exported.text);
+    assert!(
+        exported.text.lines().all(|line| !line.ends_with(',')),
+        "each says how often it is read: {}",
+        exported.text
+    );
+    assert_eq!(exported.lost, ["LOCKED: writing it, which needs more than a list can say, limits from another tag"]);
+}
+
+#[test]
+fn home_assistant_takes_whole_numbers_for_no_value() {
+    let of = |bad: &str| {
+        let text = format!(
+            "vendor = 'a'\nmodel = 'b'\nstatus = 'manual'\nsource = 'none'\naddress_base = 0\n[[tag]]\nname = 'F'\ntable = 'input'\naddress = 1\ntype = 'float32'\nbad_if = [{bad}]\n"
+        );
+        let plant = profile::check_text("made_up", &text).unwrap_or_else(|errors| panic!("{errors}")).plant;
+        let exported = export(&plant, Target::HomeAssistant);
+        (
+            exported.text.lines().find_map(|line| line.trim().strip_prefix("nan_value: ").map(str::to_owned)),
+            exported.lost,
+        )
+    };
+    assert_eq!(of("-9999"), (Some("-9999".to_owned()), Vec::new()));
+    assert_eq!(of("0x7FC00000, 7"), (Some("7".to_owned()), Vec::new()));
+    assert_eq!(of("0x3FC00000"), (None, vec!["F: a number that is no value and not whole".to_owned()]));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Small files of each form, with what is taken of them and what is not.
 
 mod configurations;
+mod doubtful;
 mod exports;
 mod meanings;
 mod odd;

@@ -26,7 +26,7 @@ fn an_export_of_modmaster_divides_by_its_scale() {
         ["41003 \"SV\" wanted int16 ABCD 0.1 -2 1 °C", "43050 Alarm 4 int16 ABCD 1 0 0 ", "00008 Run bool ABCD 1 0 0 "];
     assert_eq!(named, expect);
     assert_eq!(problems, ["line 5: 8: `int8` is not a known type", "line 6: 9: `0` is not a scale"]);
-    assert_eq!(read("Address,Name,Scale\n5,a,10\n").0, ["40006 a uint16 ABCD 10 0 0 "], "a list of a manual");
+    assert_eq!(read("Address,Name,Multiplier\n5,a,10\n").0, ["40006 a uint16 ABCD 10 0 0 "], "a list of a manual");
 }
 
 #[test]

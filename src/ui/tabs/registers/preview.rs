@@ -54,7 +54,9 @@ const LIST: &[Key] = &[
         registers.change_list(|preview| preview.context.table = next(&TABLES, preview.context.table))
     }),
     Key::change(char('o'), "order", "byte order of the rows that name none", |registers, _| {
-        registers.change_list(|preview| preview.context.order = next(&ByteOrder::ALL, preview.context.order))
+        registers.change_list(|preview| {
+            preview.context.order = Some(next(&ByteOrder::ALL, preview.context.order.unwrap_or_default()))
+        })
     }),
 ];
 const KEEP: &[Key] =
@@ -80,8 +82,8 @@ impl Preview {
     }
 
     /// What is odd about the file, and the lines that are left out.
-    fn said(&self) -> impl Iterator<Item = &String> {
-        self.list.warnings.iter().chain(&self.list.problems)
+    fn said(&self) -> impl Iterator<Item = String> {
+        said(&self.list).into_iter()
     }
 
     /// What is read beside the window, so that the rows on the screen have values.
@@ -97,9 +99,12 @@ impl Preview {
     }
 
     fn change_meaning(&mut self) {
-        let Some((_, now)) = self.list.columns.get(self.column) else { return };
+        let Some((heading, now)) = self.list.columns.get(self.column) else { return };
         let all: Vec<Option<Column>> = Column::ALL.into_iter().map(Some).chain([None]).collect();
-        self.context.means.insert(self.column, next(&all, *now));
+        // What a question offers comes first.
+        let question = self.list.questions.iter().find(|question| question.heading == *heading);
+        let means = question.map_or_else(|| next(&all, *now), |question| question.may_be.first().copied());
+        self.context.means.insert(heading.clone(), means);
     }
 
     fn next_base(&mut self) {
@@ -117,7 +122,8 @@ impl Registers {
     /// Shows what a list has before it is taken; `Err` says why it is none.
     pub fn preview(&mut self, cx: &ViewContext, bytes: &[u8]) -> Result<Vec<UiAction>, String> {
         let base = Some(self.base).filter(|base| *base != AddressBase::Modicon);
-        let (table, order, unit) = (self.table, self.order, self.unit);
+        let (table, unit) = (self.table, self.unit);
+        let order = Some(self.order).filter(|order| *order != ByteOrder::Abcd);
         let context = ListContext { table, base, order, unit: Some(unit), ..ListContext::default() };
         let preview = Preview::new(bytes.to_vec(), context.clone());
         // A file of another unit is read for what it is of.
@@ -168,12 +174,17 @@ impl Registers {
         if let Some(first) = list.named.first() {
             (self.table, self.first, self.selected) = (first.table, first.address, first.address);
         }
-        list.named.into_iter().for_each(|named| self.names.put(named));
+        std::mem::take(&mut list.named).into_iter().for_each(|named| self.names.put(named));
         vec![UiAction::Open(Modal::Notice(Notice::list(
             t!("load a register list"),
-            std::iter::once(taken).chain(list.warnings).chain(list.problems).collect(),
+            std::iter::once(taken).chain(said(&list)).collect(),
         )))]
     }
+}
+
+/// What is odd about a list, what of its rows is not kept, and the lines that are left out.
+fn said(list: &List) -> Vec<String> {
+    list.warnings.iter().cloned().chain(list.said_of_rows()).chain(list.problems.iter().cloned()).collect()
 }
 
 fn unclear() -> UiAction {
@@ -203,17 +214,20 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let words =
         t!("Registers that can be taken: {count}, lines that cannot: {left}. Are the values right?", count, left);
     canvas.text(1, 0, &fit_words(&words, room), theme.strong());
-    let (words, style) = match &list.unclear {
-        Some(Unclear { written, modicon, sent }) => {
+    let (words, style) = match (&list.unclear, list.questions.first()) {
+        (Some(Unclear { written, modicon, sent }), _) => {
             let (modicon, sent) = (place(*modicon), place(*sent));
             (
                 t!("{written}: {modicon} (Modicon) or {sent} (as sent)? b says which", written, modicon, sent),
                 theme.trouble(),
             )
         }
-        None => {
+        (None, Some(question)) => {
+            (t!("{question} m says what the column means", question = question.words()), theme.trouble())
+        }
+        (None, None) => {
             let (base, table) = (base_words(context), translate(context.table.word()));
-            let order = context.order.word();
+            let order = context.order.unwrap_or_default().word();
             (t!("plain numbers: {base}; where nothing is said: {table}, {order}", base, table, order), theme.normal())
         }
     };
@@ -244,7 +258,7 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let shown = list.named.len().saturating_sub(*top).min(rows);
     let problems = preview.said().skip(top.saturating_sub(list.named.len())).take(rows - shown);
     for (y, problem) in (HEAD + to_u16(shown)..).zip(problems) {
-        canvas.text(1, y, &fit_words(problem, room), theme.trouble());
+        canvas.text(1, y, &fit_words(&problem, room), theme.trouble());
     }
 }
 
@@ -256,7 +270,7 @@ fn columns(canvas: &mut Canvas, cx: &ViewContext, columns: &[(String, Option<Col
     }
     let mut x = 1;
     for (n, (heading, means)) in columns.iter().enumerate().skip(selected.saturating_sub(2)) {
-        let means = means.map_or("–", |means| translate(means.label()));
+        let means = means.map_or("–", |means| translate(means.word()));
         let style = if n == selected { cx.theme.focus() } else { cx.theme.dim() };
         x = canvas.text(x, 2, &format!("{}: {means}", fit(heading, 16)), style) + 2;
     }

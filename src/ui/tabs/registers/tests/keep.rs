@@ -183,8 +183,11 @@ fn the_meaning_of_a_column_is_changed_by_a_key() {
     let mut bench = Bench::at_unit(|_, _| None);
     bench.send(Msg::Loaded(Tab::Registers, Ok("address;name;factor\n5;W;10\n6;VA;100\n".into())));
     bench.answer(1, |address| Some(address * 10));
-    assert!(bench.screen(120, 24).contains("×10 "), "{}", bench.screen(120, 24));
+    let asked = "factor (10): factor / divisor? m says what the column means";
+    assert!(bench.screen(120, 24).contains(asked), "{}", bench.screen(120, 24));
     bench.keys("→→m");
+    assert!(bench.screen(120, 24).contains("×10 "), "{}", bench.screen(120, 24));
+    bench.keys("m");
     let shown = bench.screen(120, 24);
     assert!(shown.contains("factor: divisor") && shown.contains("×0.1"), "{shown}");
     bench.keys("⏎");

@@ -1,0 +1,207 @@
+//! The words of a heading: what a column below it can be.
+
+use super::columns::is_address;
+use crate::plant::{address::AddressBase, keyword::keyword_enum};
+
+keyword_enum! {
+    /// What a column holds.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Column: "meaning" {
+        /// Of the first register.
+        Address => "address",
+        /// The same, whose digits are hexadecimal without a mark.
+        HexAddress => "hex address",
+        /// What it is called.
+        Name => "name",
+        /// Type of the raw value.
+        Type => "type",
+        /// `yes`, `no`.
+        Signed => "signed",
+        /// Registers.
+        Length => "registers",
+        /// Its bytes.
+        Bytes => "bytes",
+        /// How many bits a number has.
+        Width => "width in bits",
+        /// It multiplies.
+        Scale => "factor",
+        /// It divides.
+        Divisor => "divisor",
+        /// Of ten.
+        Exponent => "power of ten",
+        /// Digits behind the point that the number does not have.
+        Places => "implied decimals",
+        /// Added after scaling.
+        Offset => "offset",
+        /// `°C`.
+        Unit => "unit",
+        /// One of the four, as word or function code.
+        Table => "table",
+        /// One of the four, as the digit of Modicon: 4 is a holding register.
+        Area => "area",
+        /// Of bytes and words.
+        Order => "byte order",
+        /// Unit address.
+        Device => "unit address",
+        /// More than a scale and an offset.
+        Formula => "formula",
+        /// `r`, `rw`, `w`.
+        Access => "access",
+        /// Least value that may be written.
+        Min => "least",
+        /// The greatest.
+        Max => "greatest",
+        /// Decimals to show.
+        Decimals => "decimals",
+        /// `0=off; 1=on`: names of numbers.
+        Labels => "names of numbers",
+        /// The same of bits.
+        Bits => "names of bits",
+        /// `5-4`, `3`: bits of a register.
+        Field => "bits",
+        /// Raw numbers that mean "no value".
+        Bad => "no value",
+        /// What it belongs to.
+        Group => "group",
+        /// What it is called at length.
+        Label => "label",
+        /// `holding:7`: where it is written.
+        WriteAt => "write address",
+        /// The function that writes it.
+        WriteWith => "write function",
+        /// `30s`: how often it is read.
+        Poll => "poll period",
+    }
+}
+
+/// The columns of an export of this program, in their order.
+pub const OWN: [(Column, &str); 21] = [
+    (Column::Address, "address"),
+    (Column::Table, "table"),
+    (Column::Name, "name"),
+    (Column::Type, "type"),
+    (Column::Order, "byte order"),
+    (Column::Field, "field"),
+    (Column::Scale, "scale"),
+    (Column::Offset, "offset"),
+    (Column::Decimals, "decimals"),
+    (Column::Unit, "unit"),
+    (Column::Access, "access"),
+    (Column::Min, "min"),
+    (Column::Max, "max"),
+    (Column::Labels, "enum"),
+    (Column::Bits, "bits"),
+    (Column::Bad, "bad if"),
+    (Column::Group, "group"),
+    (Column::Label, "label"),
+    (Column::WriteAt, "write address"),
+    (Column::WriteWith, "write function"),
+    (Column::Poll, "poll"),
+];
+
+#[rustfmt::skip]
+const ADDRESS: &[&str] = &["address", "addr", "addr.", "register", "reg", "reg.", "modicon", "pdu", "wire", "hex", "dec",
+    "adresse", "adr", "adr.", "registeradresse", "registernummer", "modbusadresse", "startadresse", "modbusregister", "startregister"];
+/// Words of headings, in small letters. Of several columns that a heading can be, the first that fits what is in it counts.
+#[rustfmt::skip]
+const HEADINGS: [(Column, &[&str]); 16] = [
+    (Column::Divisor, &["divisor", "divide", "divider", "division", "div", "teiler"]),
+    (Column::Exponent, &["sf", "exponent", "zehnerpotenz"]),
+    (Column::Scale, &["scale", "scaling", "factor", "multiplier", "multiply", "gain", "resolution", "coefficient", "sf", "ratio", "conversion", "scalefactor",
+        "faktor", "skalierung", "skalierungsfaktor", "umrechnung", "umrechnungsfaktor", "multiplikator", "auflösung", "skala"]),
+    (Column::Order, &["order", "endian", "endianness", "swap", "byteorder", "wordorder", "reihenfolge", "bytereihenfolge", "wortreihenfolge"]),
+    (Column::Device, &["deviceid", "slave", "slaveid", "station", "unit", "geräteadresse"]),
+    (Column::Unit, &["unit", "units", "uom", "dimension", "einheit", "einheiten", "maßeinheit"]),
+    (Column::Signed, &["signed", "sign", "vorzeichen"]),
+    (Column::Type, &["type", "format", "datatype", "dataformat", "encoding", "size", "signed", "sign", "typ", "datentyp", "datenformat", "variablentyp"]),
+    (Column::Width, &["bit", "bits", "size", "length", "width", "länge", "größe", "bitbreite"]),
+    (Column::Field, &["bit", "bits", "bitnr", "bitnummer", "bitposition"]),
+    (Column::Table, &["table", "function", "area", "fc", "type", "tabelle", "funktionscode", "funktion", "bereich", "registertyp", "registertype", "typ"]),
+    (Column::Length, &["len", "length", "size", "count", "quantity", "qty", "words", "registers", "bytes", "länge", "anzahl", "wörter", "größe", "registeranzahl", "datenlänge"]),
+    (Column::Formula, &["formula", "expression", "formel"]),
+    (Column::Offset, &["offset", "versatz"]),
+    (Column::Address, ADDRESS),
+    (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function",
+        "bezeichnung", "beschreibung", "benennung", "bedeutung", "datenpunkt", "messwert", "messgröße", "titel", "parametername", "funktion", "kommentar"]),
+];
+/// A heading with one of these alone is no column of addresses: tables of codes have them too.
+const WEAK: [&str; 2] = ["hex", "dec"];
+/// Columns below these say nothing about how a number is read, whatever numbers they hold.
+#[rustfmt::skip]
+const HARMLESS: [&str; 42] = [
+    "min", "min.", "minimum", "max", "max.", "maximum", "range", "limit", "limits", "default", "value", "values", "example", "page", "no", "no.", "nr", "nr.",
+    "number", "index", "id", "row", "line", "section", "chapter", "version", "note", "notes", "remark", "remarks", "comment", "comments", "access", "r/w",
+    "bereich", "grenze", "standard", "standardwert", "wert", "beispiel", "seite", "bemerkung",
+];
+/// Headings of a number that is divided by ten as often.
+const PLACES: [&str; 8] =
+    ["decimals", "decimal", "digits", "precision", "dezimalstellen", "nachkommastellen", "kommastellen", "nachkomma"];
+
+/// What is known of one heading.
+#[derive(Debug, Clone)]
+pub struct Heading(Vec<String>);
+
+impl Heading {
+    /// Its words in small letters.
+    pub fn new(heading: &str) -> Heading {
+        let heading = heading.to_lowercase();
+        let words = heading.split(|c: char| !c.is_alphanumeric() && c != '.').filter(|word| !word.is_empty());
+        Heading(words.map(str::to_owned).collect())
+    }
+
+    /// Has it one of these words?
+    pub fn has(&self, known: &[&str]) -> bool {
+        self.0.iter().any(|word| known.contains(&word.as_str()))
+    }
+
+    /// What it can be, the likeliest first.
+    pub fn candidates(&self) -> Vec<Column> {
+        HEADINGS.iter().filter(|(_, known)| self.has(known)).map(|(column, _)| *column).collect()
+    }
+
+    /// What it is as an export of this program has it, and no word more.
+    pub fn exact(heading: &str) -> Option<Column> {
+        let heading = heading.trim();
+        OWN.iter().find(|(_, word)| heading.eq_ignore_ascii_case(word)).map(|(column, _)| *column)
+    }
+
+    /// Nothing in its column matters to how a number is read.
+    pub fn is_harmless(&self) -> bool {
+        !self.0.is_empty() && self.0.iter().all(|word| HARMLESS.contains(&word.as_str()))
+    }
+
+    /// Its column says how many decimals a number has.
+    pub fn is_places(&self) -> bool {
+        self.has(&PLACES)
+    }
+
+    /// How its numbers count, where it says that.
+    pub fn base(&self) -> Option<AddressBase> {
+        let pair = |first: &[&str]| {
+            self.0
+                .windows(2)
+                .any(|two| first.contains(&two[0].as_str()) && ["based", "basiert"].contains(&two[1].as_str()))
+        };
+        if pair(&["1", "one"]) {
+            return Some(AddressBase::One);
+        }
+        (pair(&["0", "zero"]) || self.has(&["pdu", "protocol", "wire"])).then_some(AddressBase::Zero)
+    }
+
+    fn is_strong_address(&self) -> bool {
+        self.0.iter().any(|word| ADDRESS.contains(&word.as_str()) && !WEAK.contains(&word.as_str()))
+    }
+}
+
+/// Is it a heading: with an address and one more, and no number?
+pub fn is_heading(cells: &[String]) -> bool {
+    let all: Vec<Heading> = cells.iter().map(|cell| Heading::new(cell)).collect();
+    let known = all.iter().filter(|heading| !heading.candidates().is_empty()).count();
+    all.iter().any(Heading::is_strong_address) && 2 <= known && !cells.iter().any(|cell| is_address(cell))
+}
+
+/// Is it the heading of an export of this program, as that writes it or with columns taken out?
+pub fn is_own(cells: &[String]) -> bool {
+    cells.iter().all(|cell| Heading::exact(cell).is_some())
+        && cells.iter().any(|cell| Heading::exact(cell) == Some(Column::Bad))
+}
