@@ -257,7 +257,7 @@ fn is_of_hex(heading: &Heading, cells: &[&str]) -> bool {
     let bare: Vec<&&str> = cells.iter().filter(|cell| is_bare_hex(cell)).collect();
     // `F1` may be the name of a parameter.
     let is_number = |cell: &&str| cell.starts_with(|sign: char| sign.is_ascii_digit());
-    !heading.has(&["dec"]) && bare.iter().any(|cell| with_letter(&cell) && is_number(cell))
+    !heading.has(&["dec"]) && bare.iter().any(|cell| with_letter(cell) && is_number(cell))
 }
 
 /// Does it rise from row to row? Then it counts registers.

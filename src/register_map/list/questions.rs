@@ -37,8 +37,8 @@ impl Question {
     pub fn matters(&self, cell: &str) -> bool {
         let effects: Vec<Option<f64>> = self.may_be.iter().map(|column| effect(*column, cell)).collect();
         let is_same = effects.iter().all(|effect| effect.is_some() && *effect == effects[0]);
-        !matches!(cell, "" | "-" | "–")
-            && !(is_same && effects[0].is_some_and(|effect| 1 < effects.len() || effect == 1.0))
+        let changes_nothing = is_same && effects[0].is_some_and(|effect| 1 < effects.len() || effect == 1.0);
+        !changes_nothing && !matches!(cell, "" | "-" | "–")
     }
 }
 

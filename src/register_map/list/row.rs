@@ -177,7 +177,7 @@ impl<'a> Reader<'a> {
             label: self.text(Column::Label).unwrap_or_default().to_owned(),
             write_at: self.read(Column::WriteAt, in_table),
             write_with: self.read(Column::WriteWith, |cell| cell.parse().ok()),
-            poll: self.read(Column::Poll, |cell| poll_of(cell)),
+            poll: self.read(Column::Poll, poll_of),
         }
     }
 

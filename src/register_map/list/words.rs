@@ -203,7 +203,7 @@ pub fn length_of(cell: &str, is_bytes: bool) -> Option<u16> {
     let digits = cell.len() - cell.trim_start_matches(|sign: char| sign.is_ascii_digit()).len();
     let (number, word) = cell.split_at(digits);
     let number: u16 = number.parse().ok()?;
-    let of_bytes = || if number == 1 { Some(1) } else { Some(number / 2).filter(|_| number % 2 == 0) };
+    let of_bytes = || if number == 1 { Some(1) } else { Some(number / 2).filter(|_| number.is_multiple_of(2)) };
     match word.trim() {
         "" if is_bytes => of_bytes(),
         "" | "register" | "registers" | "reg" | "regs" | "word" | "words" | "wort" | "wörter" => Some(number),
