@@ -24,7 +24,7 @@ use super::{Format, named::Named};
 use crate::{
     plant::{
         address::{AddressBase, AddressContext, of_modicon},
-        tag::{ByteOrder, Table},
+        tag::{Access, ByteOrder, Table},
     },
     t,
 };
@@ -104,10 +104,8 @@ pub struct List {
 pub struct Unclear {
     /// As written.
     pub written: String,
-    /// As a Modicon number.
-    pub modicon: (Table, u16),
-    /// As sent.
-    pub sent: (Table, u16),
+    /// How its digits may count, and the address that they then are.
+    pub readings: [(AddressBase, (Table, u16)); 2],
 }
 
 impl List {
@@ -269,7 +267,7 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
     let order = context.order.unwrap_or(if is_nibe(&list.columns) { ByteOrder::Cdab } else { ByteOrder::Abcd });
     let assumed = Assumed { table: context.table, is_stated: context.is_table_stated, base, order };
     for row in rows {
-        let taken = row.named(assumed);
+        let taken = row.named(assumed).map(|taken| with_sure_writes(taken, context));
         let count = list.named.len();
         let what = taken.as_ref().map(|taken| assumptions(taken, context, list.is_sure)).unwrap_or_default();
         let named = taken.map(|taken| Named { line: row.line, ..taken.named });
@@ -282,14 +280,26 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
     list
 }
 
+/// Nothing is written where the place of a register or the order of its words is only assumed, or where nothing can be.
+fn with_sure_writes(taken: Taken, context: &ListContext) -> Taken {
+    let Taken { named, is_base_assumed, is_order_assumed, .. } = &taken;
+    let is_assumed = *is_base_assumed && context.base.is_none() || *is_order_assumed && context.order.is_none();
+    let is_fixed =
+        matches!(named.table, Table::Discrete | Table::Input) && named.write_at.is_none() && named.write_fc.is_none();
+    let is_write_lost = named.access != Access::Read && (is_assumed || is_fixed);
+    let access = if is_write_lost { Access::Read } else { named.access };
+    Taken { named: Named { access, ..taken.named }, is_write_lost, ..taken }
+}
+
 /// What neither the list nor its reader has said of a row.
 fn assumptions(taken: &Taken, context: &ListContext, is_sure: bool) -> Vec<String> {
-    let Taken { named, is_base_assumed, is_order_assumed, is_type_assumed } = taken;
+    let Taken { named, is_base_assumed, is_order_assumed, is_type_assumed, is_write_lost } = taken;
     let is_scaled_twice = named.offset != 0.0 && named.scale != 1.0;
     let all = [
         (*is_base_assumed && context.base.is_none(), t!("plain numbers are addresses as sent, from 0").to_owned()),
         (*is_order_assumed && context.order.is_none(), t!("byte order {order}", order = named.order.word())),
         (*is_type_assumed, t!("type uint16").to_owned()),
+        (*is_write_lost, t!("only read: where or how it is written is not sure").to_owned()),
         (is_scaled_twice && !is_sure, t!("the offset is added after the factor").to_owned()),
     ];
     all.into_iter().filter(|(is, _)| *is).map(|(_, what)| what).collect()
@@ -358,14 +368,22 @@ pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (Add
         (false, true) => return (AddressBase::Modicon, None),
         (true, true) | (false, false) => {}
     }
-    let unclear = written.iter().find_map(|(text, of)| {
-        let [modicon, sent] = [AddressBase::Modicon, AddressBase::Zero].map(|base| {
-            AddressContext { table: of.unwrap_or(context.table), is_stated: of.is_some(), base }.parse(text)
-        });
-        let (modicon, sent) = (modicon?, sent?);
-        (modicon != sent).then(|| Unclear { written: (*text).to_owned(), modicon, sent })
-    });
-    (AddressBase::Modicon, unclear)
+    let two = |bases: [AddressBase; 2], (text, of): &(&str, Option<Table>)| {
+        let read = |base| {
+            let place =
+                AddressContext { table: of.unwrap_or(context.table), is_stated: of.is_some(), base }.parse(text);
+            Some((base, place?))
+        };
+        let readings = [read(bases[0])?, read(bases[1])?];
+        (readings[0].1 != readings[1].1).then(|| Unclear { written: (*text).to_owned(), readings })
+    };
+    let unclear = written.iter().find_map(|one| two([AddressBase::Modicon, AddressBase::Zero], one));
+    // `0001` of an area is often its first register, unless there is one before it.
+    let is_padded = |text: &str| text.len() == 4 && text.starts_with('0') && text.bytes().all(|b| b.is_ascii_digit());
+    let has_first = written.iter().any(|(text, _)| is_padded(text) && text.parse() == Ok(0));
+    let mut padded = written.iter().filter(|(text, _)| is_padded(text) && !has_first);
+    let padded = padded.find_map(|one| two([AddressBase::One, AddressBase::Zero], one));
+    (AddressBase::Modicon, unclear.or(padded))
 }
 
 #[cfg(test)]

@@ -197,13 +197,15 @@ fn is_same_file(one: &Path, other: &Path) -> bool {
 }
 
 fn two_readings(unclear: &Unclear) -> String {
-    let place = |(table, address): (Table, u16)| format!("{} {address}", table.word());
-    format!(
-        "`{}` can be {} (--base modicon) or {} (--base 0): say which",
-        unclear.written,
-        place(unclear.modicon),
-        place(unclear.sent)
-    )
+    let [first, second] = unclear.readings.map(|(base, (table, address))| {
+        let base = match base {
+            AddressBase::Modicon => "modicon",
+            AddressBase::Zero => "0",
+            AddressBase::One => "1",
+        };
+        format!("{} {address} (--base {base})", table.word())
+    });
+    format!("`{}` can be {first} or {second}: say which", unclear.written)
 }
 
 /// `Ratio (10): factor or divisor? --column "Ratio=factor", …`

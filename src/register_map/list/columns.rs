@@ -8,8 +8,8 @@ use super::{
     headings::{self, Heading},
     questions::{self, Question},
     words::{
-        bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, table_of, type_of,
-        width_of, yes_or_no,
+        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, table_of,
+        type_of, width_of, yes_or_no,
     },
 };
 use crate::plant::{
@@ -202,8 +202,7 @@ fn fits_exactly(exact: Column, cell: &str) -> bool {
     if matches!(exact, Column::Labels | Column::Bits) {
         return labels_of(cell).is_some();
     }
-    exact == Column::Access && matches!(cell, "r" | "rw" | "w")
-        || exact == Column::Field && field_of(cell).is_some()
+    exact == Column::Field && field_of(cell).is_some()
         || exact == Column::Bad && bad_of(cell).is_some()
         || exact == Column::Group
 }
@@ -223,6 +222,7 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
             80 <= share(cells, |cell| width_of(cell).is_some()) && cells.iter().any(|cell| width_of(cell) == Some(16))
         }
         Column::Field => !cells.is_empty() && 60 <= share(cells, |cell| bit_field_of(cell).is_some()),
+        Column::Access => !cells.is_empty() && 60 <= share(cells, |cell| access_of(cell).is_some()),
         Column::Length => 60 <= share(cells, |cell| length_of(cell, false).is_some()),
         Column::Offset => 60 <= share(cells, |cell| number_of(cell).is_some()) && !is_rising(cells),
         Column::Exponent => {
@@ -233,7 +233,6 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
         | Column::Bytes
         | Column::Places
         | Column::Area
-        | Column::Access
         | Column::Min
         | Column::Max
         | Column::Decimals

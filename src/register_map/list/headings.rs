@@ -104,7 +104,7 @@ const ADDRESS: &[&str] = &["address", "addr", "addr.", "register", "reg", "reg."
     "adresse", "adr", "adr.", "registeradresse", "registernummer", "modbusadresse", "startadresse", "modbusregister", "startregister"];
 /// Words of headings, in small letters. Of several columns that a heading can be, the first that fits what is in it counts.
 #[rustfmt::skip]
-const HEADINGS: [(Column, &[&str]); 16] = [
+const HEADINGS: [(Column, &[&str]); 17] = [
     (Column::Divisor, &["divisor", "divide", "divider", "division", "div", "teiler"]),
     (Column::Exponent, &["sf", "exponent", "zehnerpotenz"]),
     (Column::Scale, &["scale", "scaling", "factor", "multiplier", "multiply", "gain", "resolution", "coefficient", "sf", "ratio", "conversion", "scalefactor",
@@ -120,6 +120,7 @@ const HEADINGS: [(Column, &[&str]); 16] = [
     (Column::Length, &["len", "length", "size", "count", "quantity", "qty", "words", "registers", "bytes", "länge", "anzahl", "wörter", "größe", "registeranzahl", "datenlänge"]),
     (Column::Formula, &["formula", "expression", "formel"]),
     (Column::Offset, &["offset", "versatz"]),
+    (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "zugriff", "zugriffsart"]),
     (Column::Address, ADDRESS),
     (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function",
         "bezeichnung", "beschreibung", "benennung", "bedeutung", "datenpunkt", "messwert", "messgröße", "titel", "parametername", "funktion", "kommentar"]),
@@ -130,7 +131,7 @@ const WEAK: [&str; 2] = ["hex", "dec"];
 #[rustfmt::skip]
 const HARMLESS: [&str; 42] = [
     "min", "min.", "minimum", "max", "max.", "maximum", "range", "limit", "limits", "default", "value", "values", "example", "page", "no", "no.", "nr", "nr.",
-    "number", "index", "id", "row", "line", "section", "chapter", "version", "note", "notes", "remark", "remarks", "comment", "comments", "access", "r/w",
+    "number", "index", "id", "row", "line", "section", "chapter", "version", "note", "notes", "remark", "remarks", "comment", "comments", "access", "rw",
     "bereich", "grenze", "standard", "standardwert", "wert", "beispiel", "seite", "bemerkung",
 ];
 /// Headings of a number that is divided by ten as often.
@@ -144,7 +145,7 @@ pub struct Heading(Vec<String>);
 impl Heading {
     /// Its words in small letters.
     pub fn new(heading: &str) -> Heading {
-        let heading = heading.to_lowercase();
+        let heading = heading.to_lowercase().replace("r/w", "rw");
         let words = heading.split(|c: char| !c.is_alphanumeric() && c != '.').filter(|word| !word.is_empty());
         Heading(words.map(str::to_owned).collect())
     }
@@ -196,7 +197,9 @@ impl Heading {
 /// Is it a heading: with an address and one more, and no number?
 pub fn is_heading(cells: &[String]) -> bool {
     let all: Vec<Heading> = cells.iter().map(|cell| Heading::new(cell)).collect();
-    let known = all.iter().filter(|heading| !heading.candidates().is_empty()).count();
+    // `rw` stands in rows as well.
+    let is_known = |heading: &&Heading| heading.candidates().iter().any(|column| *column != Column::Access);
+    let known = all.iter().filter(is_known).count();
     all.iter().any(Heading::is_strong_address) && 2 <= known && !cells.iter().any(|cell| is_address(cell))
 }
 

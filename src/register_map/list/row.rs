@@ -4,14 +4,13 @@ use super::{
     cells::{Cells, of_text},
     columns::{Column, Columns, first_of, is_address},
     words::{
-        BadNumber, area, bad_of, bit_field_of, labels_of, length_of, number_of, order_of, poll_of, power_of_ten,
-        table_of, type_of, unit_with_factor, width_of, yes_or_no,
+        BadNumber, access_of, area, bad_of, bit_field_of, labels_of, length_of, number_of, order_of, poll_of,
+        power_of_ten, table_of, type_of, unit_with_factor, width_of, yes_or_no,
     },
 };
 use crate::{
     plant::{
         address::{AddressBase, AddressContext, in_table, of_modicon},
-        keyword::Keyword,
         tag::{Access, ByteOrder, DataType, Encoding, Poll, Table},
     },
     profile::unit_of,
@@ -92,6 +91,8 @@ pub struct Taken {
     pub is_order_assumed: bool,
     /// Nothing says its type.
     pub is_type_assumed: bool,
+    /// The list says that it is written, but not surely how.
+    pub is_write_lost: bool,
 }
 
 /// The cells below a heading, by what their columns mean.
@@ -165,7 +166,7 @@ impl<'a> Reader<'a> {
 
     fn more(&mut self) -> More {
         More {
-            access: self.read(Column::Access, Access::from_word),
+            access: self.read(Column::Access, access_of),
             min: self.read(Column::Min, number_of),
             max: self.read(Column::Max, number_of),
             decimals: self.read(Column::Decimals, |cell| cell.parse().ok()),
@@ -360,6 +361,7 @@ impl Row {
             is_base_assumed: self.base.is_none() && is_plain && of_modicon(first).is_none(),
             is_order_assumed: stated.is_none() && !is_in_order,
             is_type_assumed: !table.is_bits() && self.kind.is_none() && self.signed.is_none(),
+            is_write_lost: false,
         })
     }
 

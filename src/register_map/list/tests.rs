@@ -108,7 +108,8 @@ fn a_stated_table_decides_what_five_digits_mean() {
 fn digits_of_two_registers_are_asked_about_once() {
     let sunspec = "address,name,type\n40080,W,int16\n40083,VA,int16\n";
     let list = parse(sunspec, &context());
-    let both = Unclear { written: "40080".into(), modicon: (Table::Holding, 79), sent: (Table::Holding, 40_080) };
+    let readings = [(AddressBase::Modicon, (Table::Holding, 79)), (AddressBase::Zero, (Table::Holding, 40_080))];
+    let both = Unclear { written: "40080".into(), readings };
     assert_eq!(list.unclear, Some(both));
     for (base, first) in [(AddressBase::Modicon, 79), (AddressBase::Zero, 40_080), (AddressBase::One, 40_079)] {
         let list = parse(sunspec, &ListContext { base: Some(base), ..context() });

@@ -5,7 +5,7 @@ use crate::{
         address::TABLES,
         exact::Exact,
         number::to_f32,
-        tag::{ByteOrder, DataType, Point, Poll, Table},
+        tag::{Access, ByteOrder, DataType, Point, Poll, Table},
     },
     profile::{duration_of, is_known_unit, unit_of},
     t,
@@ -225,6 +225,17 @@ pub fn yes_or_no(cell: &str) -> Option<bool> {
     match cell.trim().to_lowercase().as_str() {
         "yes" | "y" | "true" | "x" | "1" | "✓" | "✔" | "ja" | "j" | "signed" | "s" | "+/-" | "±" => Some(true),
         "no" | "n" | "false" | "0" | "nein" | "unsigned" | "u" | "+" => Some(false),
+        _ => None,
+    }
+}
+
+/// Whether a register is read, written or both, as manuals say it.
+pub fn access_of(cell: &str) -> Option<Access> {
+    let word: String = cell.to_lowercase().chars().filter(|c| c.is_alphabetic()).collect();
+    match word.as_str() {
+        "r" | "ro" | "read" | "readonly" | "lesen" | "nurlesen" => Some(Access::Read),
+        "rw" | "wr" | "readwrite" | "writeread" | "lesenschreiben" => Some(Access::ReadWrite),
+        "w" | "wo" | "write" | "writeonly" | "schreiben" => Some(Access::Write),
         _ => None,
     }
 }

@@ -1,9 +1,12 @@
 //! Columns and cells of lists that are odd: read as they mean it, asked about, or left out with a reason.
 
 use super::{list_of, shown};
-use crate::register_map::{
-    list::{Column, ListContext, Said},
-    read,
+use crate::{
+    plant::address::AddressBase,
+    register_map::{
+        list::{Column, ListContext, Said},
+        read,
+    },
 };
 
 /// What of a file is taken, what is left out, and what is asked: each reason holds its words, in this order.
@@ -119,7 +122,7 @@ fn plain_numbers_without_a_heading_are_no_factors() {
 
 #[test]
 fn a_cell_that_does_not_fit_leaves_out_its_row_alone() {
-    let rows = "5;a;int16;0.1;0;10;1;rw\n6;b;int16;;0;ten;1;rw\n7;c;int16;;0;30;1;?\n8;d;int16;;1;30;one;r\n";
+    let rows = "0x5;a;int16;0.1;0;10;1;rw\n6;b;int16;;0;ten;1;rw\n7;c;int16;;0;30;1;?\n8;d;int16;;1;30;one;r\n";
     let text = format!("address;name;type;scale;min;max;decimals;access\n{rows}");
     let left_out = ["6: `ten` is not understood below greatest", "7: `?`", "8: `one`"];
     check(&text, &["40006 a int16 ABCD x0.1 rw min0 max10"], &left_out, &[]);
@@ -211,6 +214,40 @@ fn a_number_of_no_table_proves_nothing_of_others() {
         let list = list_of(&format!("address;name;type\n40080;W;int16\n{other};E;int16\n"));
         assert_eq!(list.unclear.map(|unclear| unclear.written).as_deref(), Some("40080"), "{other}");
     }
+}
+
+#[test]
+fn a_padded_number_may_count_from_one() {
+    let unclear = |text: &str| list_of(text).unclear.map(|unclear| (unclear.written, unclear.readings[0].0));
+    let asked = Some(("0005".to_owned(), AddressBase::One));
+    assert_eq!(unclear("area;address;name;type\n4x;0005;a;int16\n4x;0012;b;int16\n"), asked);
+    assert_eq!(unclear("address;name;type\n0005;a;int16\n12;b;int16\n"), asked);
+    assert_eq!(unclear("address;name;type\n0005;a;int16\n0000;b;int16\n"), None, "it counts from 0");
+    assert_eq!(unclear("address (1-based);name;type\n0005;a;int16\n"), None);
+    assert_eq!(unclear("address;name;type\n5;a;int16\n"), None);
+}
+
+#[test]
+fn what_may_be_written_is_taken_where_that_is_sure() {
+    let list = |text: &str| list_of(&format!("{text}\n"));
+    let access = |text: &str| list(text).named.iter().map(|named| named.access.word()).collect::<Vec<_>>();
+    for (heading, cells, expect) in [
+        ("Access", ["R", "R/W", "W"], ["r", "rw", "w"]),
+        ("R/W", ["read only", "Read/Write", "write-only"], ["r", "rw", "w"]),
+        ("Zugriff", ["Lesen", "Lesen/Schreiben", "Schreiben"], ["r", "rw", "w"]),
+    ] {
+        let rows = |first: &str| {
+            let row = |(n, cell): (usize, &&str)| format!("{first}{n};n{n};int16;{cell}");
+            let rows: Vec<String> = cells.iter().enumerate().map(row).collect();
+            format!("address;name;type;{heading}\n{}", rows.join("\n"))
+        };
+        assert_eq!(access(&rows("0x1")), expect, "{heading}");
+        assert_eq!(access(&rows("1")), ["r", "r", "r"], "the base is assumed: {heading}");
+        assert!(list(&rows("1")).said_of_rows().any(|said| said.contains("only read")), "{heading}");
+        assert_eq!(access(&rows("input:")), ["r", "r", "r"], "{heading}");
+    }
+    assert_eq!(access("address;name;type;access\n0x1;a;int32;RW"), ["r"], "the order is assumed");
+    assert_eq!(access("address;name;type;access\n0x1;a;int16;RW\n0x2;b;int16;level 2"), ["r", "r"], "said, not kept");
 }
 
 #[test]

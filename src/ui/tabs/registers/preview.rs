@@ -110,7 +110,8 @@ impl Preview {
     fn next_base(&mut self) {
         let bases = [AddressBase::Modicon, AddressBase::Zero, AddressBase::One];
         // The first press settles what is unclear.
-        self.context.base = Some(self.context.base.map_or(AddressBase::Modicon, |now| next(&bases, now)));
+        let likely = self.list.unclear.as_ref().map_or(AddressBase::Modicon, |unclear| unclear.readings[0].0);
+        self.context.base = Some(self.context.base.map_or(likely, |now| next(&bases, now)));
     }
 
     fn next_column(&mut self, by: isize) {
@@ -215,12 +216,13 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
         t!("Registers that can be taken: {count}, lines that cannot: {left}. Are the values right?", count, left);
     canvas.text(1, 0, &fit_words(&words, room), theme.strong());
     let (words, style) = match (&list.unclear, list.questions.first()) {
-        (Some(Unclear { written, modicon, sent }), _) => {
-            let (modicon, sent) = (place(*modicon), place(*sent));
-            (
-                t!("{written}: {modicon} (Modicon) or {sent} (as sent)? b says which", written, modicon, sent),
-                theme.trouble(),
-            )
+        (Some(Unclear { written, readings }), _) => {
+            let [first, second] = readings.map(|(base, at)| match base {
+                AddressBase::Modicon => t!("{place} (Modicon)", place = place(at)),
+                AddressBase::Zero => t!("{place} (as sent)", place = place(at)),
+                AddressBase::One => t!("{place} (from 1)", place = place(at)),
+            });
+            (t!("{written}: {first} or {second}? b says which", written, first, second), theme.trouble())
         }
         (None, Some(question)) => {
             (t!("{question} m says what the column means", question = question.words()), theme.trouble())
