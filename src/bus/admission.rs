@@ -244,8 +244,10 @@ fn warnings(def: &PlantDef, line: &LineDef, blocks: &[Block], utilisation: f64) 
         answer: answer(block),
         poll: name_of(def, block),
     });
-    let server =
-        matches!((&line.transport, line.transport.framing()), (Transport::Tcp { .. }, Framing::Rtu | Framing::Ascii));
+    let server = matches!(
+        (&line.transport, line.transport.framing()),
+        (Transport::Network { .. }, Framing::Rtu | Framing::Ascii)
+    );
     let full = (1.0 - WRITE_SHARE..=1.0).contains(&utilisation);
     let warnings = [
         serial.map(|_| Warning::NoParityOneStopBit),

@@ -14,7 +14,7 @@ use crate::{
     bus::io::{clock::Clock, testing::Bench, transport::Connector},
     plant::{
         PlantDef,
-        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Parity, Serial, Transport},
+        def::{DeviceDef, DeviceId, LineDef, LineId, Parity, Serial, Transport},
         diagnostics::{Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
     },
     profile::{self, OwnProfiles, Search},
@@ -114,11 +114,9 @@ pub fn own_profiles(folder: &Path) -> OwnProfiles {
 
 /// The arguments that open this device again at once.
 fn place(line: &LineDef, unit: u8) -> String {
-    let mode = match (&line.transport, line.transport.framing()) {
-        (Transport::Serial { .. }, Framing::Ascii) => " --mode ascii",
-        (Transport::Tcp { .. }, Framing::Rtu) => " --mode rtu-over-tcp",
-        (Transport::Tcp { .. }, Framing::Ascii) => " --mode ascii-over-tcp",
-        (Transport::Serial { .. } | Transport::Tcp { .. }, _) => "",
+    let mode = match profile::line::mode_word(&line.transport) {
+        None | Some("rtu" | "tcp") => String::new(),
+        Some(mode) => format!(" --mode {mode}"),
     };
     let serial = line.transport.serial().map_or(String::new(), |serial| {
         let stop = if serial.stop_bits == 2 { " --stop 2" } else { "" };
@@ -157,7 +155,7 @@ pub fn bench_station(line: LineDef, unit: u8) -> station::Station {
 fn bench(line: LineDef, unit: u8) -> PlantDef {
     let place = match &line.transport {
         Transport::Serial { port, serial, .. } => format!("{port} {serial}"),
-        Transport::Tcp { host, port, .. } => format!("{host}:{port}"),
+        Transport::Network { host, port, .. } => format!("{host}:{port}"),
     };
     let device = DeviceDef { unit, ..DeviceDef::new(DeviceId(0), "device", LineId(0)) };
     PlantDef { name: "bench".into(), title: place, lines: vec![line], devices: vec![device], ..PlantDef::default() }
@@ -318,7 +316,7 @@ fn serial_of(line: &LineDef) -> Serial {
 fn port_of(line: &LineDef) -> String {
     match &line.transport {
         Transport::Serial { port, .. } => port.clone(),
-        Transport::Tcp { host, port, .. } => format!("{host}:{port}"),
+        Transport::Network { host, port, .. } => format!("{host}:{port}"),
     }
 }
 

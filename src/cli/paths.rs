@@ -4,7 +4,7 @@ use std::{env, path::PathBuf};
 
 use crate::plant::{
     PlantDef,
-    def::{Framing, Rs485, Serial, Transport},
+    def::{Framing, Protocol, Rs485, Serial, Transport},
 };
 
 /// Histories and logs: `$STATE_DIRECTORY` (set by an init system), `$XDG_STATE_HOME/sightglass`,
@@ -43,7 +43,7 @@ pub fn replace_port(def: &mut PlantDef, text: &str) -> Result<(), String> {
     line.transport = if port.starts_with('/') {
         let (framing, rs485) = match &line.transport {
             Transport::Serial { framing, rs485, .. } => (*framing, *rs485),
-            Transport::Tcp { .. } => (Framing::Rtu, Rs485::Off),
+            Transport::Network { .. } => (Framing::Rtu, Rs485::Off),
         };
         let serial = line.transport.serial().unwrap_or(Serial::USUAL);
         Transport::Serial { port: port.to_owned(), serial, framing, rs485 }
@@ -51,11 +51,11 @@ pub fn replace_port(def: &mut PlantDef, text: &str) -> Result<(), String> {
         let parsed = Transport::host_and_port(port).and_then(|(host, port)| Some((host.to_owned(), port?)));
         let (host, port) =
             parsed.ok_or_else(|| format!("--port: found `{port}`, expected an absolute path or HOST:TCPPORT"))?;
-        let framing = match &line.transport {
-            Transport::Tcp { framing, .. } => *framing,
-            Transport::Serial { .. } => Framing::Mbap,
+        let (protocol, framing) = match &line.transport {
+            Transport::Network { protocol, framing, .. } => (*protocol, *framing),
+            Transport::Serial { .. } => (Protocol::Tcp, Framing::Mbap),
         };
-        Transport::Tcp { host, port, framing }
+        Transport::Network { protocol, host, port, framing }
     };
     Ok(())
 }

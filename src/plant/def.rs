@@ -13,7 +13,7 @@ pub use super::{
     control_run::RunDef,
     history_def::{HistoryDef, ParquetVersion},
     id::{AlarmId, DeviceId, LineId, ProcedureId, TagId},
-    line::{Framing, LineDef, Serial, Transport},
+    line::{Framing, LineDef, Protocol, Serial, Transport},
     mimic_def::{MimicDef, MimicPage, Picture},
     north_def::{MqttDef, NorthDef, PasswordSource, TlsRoots},
     output::Output,

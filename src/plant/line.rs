@@ -61,15 +61,26 @@ pub enum Transport {
         /// Who switches the direction of an RS-485 driver.
         rs485: Rs485,
     },
-    /// A TCP connection.
-    Tcp {
+    /// A host on a network.
+    Network {
+        /// TCP or UDP.
+        protocol: Protocol,
         /// Host name or address.
         host: String,
-        /// TCP port, 502 by default.
+        /// Port, 502 by default.
         port: u16,
         /// MBAP, or RTU frames as serial servers pass them on.
         framing: Framing,
     },
+}
+
+/// What carries frames over a network.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum Protocol {
+    /// One connection.
+    Tcp,
+    /// Datagrams, a frame each; one that is lost is not sent again.
+    Udp,
 }
 
 impl Transport {
@@ -80,7 +91,7 @@ impl Transport {
 
     /// Modbus TCP.
     pub fn tcp(host: &str, port: u16) -> Transport {
-        Transport::Tcp { host: host.to_owned(), port, framing: Framing::Mbap }
+        Transport::Network { protocol: Protocol::Tcp, host: host.to_owned(), port, framing: Framing::Mbap }
     }
 
     /// `host:502`, `host`, `10.0.0.5:502`, `[::1]:502` or `::1` as host and TCP port; `None` for a port that is none.
@@ -102,7 +113,7 @@ impl Transport {
     /// How frames are delimited and checked.
     pub fn framing(&self) -> Framing {
         match self {
-            Transport::Serial { framing, .. } | Transport::Tcp { framing, .. } => *framing,
+            Transport::Serial { framing, .. } | Transport::Network { framing, .. } => *framing,
         }
     }
 
@@ -115,7 +126,15 @@ impl Transport {
     pub fn serial(&self) -> Option<Serial> {
         match self {
             Transport::Serial { serial, .. } => Some(*serial),
-            Transport::Tcp { .. } => None,
+            Transport::Network { .. } => None,
+        }
+    }
+
+    /// The protocol, if it is a network.
+    pub fn protocol(&self) -> Option<Protocol> {
+        match self {
+            Transport::Serial { .. } => None,
+            Transport::Network { protocol, .. } => Some(*protocol),
         }
     }
 
@@ -124,9 +143,12 @@ impl Transport {
         match (self, self.framing()) {
             (Transport::Serial { .. }, Framing::Rtu) => "RTU",
             (Transport::Serial { .. }, _) => "ASCII",
-            (Transport::Tcp { .. }, Framing::Mbap) => "TCP",
-            (Transport::Tcp { .. }, Framing::Rtu) => "RTU over TCP",
-            (Transport::Tcp { .. }, Framing::Ascii) => "ASCII over TCP",
+            (Transport::Network { protocol: Protocol::Tcp, .. }, Framing::Mbap) => "TCP",
+            (Transport::Network { protocol: Protocol::Tcp, .. }, Framing::Rtu) => "RTU over TCP",
+            (Transport::Network { protocol: Protocol::Tcp, .. }, Framing::Ascii) => "ASCII over TCP",
+            (Transport::Network { protocol: Protocol::Udp, .. }, Framing::Mbap) => "UDP",
+            (Transport::Network { protocol: Protocol::Udp, .. }, Framing::Rtu) => "RTU over UDP",
+            (Transport::Network { protocol: Protocol::Udp, .. }, Framing::Ascii) => "ASCII over UDP",
         }
     }
 }
@@ -136,8 +158,8 @@ impl std::fmt::Display for Transport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Transport::Serial { port, serial, .. } => write!(f, "{} {port} {serial}", self.mode()),
-            Transport::Tcp { host, port, .. } if host.contains(':') => write!(f, "{} [{host}]:{port}", self.mode()),
-            Transport::Tcp { host, port, .. } => write!(f, "{} {host}:{port}", self.mode()),
+            Transport::Network { host, port, .. } if host.contains(':') => write!(f, "{} [{host}]:{port}", self.mode()),
+            Transport::Network { host, port, .. } => write!(f, "{} {host}:{port}", self.mode()),
         }
     }
 }

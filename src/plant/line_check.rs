@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::line::{Framing, LineDef, Serial, Transport};
+use super::line::{Framing, LineDef, Protocol, Serial, Transport};
 use crate::t;
 
 /// Shortest time that an answer may take: no device is faster, and less would be all timeouts.
@@ -42,7 +42,7 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
     check_transport(&line.transport, &mut check);
     let known = match &line.transport {
         Transport::Serial { framing, .. } => *framing != Framing::Mbap,
-        Transport::Tcp { .. } => true,
+        Transport::Network { .. } => true,
     };
     check(
         !known,
@@ -90,23 +90,22 @@ fn check_transport(transport: &Transport, check: &mut impl FnMut(bool, &'static 
             let wrong = !matches!(stop_bits, 1 | 2);
             check(wrong, "stop_bits", t!("{stop_bits} stop bits do not exist", stop_bits), t!("expected 1 or 2"));
         }
-        Transport::Tcp { host, port, framing: _ } => {
+        Transport::Network { protocol, host, port, framing: _ } => {
+            let (key, word) = match protocol {
+                Protocol::Tcp => ("tcp_port", "TCP"),
+                Protocol::Udp => ("udp_port", "UDP"),
+            };
             let named = !host.trim().is_empty();
-            check(!named, "host", t!("a TCP line needs a host").into(), t!("expected a name or an address"));
+            check(!named, "host", t!("a {word} line needs a host", word), t!("expected a name or an address"));
             // More than one colon is an address of IPv6.
             let with_port = host.matches(':').count() == 1;
             check(
                 with_port,
                 "host",
                 t!("`{host}` is no host", host),
-                t!("expected the host alone, the port is tcp_port"),
+                t!("expected the host alone, the port is tcp_port or udp_port"),
             );
-            check(
-                *port == 0,
-                "tcp_port",
-                t!("TCP port 0 does not exist").into(),
-                t!("expected 1 to 65535, usually 502"),
-            );
+            check(*port == 0, key, t!("{word} port 0 does not exist", word), t!("expected 1 to 65535, usually 502"));
         }
     }
 }

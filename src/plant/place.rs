@@ -12,7 +12,7 @@ use super::{
 fn of_line(line: &LineDef) -> String {
     match &line.transport {
         Transport::Serial { port, .. } => port.clone(),
-        Transport::Tcp { host, port, .. } => format!("{host} {port}"),
+        Transport::Network { host, port, .. } => format!("{host} {port}"),
     }
 }
 

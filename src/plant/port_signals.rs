@@ -65,8 +65,8 @@ impl SignalTest {
     /// Can it be done on this line? `Err` says why not.
     pub fn check_on(&self, line: &LineDef) -> Result<(), String> {
         match (&line.transport, self.signal) {
-            (Transport::Tcp { .. }, _) => {
-                Err(t!("a TCP connection has no RTS and DTR: this needs a serial line").to_owned())
+            (Transport::Network { .. }, _) => {
+                Err(t!("a network has no RTS and DTR: this needs a serial line").to_owned())
             }
             (Transport::Serial { rs485: Rs485::RtsHigh | Rs485::RtsLow, .. }, OutputSignal::Rts) => {
                 Err(t!("the driver switches RTS on this line (rs485 in the plant file): set DTR only").to_owned())

@@ -9,7 +9,7 @@ use super::{
     schema::PlantFile,
 };
 use crate::plant::{
-    def::{LineDef, Rs485, Transport},
+    def::{LineDef, Protocol, Rs485, Transport},
     line_check::check_settings,
 };
 
@@ -62,9 +62,11 @@ fn or_usual<T: Into<Value>>(key: &'static str, value: T, usual: T) -> Entry {
     Entry { key, value: value.into(), usual: Some(usual.into()) }
 }
 
-/// Keys that only a serial line has, and keys that only a TCP line has.
+/// Keys that only a serial line has, keys that only a TCP line has, and keys that only a UDP line has.
 const SERIAL: [&str; 7] = ["port", "baud", "data_bits", "parity", "stop_bits", "rs485", "turnaround_ms"];
-const TCP: [&str; 3] = ["host", "tcp_port", "connect_delay_ms"];
+const TCP: [&str; 2] = ["tcp_port", "connect_delay_ms"];
+const UDP: [&str; 1] = ["udp_port"];
+const HOST: [&str; 1] = ["host"];
 
 fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
     if settings.listens {
@@ -87,11 +89,14 @@ fn entries(settings: &LineDef) -> Option<Vec<Entry>> {
             or_usual("rs485", rs485.word(), Rs485::Off.word()),
             or_usual("turnaround_ms", ms(settings.turnaround), ms(usual.turnaround)),
         ]),
-        Transport::Tcp { host, port, framing: _ } => entries.extend([
+        Transport::Network { protocol: Protocol::Tcp, host, port, framing: _ } => entries.extend([
             entry("host", host.as_str()),
             or_usual("tcp_port", i64::from(*port), i64::from(TCP_PORT)),
             or_usual("connect_delay_ms", ms(settings.connect_delay), ms(usual.connect_delay)),
         ]),
+        Transport::Network { protocol: Protocol::Udp, host, port, framing: _ } => {
+            entries.extend([entry("host", host.as_str()), or_usual("udp_port", i64::from(*port), i64::from(TCP_PORT))])
+        }
     }
     entries.extend([
         or_usual("timeout_ms", ms(settings.timeout), ms(usual.timeout)),
@@ -110,11 +115,12 @@ pub(super) fn line_text(settings: &LineDef) -> String {
 
 fn set(table: &mut dyn TableLike, settings: &LineDef) -> Result<(), String> {
     let entries = entries(settings).ok_or("a plant file has no keyword for this mode")?;
-    let others: &[&str] = match settings.transport {
-        Transport::Serial { .. } => &TCP,
-        Transport::Tcp { .. } => &SERIAL,
+    let others: [&[&str]; 3] = match settings.transport.protocol() {
+        None => [&HOST, &TCP, &UDP],
+        Some(Protocol::Tcp) => [&SERIAL, &UDP, &[]],
+        Some(Protocol::Udp) => [&SERIAL, &TCP, &[]],
     };
-    let mut comments: String = others.iter().filter_map(|key| remove(table, key)).collect();
+    let mut comments: String = others.concat().iter().filter_map(|key| remove(table, key)).collect();
     for Entry { key, value, usual } in entries {
         match table.get_mut(key) {
             Some(item) => {
@@ -287,8 +293,9 @@ unit = 1
             rs485,
         });
         let framing = prop_oneof![Just(Framing::Rtu), Just(Framing::Ascii), Just(Framing::Mbap)];
-        let tcp = ("[ -9;-~]{0,20}[!-9;-~]", 1u16.., framing);
-        let tcp = tcp.prop_map(|(host, port, framing)| Transport::Tcp { host, port, framing });
+        let protocol = prop_oneof![Just(Protocol::Tcp), Just(Protocol::Udp)];
+        let tcp = (protocol, "[ -9;-~]{0,20}[!-9;-~]", 1u16.., framing);
+        let tcp = tcp.prop_map(|(protocol, host, port, framing)| Transport::Network { protocol, host, port, framing });
         prop_oneof![serial, tcp]
     }
 

@@ -6,11 +6,11 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Unique, check_name},
     reader::{At, Node, OptionalKey, Raw, kind_of, text},
-    schema::{DeviceTable, ListenFraming, ListenSerialTable, ListenTcpTable, SerialTable, TcpTable},
+    schema::{DeviceTable, ListenFraming, ListenSerialTable, ListenTcpTable, SerialTable, TcpTable, UdpTable},
 };
 use crate::plant::{
-    def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
-    keyword::keyword_enum,
+    def::{Framing, LineDef, LineId, Parity, Protocol, Rs485, Serial, Transport},
+    keyword::{Keyword, keyword_enum},
     line_check::{BAUD_RANGE, BAUDS, SettingError, check_settings},
     number::to_u16,
 };
@@ -26,11 +26,15 @@ pub(super) fn lines(tables: &[At<Raw>], problems: &mut Problems) -> Vec<LineDef>
         }
         let Some(mode) = kind_of::<Mode>(&raw, "a line", "mode", problems) else { continue };
         let id = LineId(to_u16(index));
-        let Some((is_tcp, framing)) = mode.transport() else {
+        let Some((protocol, framing)) = mode.transport() else {
             lines.extend(listening(raw, id, &mut seen, problems));
             continue;
         };
-        let read = if is_tcp { tcp } else { serial };
+        let read = match protocol {
+            None => serial,
+            Some(Protocol::Tcp) => tcp,
+            Some(Protocol::Udp) => udp,
+        };
         lines.extend(read(raw, framing, id, &mut seen, problems));
     }
     lines
@@ -45,6 +49,9 @@ keyword_enum! {
         Tcp => "tcp",
         RtuOverTcp => "rtu-over-tcp",
         AsciiOverTcp => "ascii-over-tcp",
+        Udp => "udp",
+        RtuOverUdp => "rtu-over-udp",
+        AsciiOverUdp => "ascii-over-udp",
         // Another master polls.
         Listen => "listen",
     }
@@ -63,16 +70,20 @@ impl ListenFraming {
 }
 
 impl Mode {
-    /// Whether it goes over TCP, and its framing; other keys say so of a listening line.
-    fn transport(self) -> Option<(bool, Framing)> {
-        match self {
-            Mode::Rtu => Some((false, Framing::Rtu)),
-            Mode::Ascii => Some((false, Framing::Ascii)),
-            Mode::Tcp => Some((true, Framing::Mbap)),
-            Mode::RtuOverTcp => Some((true, Framing::Rtu)),
-            Mode::AsciiOverTcp => Some((true, Framing::Ascii)),
-            Mode::Listen => None,
-        }
+    /// The protocol, if it goes over a network, and its framing; other keys say so of a listening line.
+    fn transport(self) -> Option<(Option<Protocol>, Framing)> {
+        let (protocol, framing) = match self {
+            Mode::Rtu => (None, Framing::Rtu),
+            Mode::Ascii => (None, Framing::Ascii),
+            Mode::Tcp => (Some(Protocol::Tcp), Framing::Mbap),
+            Mode::RtuOverTcp => (Some(Protocol::Tcp), Framing::Rtu),
+            Mode::AsciiOverTcp => (Some(Protocol::Tcp), Framing::Ascii),
+            Mode::Udp => (Some(Protocol::Udp), Framing::Mbap),
+            Mode::RtuOverUdp => (Some(Protocol::Udp), Framing::Rtu),
+            Mode::AsciiOverUdp => (Some(Protocol::Udp), Framing::Ascii),
+            Mode::Listen => return None,
+        };
+        Some((protocol, framing))
     }
 }
 
@@ -113,12 +124,27 @@ fn tcp(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut
     let table = TcpTable::of(&[raw], problems);
     let (host, port) = (text(&table.host), table.tcp_port.value_or(TCP_PORT));
     let name = checked_name(&table.name, seen, problems)?;
-    let usual = LineDef::new(id, &name, Transport::Tcp { host, port, framing });
+    let usual = LineDef::new(id, &name, Transport::Network { protocol: Protocol::Tcp, host, port, framing });
     let line = LineDef {
         timeout: millis(table.timeout_ms, usual.timeout),
         gap: millis(table.request_gap_ms, usual.gap),
         frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout),
         connect_delay: millis(table.connect_delay_ms, usual.connect_delay),
+        ..usual
+    };
+    report_wrong(&line, |key| table.span_of(key), problems);
+    Some(line)
+}
+
+fn udp(raw: Raw, framing: Framing, id: LineId, seen: &mut Unique, problems: &mut Problems) -> Option<LineDef> {
+    let table = UdpTable::of(&[raw], problems);
+    let (host, port) = (text(&table.host), table.udp_port.value_or(TCP_PORT));
+    let name = checked_name(&table.name, seen, problems)?;
+    let usual = LineDef::new(id, &name, Transport::Network { protocol: Protocol::Udp, host, port, framing });
+    let line = LineDef {
+        timeout: millis(table.timeout_ms, usual.timeout),
+        gap: millis(table.request_gap_ms, usual.gap),
+        frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout),
         ..usual
     };
     report_wrong(&line, |key| table.span_of(key), problems);
@@ -133,7 +159,7 @@ fn listening(raw: Raw, id: LineId, seen: &mut Unique, problems: &mut Problems) -
         let (host, port) = (text(&table.host), table.tcp_port.value_or(TCP_PORT));
         let framing = listen_framing(&table.framing, true, problems);
         let name = checked_name(&table.name, seen, problems)?;
-        let usual = LineDef::new(id, &name, Transport::Tcp { host, port, framing });
+        let usual = LineDef::new(id, &name, Transport::Network { protocol: Protocol::Tcp, host, port, framing });
         let line =
             LineDef { frame_timeout: millis(table.frame_timeout_ms, usual.frame_timeout), listens: true, ..usual };
         report_wrong(&line, |key| table.span_of(key), problems);
@@ -213,10 +239,15 @@ pub fn usual_data_bits(ascii: bool) -> u8 {
     if ascii { 7 } else { 8 }
 }
 
-/// The word of a mode in the plant file: `rtu`, `ascii`, `tcp`, `rtu-over-tcp`, `ascii-over-tcp`; `None` for a mode that has none.
-pub(super) fn mode_word(transport: &Transport) -> Option<&'static str> {
-    let written = (matches!(transport, Transport::Tcp { .. }), transport.framing());
+/// The word of a mode in the plant file: `rtu`, `ascii`, `tcp`, `rtu-over-tcp`, `udp`, …; `None` for a mode that has none.
+pub fn mode_word(transport: &Transport) -> Option<&'static str> {
+    let written = (transport.protocol(), transport.framing());
     Mode::ALL.into_iter().find(|mode| mode.transport() == Some(written)).map(Mode::word)
+}
+
+/// What a mode of the plant file means: the protocol, if it goes over a network, and the framing.
+pub fn of_mode_word(word: &str) -> Option<(Option<Protocol>, Framing)> {
+    Mode::from_word(word)?.transport()
 }
 
 /// The name of a line even if the rest of it is wrong, so that one mistake is reported once.

@@ -188,6 +188,17 @@ fn a_faulty_answer_in_rtu_over_tcp_is_never_shown_as_a_value() {
     }
 }
 
+#[test]
+fn the_station_reads_pymodbus_over_udp_and_no_faulty_answer() {
+    let Some(python) = python() else { return };
+    for mode in ["udp", "rtu-over-udp"] {
+        let port = free_port();
+        let _slave = slave(&python, mode, &port.to_string());
+        let said = read_faults(&[WELL, CORRUPT, SILENT, CUT], mode, &format!("127.0.0.1:{port}"));
+        check(&said, &[("WELL.N", "10 good"), ("SILENT.N", "---- bad: device not responding")]);
+    }
+}
+
 /// What a TCP peer can do short of answering: stay mute, hang up, answer by halves, talk nonsense.
 #[test]
 fn a_hostile_tcp_peer_costs_values_but_never_shows_a_wrong_one() {

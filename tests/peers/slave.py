@@ -1,6 +1,6 @@
 """A pymodbus slave for the tests.
 
-    slave.py rtu PORT | ascii PORT | tcp TCPPORT | rtu-over-tcp TCPPORT   [calm]
+    slave.py rtu PORT | ascii PORT | tcp TCPPORT | rtu-over-tcp TCPPORT | udp UDPPORT | rtu-over-udp UDPPORT   [calm]
 
 Unit 1 looks like a FUJI PXR4, unit 2 like a KOYO DL06; any other register holds its address. In the units 3 to 8 every register
 holds its address, and the address says what is wrong with the answer:
@@ -17,7 +17,7 @@ import asyncio
 import sys
 
 from pymodbus import FramerType
-from pymodbus.server import ModbusSerialServer, ModbusTcpServer
+from pymodbus.server import ModbusSerialServer, ModbusTcpServer, ModbusUdpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
 KIND, WHERE = sys.argv[1:3]
@@ -66,7 +66,7 @@ def trace_pdu(sending, pdu):
 
 def corrupt(frame):
     """The frame with a check that does not fit."""
-    if KIND == "tcp":
+    if KIND in ("tcp", "udp"):
         return bytes([frame[0] ^ 0xFF]) + frame[1:]
     if KIND == "ascii":
         return frame[:-3] + (b"1" if frame[-3:-2] == b"0" else b"0") + frame[-2:]
@@ -92,7 +92,7 @@ def trace_packet(sending, frame):
         case 4:
             return b""
         case 5:
-            if KIND == "tcp":
+            if KIND in ("tcp", "udp"):
                 return corrupt(frame)[:-1] + b"\x55" + frame
             return b"\xff\x00\x55" + frame
         case 6:
@@ -112,6 +112,9 @@ async def main():
         case "tcp" | "rtu-over-tcp":
             framer = FramerType.SOCKET if KIND == "tcp" else FramerType.RTU
             server = ModbusTcpServer(context, framer=framer, address=("127.0.0.1", int(WHERE)), **traces)
+        case "udp" | "rtu-over-udp":
+            framer = FramerType.SOCKET if KIND == "udp" else FramerType.RTU
+            server = ModbusUdpServer(context, framer=framer, address=("127.0.0.1", int(WHERE)), **traces)
         case "rtu" | "ascii":
             framer = FramerType.RTU if KIND == "rtu" else FramerType.ASCII
             server = ModbusSerialServer(context, framer=framer, port=WHERE, baudrate=9600, bytesize=8, parity="N", stopbits=1,

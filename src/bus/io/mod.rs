@@ -6,6 +6,7 @@ pub mod uart;
 pub mod ports;
 pub mod network;
 pub mod transport;
+pub mod datagrams;
 pub mod tap;
 pub mod hearing;
 pub mod signals;

@@ -99,8 +99,8 @@ pub async fn scan(network: Network, line: &LineDef, mut done: impl FnMut(usize))
 }
 
 async fn ask(host: Ipv4Addr, line: &LineDef) -> Option<HostAnswer> {
-    let Transport::Tcp { port, framing, .. } = line.transport else { return None };
-    let transport = Transport::Tcp { host: host.to_string(), port, framing };
+    let Transport::Network { protocol, port, framing, .. } = line.transport else { return None };
+    let transport = Transport::Network { protocol, host: host.to_string(), port, framing };
     let line = LineDef { transport, ..line.clone() };
     let mut connection = tokio::time::timeout(CONNECT_MAX, testing::open(&line)).await.ok()??;
     let hearing = Hearing::default();

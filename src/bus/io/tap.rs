@@ -32,7 +32,9 @@ impl Tap {
     pub async fn open(transport: &Transport, rts: bool) -> Result<Tap, String> {
         match transport {
             Transport::Serial { port, serial, .. } => open_serial(port, *serial, rts),
-            Transport::Tcp { host, port, .. } => Ok(Tap { bytes: Box::new(connect(host, *port).await?), watch: None }),
+            Transport::Network { host, port, .. } => {
+                Ok(Tap { bytes: Box::new(connect(host, *port).await?), watch: None })
+            }
         }
     }
 

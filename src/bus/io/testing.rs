@@ -296,7 +296,7 @@ impl Bench {
     pub fn port(&self) -> Option<&str> {
         match &self.line.transport {
             Transport::Serial { port, .. } => Some(port),
-            Transport::Tcp { .. } => None,
+            Transport::Network { .. } => None,
         }
     }
 

@@ -10,11 +10,12 @@ use tokio::{
 use tokio_serial::{SerialPortBuilderExt, SerialStream};
 
 use super::{
+    datagrams::Datagrams,
     pause::Pause,
     ports,
     uart::{self, PortWatch},
 };
-use crate::plant::def::{Parity, Rs485, Serial, Transport};
+use crate::plant::def::{Parity, Protocol, Rs485, Serial, Transport};
 
 /// A TCP connection must stand within this time.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
@@ -73,7 +74,11 @@ impl Connector {
 async fn open(transport: &Transport) -> Result<Opened, String> {
     match transport {
         Transport::Serial { port, serial, rs485, .. } => open_serial(port, *serial, *rs485),
-        Transport::Tcp { host, port, .. } => open_tcp(host, *port).await,
+        Transport::Network { protocol: Protocol::Tcp, host, port, .. } => open_tcp(host, *port).await,
+        Transport::Network { protocol: Protocol::Udp, host, port, framing } => {
+            let stream = Box::new(Datagrams::open(host, *port, *framing).await?);
+            Ok(Opened { stream, pause: Pause::exact(), watch: None })
+        }
     }
 }
 

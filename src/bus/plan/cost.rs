@@ -55,7 +55,7 @@ impl Wire {
                 }
                 Framing::Ascii => (serial.char_time(), Duration::ZERO, gap),
             },
-            Transport::Tcp { .. } => (TCP_BYTE, TCP_ROUND_TRIP, gap),
+            Transport::Network { .. } => (TCP_BYTE, TCP_ROUND_TRIP, gap),
         };
         let frame = |message: u32| character * (fixed + per_byte * message);
         Wire { request: frame(REQUEST), turnaround, answer: frame(ANSWER), byte: character * per_byte, silent_interval }

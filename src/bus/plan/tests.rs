@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::plant::{
-    def::{Framing, Limits, LineDef, Parity, Rs485, Serial, Transport},
+    def::{Framing, Limits, LineDef, Parity, Protocol, Rs485, Serial, Transport},
     fixture,
     tag::DataType,
 };
@@ -62,7 +62,7 @@ fn serial_line(baud: u32, stop_bits: u8, framing: Framing) -> Transport {
 fn costs_are_those_of_the_wire() {
     let mut def = fixture::plant();
     let block = blocks(&def, LineId(0), &UnreadableRanges::default()).remove(0);
-    let tcp = |framing| Transport::Tcp { host: "plc".into(), port: 502, framing };
+    let tcp = |framing| Transport::Network { protocol: Protocol::Tcp, host: "plc".into(), port: 502, framing };
     for (transport, words, ms) in [
         (serial_line(9600, 2, Framing::Rtu), 1u16, 25.2),
         (serial_line(9600, 2, Framing::Rtu), 10, 45.8),

@@ -21,11 +21,11 @@ use crate::{
     },
     plant::{
         command::CommandId,
-        def::{Framing, LineDef, LineId, Parity, Rs485, Serial, Transport},
+        def::{Framing, LineDef, LineId, Parity, Protocol, Rs485, Serial, Transport},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding},
         traffic::Exchange,
     },
-    profile::{BAUD_RANGE, BAUDS},
+    profile::{self, BAUD_RANGE, BAUDS},
 };
 
 use super::{CliError, menu, runtime, say, say_error};
@@ -39,8 +39,9 @@ pub struct PortArgs {
     /// A serial port (/dev/ttyUSB0), or HOST, HOST:TCPPORT or [IPV6]:TCPPORT
     #[arg(value_name = "PORT", value_parser = port_text)]
     port: String,
-    /// rtu, ascii, tcp, rtu-over-tcp or ascii-over-tcp [default: rtu on a serial port, else tcp]
-    #[arg(long, value_parser = ["rtu", "ascii", "tcp", "rtu-over-tcp", "ascii-over-tcp"])]
+    /// rtu, ascii, tcp, rtu-over-tcp, ascii-over-tcp, udp, rtu-over-udp or ascii-over-udp [default: rtu on a serial port,
+    /// else tcp]
+    #[arg(long, value_parser = ["rtu", "ascii", "tcp", "rtu-over-tcp", "ascii-over-tcp", "udp", "rtu-over-udp", "ascii-over-udp"])]
     mode: Option<String>,
     /// Baud rate [default: 9600]
     #[arg(long)]
@@ -133,15 +134,9 @@ impl PortArgs {
         }
         let is_path = self.is_path();
         let mode = self.mode.as_deref().unwrap_or(if is_path { "rtu" } else { "tcp" });
-        let (serial_mode, framing) = match mode {
-            "rtu" => (true, Framing::Rtu),
-            "ascii" => (true, Framing::Ascii),
-            "rtu-over-tcp" => (false, Framing::Rtu),
-            "ascii-over-tcp" => (false, Framing::Ascii),
-            _ => (false, Framing::Mbap),
-        };
-        if serial_mode != is_path {
-            let expected = if serial_mode { "a path such as /dev/ttyUSB0" } else { "HOST or HOST:TCPPORT" };
+        let (protocol, framing) = profile::line::of_mode_word(mode).unwrap_or((Some(Protocol::Tcp), Framing::Mbap));
+        if protocol.is_none() != is_path {
+            let expected = if protocol.is_none() { "a path such as /dev/ttyUSB0" } else { "HOST or HOST:TCPPORT" };
             return Err(CliError::Usage(format!("port: found `{}`, expected {expected} for {mode}", self.port)));
         }
         let transport = if is_path {
@@ -154,7 +149,8 @@ impl PortArgs {
                 let expected = "expected HOST or HOST:TCPPORT with a TCP port up to 65535, or [IPV6]:TCPPORT";
                 CliError::Usage(format!("port: found `{}`, {expected}", self.port))
             })?;
-            Transport::Tcp { host: host.to_owned(), port: tcp_port.unwrap_or(502), framing }
+            let protocol = protocol.unwrap_or(Protocol::Tcp);
+            Transport::Network { protocol, host: host.to_owned(), port: tcp_port.unwrap_or(502), framing }
         };
         Ok(LineDef {
             timeout: Duration::from_millis(self.timeout.unwrap_or(TIMEOUT_MS)),

@@ -13,6 +13,7 @@ use crate::{
         def::{LineDef, Transport},
         number::to_u32,
     },
+    profile,
 };
 
 /// Asks, connects to every host, shows who answers, and offers to open one.
@@ -86,11 +87,11 @@ async fn scanned(network: Network, line: &LineDef) -> Result<Vec<(Ipv4Addr, Host
 /// The arguments that open a host.
 fn words_of(host: Ipv4Addr, answer: &HostAnswer, line: &LineDef) -> Option<Vec<String>> {
     let HostAnswer::Unit(unit, _) = answer else { return None };
-    let mode = if line.transport.mode() == "TCP" { "tcp" } else { "rtu-over-tcp" };
+    let mode = profile::line::mode_word(&line.transport).unwrap_or("tcp");
     let words = ["open", &format!("{host}:{}", port_of(line)), "--unit", &unit.to_string(), "--mode", mode];
     Some(words.map(str::to_owned).to_vec())
 }
 
 fn port_of(line: &LineDef) -> u16 {
-    if let Transport::Tcp { port, .. } = line.transport { port } else { 0 }
+    if let Transport::Network { port, .. } = line.transport { port } else { 0 }
 }

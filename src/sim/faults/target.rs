@@ -122,7 +122,7 @@ pub fn why_not_applicable(def: &PlantDef, target: FaultTarget, fault: InjectedFa
 }
 
 fn over_mbap(def: &PlantDef, line: LineId) -> bool {
-    matches!(def.line(line).transport, Transport::Tcp { framing: Framing::Mbap, .. })
+    matches!(def.line(line).transport, Transport::Network { framing: Framing::Mbap, .. })
 }
 
 fn lack(fault: ValueFault) -> &'static str {

@@ -14,7 +14,7 @@ use crate::{
     bus::io::clock::Clock,
     plant::{
         PlantDef,
-        def::{Framing, LineDef, LineId, Serial, Transport},
+        def::{Framing, LineDef, LineId, Protocol, Serial, Transport},
         number::to_u16,
     },
     sim::simulator::{Simulator, UnknownSimulation},
@@ -83,11 +83,12 @@ impl Serving {
         for (line, endpoint) in def.lines.iter_mut().zip(&self.endpoints) {
             match (&mut line.transport, endpoint) {
                 (Transport::Serial { port, .. }, Endpoint::Port(path)) => *port = path.display().to_string(),
-                (Transport::Tcp { host, port, .. }, Endpoint::Address(address)) => {
-                    (*host, *port) = (address.ip().to_string(), address.port());
+                // Simulated devices are asked over a connection.
+                (Transport::Network { protocol, host, port, .. }, Endpoint::Address(address)) => {
+                    (*protocol, *host, *port) = (Protocol::Tcp, address.ip().to_string(), address.port());
                 }
                 // Served otherwise than the plant says, which is for masters of other makers.
-                (Transport::Serial { .. }, Endpoint::Address(_)) | (Transport::Tcp { .. }, Endpoint::Port(_)) => {}
+                (Transport::Serial { .. }, Endpoint::Address(_)) | (Transport::Network { .. }, Endpoint::Port(_)) => {}
             }
         }
     }
@@ -120,9 +121,9 @@ impl Mode {
         match &line.transport {
             Transport::Serial { framing: Framing::Ascii, .. } => Mode::Ascii,
             Transport::Serial { .. } => Mode::Rtu,
-            Transport::Tcp { framing: Framing::Mbap, .. } => Mode::Tcp,
-            Transport::Tcp { framing: Framing::Ascii, .. } => Mode::AsciiOverTcp,
-            Transport::Tcp { .. } => Mode::RtuOverTcp,
+            Transport::Network { framing: Framing::Mbap, .. } => Mode::Tcp,
+            Transport::Network { framing: Framing::Ascii, .. } => Mode::AsciiOverTcp,
+            Transport::Network { .. } => Mode::RtuOverTcp,
         }
     }
 

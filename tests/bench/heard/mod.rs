@@ -14,7 +14,7 @@ use sightglass::{
     bus::listen::{Heard, Listener, Losses, events},
     plant::{
         Plant, PlantDef,
-        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Serial, TagId, Transport},
+        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Protocol, Serial, TagId, Transport},
         event::Event,
         line::Rs485,
         tag::{ByteOrder, DataType, Point, Table, TagDef},
@@ -154,7 +154,7 @@ fn plant(model: &Model) -> PlantDef {
     let serial = Serial { baud: model.baud.unwrap_or_default(), ..Serial::USUAL };
     let transport = match model.baud {
         Some(_) => Transport::Serial { port: "heard".into(), serial, framing: model.framing, rs485: Rs485::Off },
-        None => Transport::Tcp { host: "heard".into(), port: 502, framing: model.framing },
+        None => Transport::Network { protocol: Protocol::Tcp, host: "heard".into(), port: 502, framing: model.framing },
     };
     let mut def = PlantDef {
         name: "heard".into(),

@@ -129,7 +129,8 @@ async fn at_deaf(diagnostic: Diagnostic, lost: u32, framing: Framing) -> (Vec<Fi
             tokio::spawn(deaf(stream, lost, framing));
         }
     });
-    let transport = Transport::Tcp { host: "127.0.0.1".into(), port, framing };
+    let transport =
+        Transport::Network { protocol: crate::plant::def::Protocol::Tcp, host: "127.0.0.1".into(), port, framing };
     let line = LineDef { timeout: Duration::from_millis(60), ..LineDef::new(LineId(0), "line", transport) };
     let job = Job::new(CommandId::default(), "test".into(), diagnostic, Timestamp::UNIX_EPOCH);
     let run = Bench::new(&line).run(job, |_| true).await;

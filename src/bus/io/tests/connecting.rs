@@ -14,7 +14,7 @@ use crate::{
     plant::{
         PlantDef,
         command::{BusRequest, WriteId, WriteJob},
-        def::{Framing, TagId, Transport},
+        def::{Framing, Protocol, TagId, Transport},
         event::{Event, Fault, LineState, WriteResult},
     },
 };
@@ -39,7 +39,7 @@ impl Unreachable {
         let mut def = plant(Mode::Tcp);
         let (host, port) = ("127.0.0.1".to_owned(), self.at.local_addr().expect("it is bound").port());
         let framing = if listens { Framing::Rtu } else { Framing::Mbap };
-        let transport = Transport::Tcp { host, port, framing };
+        let transport = Transport::Network { protocol: Protocol::Tcp, host, port, framing };
         (def.lines[0].listens, def.lines[0].transport) = (listens, transport.clone());
         let mut line = line_on(def.clone(), mpsc::channel(1).0, Connector::Real(transport));
         let connects = |event: &Event| is_in(event, &LineState::Connecting).then_some(());

@@ -25,7 +25,7 @@ use crate::{
     plant::{
         PlantDef,
         command::{BusRequest, WriteId, WriteJob},
-        def::{DeviceDef, DeviceId, Framing, Limits, LineId, Rs485, Serial, TagId, Transport},
+        def::{DeviceDef, DeviceId, Framing, Limits, LineId, Protocol, Rs485, Serial, TagId, Transport},
         event::{Event, Fault, WriteResult},
         fixture,
         line_finding::DeviceFinding,
@@ -67,8 +67,15 @@ impl Mode {
         match self {
             Mode::Rtu => serial(Framing::Rtu, 8),
             Mode::Ascii => serial(Framing::Ascii, 7),
-            Mode::RtuOverTcp => Transport::Tcp { host: "memory".into(), port: 502, framing: Framing::Rtu },
-            Mode::AsciiOverTcp => Transport::Tcp { host: "memory".into(), port: 502, framing: Framing::Ascii },
+            Mode::RtuOverTcp => {
+                Transport::Network { protocol: Protocol::Tcp, host: "memory".into(), port: 502, framing: Framing::Rtu }
+            }
+            Mode::AsciiOverTcp => Transport::Network {
+                protocol: Protocol::Tcp,
+                host: "memory".into(),
+                port: 502,
+                framing: Framing::Ascii,
+            },
             Mode::Tcp | Mode::Tcp16 => Transport::tcp("memory", 502),
         }
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::{
     plant::{
-        def::{Framing, LineDef, Parity, Rs485, Serial, Transport},
+        def::{Framing, LineDef, Parity, Protocol, Rs485, Serial, Transport},
         line_check::{BAUDS, check_settings},
     },
     profile::line::{TCP_PORT, usual_data_bits},
@@ -38,13 +38,16 @@ impl Row {
     }
 }
 
-/// The modes of a line: on a serial port or over TCP, and with which frames.
-const MODES: [(bool, Framing); 5] = [
-    (true, Framing::Rtu),
-    (true, Framing::Ascii),
-    (false, Framing::Mbap),
-    (false, Framing::Rtu),
-    (false, Framing::Ascii),
+/// The modes of a line: on a serial port or over a network, and with which frames.
+const MODES: [(Option<Protocol>, Framing); 8] = [
+    (None, Framing::Rtu),
+    (None, Framing::Ascii),
+    (Some(Protocol::Tcp), Framing::Mbap),
+    (Some(Protocol::Tcp), Framing::Rtu),
+    (Some(Protocol::Tcp), Framing::Ascii),
+    (Some(Protocol::Udp), Framing::Mbap),
+    (Some(Protocol::Udp), Framing::Rtu),
+    (Some(Protocol::Udp), Framing::Ascii),
 ];
 const STOP_BITS: [u8; 2] = [1, 2];
 /// Most characters of a port or a host.
@@ -66,10 +69,10 @@ impl Draft {
         let usual = (t!("/dev/ttyUSB0"), Serial::USUAL, Rs485::Off, "", TCP_PORT);
         let (port, serial, rs485, host, tcp_port) = match &settings.transport {
             Transport::Serial { port, serial, rs485, .. } => (&**port, *serial, *rs485, usual.3, usual.4),
-            Transport::Tcp { host, port, .. } => (usual.0, usual.1, usual.2, &**host, *port),
+            Transport::Network { host, port, .. } => (usual.0, usual.1, usual.2, &**host, *port),
         };
         let is_serial = settings.transport.serial().is_some();
-        let mode = (is_serial, settings.transport.framing());
+        let mode = (settings.transport.protocol(), settings.transport.framing());
         let mut bauds = BAUDS.to_vec();
         if let Err(place) = bauds.binary_search(&serial.baud) {
             bauds.insert(place, serial.baud);
@@ -93,7 +96,7 @@ impl Draft {
         draft
     }
 
-    fn mode(&self) -> (bool, Framing) {
+    fn mode(&self) -> (Option<Protocol>, Framing) {
         MODES[self.form.chosen(Row::Mode as usize)]
     }
 
@@ -110,7 +113,7 @@ impl Draft {
     }
 
     fn fit(&mut self) {
-        let is_serial = self.mode().0;
+        let is_serial = self.mode().0.is_none();
         for row in [Row::Port, Row::Baud, Row::DataBits, Row::Parity, Row::StopBits] {
             self.form.hide(row as usize, !is_serial);
         }
@@ -138,8 +141,8 @@ impl Draft {
 
     fn transport(&self) -> Result<Transport, String> {
         let (text, chosen) = (|row: Row| self.form.text(row as usize), |row: Row| self.form.chosen(row as usize));
-        let (is_serial, framing) = self.mode();
-        if is_serial {
+        let (protocol, framing) = self.mode();
+        let Some(protocol) = protocol else {
             let serial = Serial {
                 baud: self.bauds[chosen(Row::Baud)],
                 data_bits: text(Row::DataBits).parse().unwrap_or_else(|_| usual_data_bits(false)),
@@ -147,10 +150,10 @@ impl Draft {
                 stop_bits: STOP_BITS[chosen(Row::StopBits)],
             };
             return Ok(Transport::Serial { port: text(Row::Port), serial, framing, rs485: self.rs485 });
-        }
+        };
         let port = text(Row::TcpPort);
         let port = port.parse().map_err(|_| t!("\"{text}\" is not a TCP port, expected 1 to 65535", text = port))?;
-        Ok(Transport::Tcp { host: text(Row::Host), port, framing })
+        Ok(Transport::Network { protocol, host: text(Row::Host), port, framing })
     }
 
     fn millis(&self, row: Row) -> Result<Duration, String> {
@@ -171,13 +174,16 @@ fn data_bits(framing: Framing, now: u8) -> Field {
     Field::one_of(t!("data bits"), all, now, |bits| bits.to_string())
 }
 
-fn mode_words(mode: (bool, Framing)) -> &'static str {
+fn mode_words(mode: (Option<Protocol>, Framing)) -> &'static str {
     match mode {
-        (true, Framing::Ascii) => "ASCII",
-        (true, Framing::Rtu | Framing::Mbap) => "RTU",
-        (false, Framing::Mbap) => "TCP",
-        (false, Framing::Rtu) => t!("RTU over TCP"),
-        (false, Framing::Ascii) => t!("ASCII over TCP"),
+        (None, Framing::Ascii) => "ASCII",
+        (None, Framing::Rtu | Framing::Mbap) => "RTU",
+        (Some(Protocol::Tcp), Framing::Mbap) => "TCP",
+        (Some(Protocol::Tcp), Framing::Rtu) => t!("RTU over TCP"),
+        (Some(Protocol::Tcp), Framing::Ascii) => t!("ASCII over TCP"),
+        (Some(Protocol::Udp), Framing::Mbap) => "UDP",
+        (Some(Protocol::Udp), Framing::Rtu) => t!("RTU over UDP"),
+        (Some(Protocol::Udp), Framing::Ascii) => t!("ASCII over UDP"),
     }
 }
 

@@ -28,7 +28,7 @@ pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<String> {
 /// Where nothing was asked, because the connection does not come about or does not last.
 fn of_connection(cx: &ViewContext, line: LineId) -> Vec<String> {
     let (state, transport) = (&cx.snapshot.line(line).state, &cx.def().line(line).transport);
-    let (LineState::Waiting { .. }, Transport::Tcp { framing, .. }) = (state, transport) else {
+    let (LineState::Waiting { .. }, Transport::Network { framing, .. }) = (state, transport) else {
         return Vec::new();
     };
     let other = match framing {
