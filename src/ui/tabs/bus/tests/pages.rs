@@ -250,7 +250,7 @@ fn no_signal_is_set_where_the_driver_has_it_or_there_is_none() {
         screen(&mut model, 80, 24)
     };
     let shown = on(&|transport| *transport = Transport::tcp("host", 502));
-    assert!(shown.contains("a TCP connection has no RTS and DTR"), "{shown}");
+    assert!(shown.contains("a network has no RTS and DTR"), "{shown}");
     let shown = on(&|transport| {
         if let Transport::Serial { rs485, .. } = transport {
             *rs485 = Rs485::RtsHigh;
