@@ -75,7 +75,7 @@ impl Block {
 }
 
 /// The blocks of a line: every readable tag in exactly one, no value split, all within the limits of its device, in the
-/// least time on the wire. A tag that the device has [`refused`] is asked for alone and seldom.
+/// least time on the wire. A tag that the device has [`refused()`] is asked for alone and seldom.
 pub fn blocks(def: &PlantDef, line: LineId, unreadable: &UnreadableRanges) -> Vec<Block> {
     blocks_with_unpolled(def, line, unreadable, &[])
 }
