@@ -54,14 +54,22 @@ impl Datagrams {
     }
 }
 
+/// Was an earlier datagram refused, because nobody takes any there now? Then it has no answer, and the next one may have.
+fn is_refused<T>(ended: &io::Result<T>) -> bool {
+    ended.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused)
+}
+
 impl AsyncRead for Datagrams {
     fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context, buffer: &mut ReadBuf) -> Poll<io::Result<()>> {
         // An empty one is no end.
         while self.left.is_empty() {
             let mut bytes = [0; DATAGRAM_MAX];
             let mut datagram = ReadBuf::new(&mut bytes);
-            ready!(self.socket.poll_recv(cx, &mut datagram))?;
-            self.left.extend(datagram.filled());
+            let received = ready!(self.socket.poll_recv(cx, &mut datagram));
+            if !is_refused(&received) {
+                received?;
+                self.left.extend(datagram.filled());
+            }
         }
         let count = self.left.len().min(buffer.remaining());
         buffer.put_slice(&self.left[..count]);
@@ -72,7 +80,10 @@ impl AsyncRead for Datagrams {
 
 impl AsyncWrite for Datagrams {
     fn poll_write(self: Pin<&mut Self>, cx: &mut Context, bytes: &[u8]) -> Poll<io::Result<usize>> {
-        self.socket.poll_send(cx, &bytes[..self.first(bytes)])
+        let frame = &bytes[..self.first(bytes)];
+        let sent = ready!(self.socket.poll_send(cx, frame));
+        // What was refused is the one before; this one was not sent.
+        if is_refused(&sent) { self.socket.poll_send(cx, frame) } else { Poll::Ready(sent) }
     }
 
     fn poll_flush(self: Pin<&mut Self>, _: &mut Context) -> Poll<io::Result<()>> {
@@ -81,5 +92,52 @@ impl AsyncWrite for Datagrams {
 
     fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context) -> Poll<io::Result<()>> {
         Poll::Ready(Ok(()))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+
+    use super::*;
+
+    #[tokio::test]
+    async fn each_frame_is_a_datagram_and_an_empty_one_no_end() {
+        let device = UdpSocket::bind("127.0.0.1:0").await.unwrap();
+        let mut datagrams =
+            Datagrams::open("127.0.0.1", device.local_addr().unwrap().port(), Framing::Mbap).await.unwrap();
+        let frame = |id: u8| [0, id, 0, 0, 0, 6, 1, 3, 0, 0, 0, 1];
+        datagrams.write_all(&[frame(1), frame(2)].concat()).await.unwrap();
+        let mut bytes = [0; DATAGRAM_MAX];
+        for id in [1, 2] {
+            let (count, from) = device.recv_from(&mut bytes).await.unwrap();
+            assert_eq!(bytes[..count], frame(id));
+            device.send_to(&[], from).await.unwrap();
+            device.send_to(&[id; 9], from).await.unwrap();
+        }
+        let mut answers = [0; 18];
+        datagrams.read_exact(&mut answers[..4]).await.unwrap();
+        datagrams.read_exact(&mut answers[4..]).await.unwrap();
+        assert_eq!(answers, *[[1; 9], [2; 9]].as_flattened());
+    }
+
+    #[tokio::test]
+    async fn a_device_that_was_off_is_asked_again() {
+        let device = UdpSocket::bind("127.0.0.1:0").await.unwrap();
+        let address = device.local_addr().unwrap();
+        drop(device);
+        let mut datagrams = Datagrams::open("127.0.0.1", address.port(), Framing::Rtu).await.unwrap();
+        datagrams.write_all(b"nobody").await.unwrap();
+        let device = UdpSocket::bind(address).await.unwrap();
+        // The refusal of the first one lies in wait for the next call.
+        datagrams.write_all(b"request").await.unwrap();
+        let mut bytes = [0; DATAGRAM_MAX];
+        let (count, from) = device.recv_from(&mut bytes).await.unwrap();
+        assert_eq!(&bytes[..count], b"request");
+        device.send_to(b"answer", from).await.unwrap();
+        let mut answer = [0; 6];
+        datagrams.read_exact(&mut answer).await.unwrap();
+        assert_eq!(&answer, b"answer");
     }
 }
