@@ -54,7 +54,7 @@ impl Datagrams {
     }
 }
 
-/// Was an earlier datagram refused, because nobody takes any there now? Then it has no answer, and the next one may have.
+/// Was an earlier datagram refused, because the device takes none now? Then it has no answer, and the next one may have.
 fn is_refused<T>(ended: &io::Result<T>) -> bool {
     ended.as_ref().is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused)
 }
