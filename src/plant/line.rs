@@ -138,6 +138,11 @@ impl Transport {
         }
     }
 
+    /// Is there a connection, which is opened, may be deaf for a while, and ends?
+    pub fn has_connection(&self) -> bool {
+        self.protocol() == Some(Protocol::Tcp)
+    }
+
     /// The word for the mode: `RTU`, `ASCII`, `TCP`, `RTU over TCP`.
     pub fn mode(&self) -> &'static str {
         match (self, self.framing()) {

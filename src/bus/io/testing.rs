@@ -45,9 +45,9 @@ pub struct Hearing {
 }
 
 impl Hearing {
-    /// A serial port accepts nothing: what is not answered at once is not there.
+    /// A port without connections accepts nothing: what is not answered at once is not there.
     fn of(line: &LineDef) -> Hearing {
-        let at_once = line.transport.serial().is_some().then_some(Duration::ZERO);
+        let at_once = (!line.transport.has_connection()).then_some(Duration::ZERO);
         Hearing { heard: Cell::new(at_once) }
     }
 

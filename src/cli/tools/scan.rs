@@ -65,7 +65,7 @@ pub fn time_max(line: &LineDef, scan: &Scan) -> (usize, Duration) {
     // Where nothing answers on several connections at once, it is asked again on one.
     let is_wide = line.transport.framing() == Framing::Mbap && 1 < requests;
     let at_once = if is_wide { requests.div_ceil(testing::SCAN_CONNECTIONS) } else { 0 };
-    let deaf = if line.transport.serial().is_none() { testing::DEAF_MAX } else { Duration::ZERO };
+    let deaf = if line.transport.has_connection() { testing::DEAF_MAX } else { Duration::ZERO };
     // With other settings nothing is asked before the answer to what was asked before can no longer come.
     let changes = line.timeout * to_u32(scan.serials.len());
     (requests, deaf + changes + scan.timeout * to_u32(requests + at_once))

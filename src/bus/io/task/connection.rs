@@ -77,7 +77,7 @@ impl Task<'_> {
     /// A port was left. One that is gone without a fault of the line is [`LinkExit::UsedUp`].
     async fn ended(&mut self, schedule: &mut Schedule, answers: u64, exit: LinkExit) -> Result<LinkExit, LinkExit> {
         let exit = match exit {
-            LinkExit::Gone(why) if self.settings.transport.serial().is_none() => {
+            LinkExit::Gone(why) if self.settings.transport.has_connection() => {
                 tracing::debug!(line = self.settings.name, why, answers, "the connection has ended");
                 if self.on_hangup(schedule, answers).await? {
                     self.end_diagnostic(&why).await?;

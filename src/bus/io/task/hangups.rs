@@ -64,8 +64,7 @@ impl Task<'_> {
 
     /// The first answer over a connection shows how long the other side was deaf.
     pub(super) fn check_deafness(&mut self, link: &mut Link) {
-        let network = self.settings.transport.serial().is_none();
-        if self.heard || !network || link.answers() == 0 {
+        if self.heard || !self.settings.transport.has_connection() || link.answers() == 0 {
             return;
         }
         self.heard = true;
@@ -103,8 +102,7 @@ impl Task<'_> {
 
     /// May the other side have had enough of this connection?
     pub(super) fn check_used_up(&mut self, link: &Link) -> Result<(), LinkExit> {
-        let network = self.settings.transport.serial().is_none();
-        if network
+        if self.settings.transport.has_connection()
             && self.under_way.is_empty()
             && self.hangups.answers_max() == Some(link.answers())
             && self.hangups.is_used_up(link.answers())

@@ -98,7 +98,7 @@ impl Task<'_> {
     /// A peer may have forgotten a connection, or hold it without ever answering: only a new one shows which.
     pub(super) fn check_connection(&mut self, link: &Link) -> Result<(), LinkExit> {
         let most = UNANSWERED_MAX << self.unheard.min(DOUBLINGS_MAX);
-        if self.settings.transport.serial().is_some() || link.unanswered < most {
+        if !self.settings.transport.has_connection() || link.unanswered < most {
             return Ok(());
         }
         self.unheard += u32::from(link.answers() == 0);

@@ -84,8 +84,8 @@ impl Task<'_> {
         }
         // It may still be queued here or on the way; closing the connection discards it. A waiting stop does not wait for
         // another connection and follows it on this one.
-        let tcp = self.settings.transport.serial().is_none();
-        if tcp && unanswered && !self.requests.stop_waits() { Err(LinkExit::UsedUp) } else { Ok(()) }
+        let closes = self.settings.transport.has_connection();
+        if closes && unanswered && !self.requests.stop_waits() { Err(LinkExit::UsedUp) } else { Ok(()) }
     }
 
     /// Publishes the value that was read back, or has the value read again that a write has made unknown.

@@ -99,3 +99,25 @@ async fn a_silent_unit_that_is_out_of_sync_is_read_again() {
     let (good, failed) = poll(Mode::Ascii, 60, script).await;
     assert!(failed < good, "{good} good, {failed} failed");
 }
+
+/// Without connections none can be of use: the line stays as it is while its devices are silent, and they are back at once.
+#[tokio::test(start_paused = true)]
+async fn a_silent_host_without_a_connection_does_not_move_its_line() {
+    for mode in [Mode::Udp, Mode::RtuOverUdp] {
+        let def = plant(mode);
+        let mut line = line(def.clone());
+        line.plug(mode, |number, _| if number < 40 { SlaveAction::Silent } else { SlaveAction::Answer });
+        let (mut failed, mut good) = (0, 0);
+        while good < 20 {
+            match line.next(&def).await {
+                Event::Failed { .. } => failed += 1,
+                Event::Read { .. } => good += 1,
+                Event::Line { state, .. } => {
+                    assert!(!matches!(state, LineState::Waiting { .. }), "{mode:?}: {state:?}")
+                }
+                _ => {}
+            }
+        }
+        assert!(10 < failed, "{mode:?}: {failed} failed before");
+    }
+}

@@ -43,6 +43,8 @@ pub enum Mode {
     Tcp,
     /// With sixteen requests under way.
     Tcp16,
+    Udp,
+    RtuOverUdp,
 }
 
 impl Mode {
@@ -64,19 +66,15 @@ impl Mode {
             framing,
             rs485: Rs485::Off,
         };
+        let network = |protocol, framing| Transport::Network { protocol, host: "memory".into(), port: 502, framing };
         match self {
             Mode::Rtu => serial(Framing::Rtu, 8),
             Mode::Ascii => serial(Framing::Ascii, 7),
-            Mode::RtuOverTcp => {
-                Transport::Network { protocol: Protocol::Tcp, host: "memory".into(), port: 502, framing: Framing::Rtu }
-            }
-            Mode::AsciiOverTcp => Transport::Network {
-                protocol: Protocol::Tcp,
-                host: "memory".into(),
-                port: 502,
-                framing: Framing::Ascii,
-            },
-            Mode::Tcp | Mode::Tcp16 => Transport::tcp("memory", 502),
+            Mode::RtuOverTcp => network(Protocol::Tcp, Framing::Rtu),
+            Mode::AsciiOverTcp => network(Protocol::Tcp, Framing::Ascii),
+            Mode::Tcp | Mode::Tcp16 => network(Protocol::Tcp, Framing::Mbap),
+            Mode::Udp => network(Protocol::Udp, Framing::Mbap),
+            Mode::RtuOverUdp => network(Protocol::Udp, Framing::Rtu),
         }
     }
 
