@@ -245,6 +245,11 @@ pub fn mode_word(transport: &Transport) -> Option<&'static str> {
     Mode::ALL.into_iter().find(|mode| mode.transport() == Some(written)).map(Mode::word)
 }
 
+/// The words of the modes of lines that are polled.
+pub fn polled_modes() -> impl Iterator<Item = &'static str> {
+    Mode::ALL.into_iter().filter(|mode| mode.transport().is_some()).map(Mode::word)
+}
+
 /// What a mode of the plant file means: the protocol, if it goes over a network, and the framing.
 pub fn of_mode_word(word: &str) -> Option<(Option<Protocol>, Framing)> {
     Mode::from_word(word)?.transport()

@@ -104,6 +104,8 @@ async fn ask(host: Ipv4Addr, line: &LineDef) -> Option<HostAnswer> {
     let line = LineDef { transport, ..line.clone() };
     let mut connection = tokio::time::timeout(CONNECT_MAX, testing::open(&line)).await.ok()??;
     let hearing = Hearing::default();
+    // Datagrams are taken by any address, whether anyone is there or not.
+    let is_open = line.transport.has_connection().then_some(HostAnswer::Open);
     for unit in UNITS.into_iter().filter(|unit| line.transport.units().contains(unit)) {
         let scan = Scan { first: unit, last: unit, serials: Vec::new(), timeout: line.timeout };
         let mut job = Job::new(CommandId::default(), "cli".into(), Diagnostic::Scan(scan), Timestamp::UNIX_EPOCH);
@@ -111,7 +113,7 @@ async fn ask(host: Ipv4Addr, line: &LineDef) -> Option<HostAnswer> {
             match connection.step(&hearing, &step).await {
                 Ok((result, _)) => job.on_result(result),
                 // It has hung up: it is there, and not willing.
-                Err(_) => return Some(HostAnswer::Open),
+                Err(_) => return is_open,
             }
         }
         let words = job.run().findings.iter().find_map(|finding| match finding {
@@ -122,12 +124,23 @@ async fn ask(host: Ipv4Addr, line: &LineDef) -> Option<HostAnswer> {
             return Some(HostAnswer::Unit(unit, words));
         }
     }
-    Some(HostAnswer::Open)
+    is_open
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::def::{Framing, LineId, Protocol};
+
+    #[tokio::test]
+    async fn an_address_that_takes_datagrams_is_no_host_that_answers() {
+        let socket = tokio::net::UdpSocket::bind("127.0.0.1:0").await.expect("a port is free");
+        let port = socket.local_addr().expect("it has an address").port();
+        let transport =
+            Transport::Network { protocol: Protocol::Udp, host: String::new(), port, framing: Framing::Mbap };
+        let line = LineDef { timeout: Duration::from_millis(20), ..LineDef::new(LineId(0), "line", transport) };
+        assert_eq!(ask(Ipv4Addr::LOCALHOST, &line).await, None);
+    }
 
     #[test]
     fn a_network_has_its_hosts_and_is_small() {

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::plant::{
     event::UartCounters,
-    line::{Parity, Serial, Transport},
+    line::{Parity, Protocol, Serial, Transport},
     port_signals::OutputSignal,
 };
 
@@ -32,6 +32,9 @@ impl Tap {
     pub async fn open(transport: &Transport, rts: bool) -> Result<Tap, String> {
         match transport {
             Transport::Serial { port, serial, .. } => open_serial(port, *serial, rts),
+            Transport::Network { protocol: Protocol::Udp, .. } => {
+                Err("datagrams of others do not come here: expected a serial port or a mirror over TCP".into())
+            }
             Transport::Network { host, port, .. } => {
                 Ok(Tap { bytes: Box::new(connect(host, *port).await?), watch: None })
             }
@@ -151,5 +154,9 @@ mod tests {
             let failed = Tap::open(&Transport::rtu(path, Serial::USUAL), false).await.err().unwrap_or_default();
             assert!(failed.contains(part), "{path}: {failed}");
         }
+        let (protocol, framing) = (crate::plant::line::Protocol::Udp, crate::plant::line::Framing::Mbap);
+        let datagrams = Transport::Network { protocol, host: "127.0.0.1".into(), port: 502, framing };
+        let failed = Tap::open(&datagrams, false).await.err().unwrap_or_default();
+        assert!(failed.contains("expected a serial port or a mirror over TCP"), "{failed}");
     }
 }

@@ -10,6 +10,7 @@ pub mod scan;
 
 use std::{io::IsTerminal, path::Path, sync::Arc, time::Duration};
 
+use clap::builder::PossibleValuesParser;
 use jiff::Timestamp;
 
 use crate::{
@@ -39,9 +40,8 @@ pub struct PortArgs {
     /// A serial port (/dev/ttyUSB0), or HOST, HOST:TCPPORT or [IPV6]:TCPPORT
     #[arg(value_name = "PORT", value_parser = port_text)]
     port: String,
-    /// rtu, ascii, tcp, rtu-over-tcp, ascii-over-tcp, udp, rtu-over-udp or ascii-over-udp [default: rtu on a serial port,
-    /// else tcp]
-    #[arg(long, value_parser = ["rtu", "ascii", "tcp", "rtu-over-tcp", "ascii-over-tcp", "udp", "rtu-over-udp", "ascii-over-udp"])]
+    /// How frames travel [default: rtu on a serial port, else tcp]
+    #[arg(long, value_parser = PossibleValuesParser::new(profile::line::polled_modes()))]
     mode: Option<String>,
     /// Baud rate [default: 9600]
     #[arg(long)]

@@ -152,6 +152,11 @@ impl Form {
         self.select(self.at);
     }
 
+    /// Gives a field another label.
+    pub fn label_with(&mut self, n: usize, label: &'static str) {
+        self.fields[n].label = label;
+    }
+
     /// Is a field hidden?
     pub fn is_hidden(&self, n: usize) -> bool {
         self.fields[n].hidden

@@ -22,7 +22,7 @@ pub(super) enum Row {
     Parity,
     StopBits,
     Host,
-    TcpPort,
+    NetworkPort,
     Timeout,
     Gap,
 }
@@ -67,7 +67,7 @@ impl Draft {
     /// The form filled with settings; what differs most often is selected.
     pub fn new(settings: &LineDef) -> Draft {
         let usual = (t!("/dev/ttyUSB0"), Serial::USUAL, Rs485::Off, "", TCP_PORT);
-        let (port, serial, rs485, host, tcp_port) = match &settings.transport {
+        let (port, serial, rs485, host, network_port) = match &settings.transport {
             Transport::Serial { port, serial, rs485, .. } => (&**port, *serial, *rs485, usual.3, usual.4),
             Transport::Network { host, port, .. } => (usual.0, usual.1, usual.2, &**host, *port),
         };
@@ -85,11 +85,11 @@ impl Draft {
             Field::one_of(t!("parity"), &Parity::ALL, serial.parity, parity_words),
             Field::one_of(t!("stop bits"), &STOP_BITS, serial.stop_bits, |bits| bits.to_string()),
             Field::text(t!("host"), host, PLACE_CHARS),
-            Field::digits(t!("TCP port"), tcp_port),
+            Field::digits(t!("TCP port"), network_port),
             Field::digits(t!("timeout"), settings.timeout.as_millis()),
             Field::digits(t!("gap"), settings.gap.as_millis()),
         ];
-        let first = if is_serial { Row::Baud } else { Row::TcpPort };
+        let first = if is_serial { Row::Baud } else { Row::NetworkPort };
         let form = Form::submitting(fields, first as usize);
         let mut draft = Draft { base: settings.clone(), rs485, bauds, form };
         draft.fit();
@@ -113,11 +113,14 @@ impl Draft {
     }
 
     fn fit(&mut self) {
-        let is_serial = self.mode().0.is_none();
+        let protocol = self.mode().0;
+        let port = if protocol == Some(Protocol::Udp) { t!("UDP port") } else { t!("TCP port") };
+        self.form.label_with(Row::NetworkPort as usize, port);
+        let is_serial = protocol.is_none();
         for row in [Row::Port, Row::Baud, Row::DataBits, Row::Parity, Row::StopBits] {
             self.form.hide(row as usize, !is_serial);
         }
-        for row in [Row::Host, Row::TcpPort] {
+        for row in [Row::Host, Row::NetworkPort] {
             self.form.hide(row as usize, is_serial);
         }
     }
@@ -151,8 +154,8 @@ impl Draft {
             };
             return Ok(Transport::Serial { port: text(Row::Port), serial, framing, rs485: self.rs485 });
         };
-        let port = text(Row::TcpPort);
-        let port = port.parse().map_err(|_| t!("\"{text}\" is not a TCP port, expected 1 to 65535", text = port))?;
+        let port = text(Row::NetworkPort);
+        let port = port.parse().map_err(|_| t!("\"{text}\" is not a port, expected 1 to 65535", text = port))?;
         Ok(Transport::Network { protocol, host: text(Row::Host), port, framing })
     }
 

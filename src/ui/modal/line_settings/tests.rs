@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use crate::{
     plant::{
         command::CommandKind,
-        def::{Framing, LineDef, LineId, Parity, Serial, Transport},
+        def::{Framing, LineDef, LineId, Parity, Protocol, Serial, Transport},
         event::LineState,
         snapshot::DeviceState,
     },
@@ -64,6 +64,8 @@ fn what_is_chosen_is_what_is_sent() {
     assert_eq!(tried("↑↑→"), with(transport("/dev/ttyUSB0", ascii, Framing::Ascii)));
     assert_eq!(tried("↑1u"), with(transport("/dev/ttyUSB01u", usual, Framing::Rtu)), "letters are text here");
     assert_eq!(tried("↑↑→→↓plc7"), with(Transport::tcp("plc7", 502)));
+    let udp = Transport::Network { protocol: Protocol::Udp, host: "plc7".into(), port: 502, framing: Framing::Mbap };
+    assert_eq!(tried("↑↑→→→→→↓plc7"), with(udp));
     assert_eq!(tried("↓↓↓↓x1").map(|line| line.timeout), Some(Duration::from_millis(3_001)));
 }
 
@@ -73,6 +75,9 @@ fn what_cannot_be_is_reported_before_anything_is_sent() {
         ("⏎", "these settings are active already"),
         ("↓→", "Modbus RTU always has 8 data bits"),
         ("↑↑→→⏎", "a TCP line needs a host"),
+        ("↑↑→→→→→⏎", "a UDP line needs a host"),
+        ("↑↑→→→→→", "UDP port"),
+        ("↑↑→→→→→↓h↓999⏎", "is not a port"),
         ("↓↓↓↓999⏎", "too long: the line is blocked for this time"),
         ("u", "nothing to revert"),
         ("S", "nothing to save"),
