@@ -16,6 +16,8 @@ pub use mbap::{Mbap, ShortException, is_out_of_sync, mbap, short_exception};
 
 /// Longest message: unit and 253 bytes of PDU.
 pub const MESSAGE_MAX: usize = 254;
+/// Longest frame, an ASCII one: two characters for each byte of message and LRC, a colon, the end of the line.
+pub const FRAME_MAX: usize = 2 * (MESSAGE_MAX + 1) + 3;
 
 /// CRC-16 of Modbus RTU (polynomial 0xA001 reflected, start 0xFFFF); sent low byte first.
 pub fn crc16(bytes: &[u8]) -> u16 {

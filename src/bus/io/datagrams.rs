@@ -14,8 +14,6 @@ use tokio::{
 
 use crate::plant::def::Framing;
 
-/// More than the longest frame, an ASCII one.
-const DATAGRAM_MAX: usize = 1_024;
 /// Bytes of an MBAP header before what its length counts.
 const MBAP_HEAD: usize = 6;
 
@@ -24,8 +22,6 @@ const MBAP_HEAD: usize = 6;
 pub struct Datagrams {
     socket: UdpSocket,
     framing: Framing,
-    /// What has come and was not read yet.
-    left: Vec<u8>,
 }
 
 impl Datagrams {
@@ -40,7 +36,7 @@ impl Datagrams {
             Ok::<UdpSocket, io::Error>(socket)
         };
         let socket = socket.await.map_err(|error| format!("{host}:{port}: {error}"))?;
-        Ok(Datagrams { socket, framing, left: Vec::new() })
+        Ok(Datagrams { socket, framing })
     }
 
     /// Bytes of the first frame: a datagram holds no two.
@@ -60,20 +56,16 @@ fn is_refused<T>(ended: &io::Result<T>) -> bool {
 }
 
 impl AsyncRead for Datagrams {
-    fn poll_read(mut self: Pin<&mut Self>, cx: &mut Context, buffer: &mut ReadBuf) -> Poll<io::Result<()>> {
+    /// One datagram; of one that is longer than the room for it the rest is lost.
+    fn poll_read(self: Pin<&mut Self>, cx: &mut Context, buffer: &mut ReadBuf) -> Poll<io::Result<()>> {
         // An empty one is no end.
-        while self.left.is_empty() {
-            let mut bytes = [0; DATAGRAM_MAX];
-            let mut datagram = ReadBuf::new(&mut bytes);
-            let received = ready!(self.socket.poll_recv(cx, &mut datagram));
+        let before = buffer.filled().len();
+        while buffer.filled().len() == before {
+            let received = ready!(self.socket.poll_recv(cx, buffer));
             if !is_refused(&received) {
                 received?;
-                self.left.extend(datagram.filled());
             }
         }
-        let count = self.left.len().min(buffer.remaining());
-        buffer.put_slice(&self.left[..count]);
-        self.left.drain(..count);
         Poll::Ready(Ok(()))
     }
 }
@@ -102,6 +94,8 @@ mod tests {
 
     use super::*;
 
+    const DATAGRAM_MAX: usize = 300;
+
     #[tokio::test]
     async fn each_frame_is_a_datagram_and_an_empty_one_no_end() {
         let device = UdpSocket::bind("127.0.0.1:0").await.unwrap();
@@ -116,10 +110,10 @@ mod tests {
             device.send_to(&[], from).await.unwrap();
             device.send_to(&[id; 9], from).await.unwrap();
         }
-        let mut answers = [0; 18];
-        datagrams.read_exact(&mut answers[..4]).await.unwrap();
-        datagrams.read_exact(&mut answers[4..]).await.unwrap();
-        assert_eq!(answers, *[[1; 9], [2; 9]].as_flattened());
+        for id in [1, 2] {
+            assert_eq!(datagrams.read(&mut bytes).await.unwrap(), 9);
+            assert_eq!(bytes[..9], [id; 9]);
+        }
     }
 
     #[tokio::test]

@@ -28,7 +28,7 @@ use super::{
 use crate::{
     bus::frame,
     plant::{
-        def::{Framing, LineDef},
+        def::{Framing, LineDef, Protocol},
         event::{Fault, FaultKind, LineCounters},
         number::to_u32,
         traffic::{Exchange, Frame, FrameFault, FrameResult},
@@ -86,6 +86,8 @@ pub struct Link {
     answers_before: u64,
     /// Bytes may be delayed by a network.
     is_network: bool,
+    /// What comes in one piece is one datagram.
+    in_datagrams: bool,
 }
 
 impl Link {
@@ -110,6 +112,7 @@ impl Link {
             took: Duration::ZERO,
             answers_before: answers(&wire.counters),
             is_network: line.transport.serial().is_none(),
+            in_datagrams: line.transport.protocol() == Some(Protocol::Udp),
             wire,
         }
     }

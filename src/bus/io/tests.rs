@@ -9,7 +9,7 @@ mod recalled;
 mod redefined;
 mod reports;
 mod silent;
-mod slave;
+pub mod slave;
 mod slow;
 mod stops;
 mod strangers;

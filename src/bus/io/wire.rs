@@ -192,7 +192,7 @@ impl Wire {
     /// Appends what comes next to `buffer`; `false` if nothing came before `until`.
     pub async fn receive(&mut self, until: Instant, buffer: &mut Vec<u8>) -> Result<bool, LinkError> {
         // Room of its own would be part of this future, and be moved with it from call to call.
-        buffer.reserve(frame::MESSAGE_MAX);
+        buffer.reserve(frame::FRAME_MAX);
         // What is there already costs no timer.
         let read = match self.port.read_buf(buffer).now_or_never() {
             Some(read) => read,
@@ -209,7 +209,7 @@ impl Wire {
 
     /// Appends what has come already.
     pub fn receive_waiting(&mut self, buffer: &mut Vec<u8>) {
-        buffer.reserve(frame::MESSAGE_MAX);
+        buffer.reserve(frame::FRAME_MAX);
         if let Some(read) = self.port.read_buf(buffer).now_or_never() {
             // A stream that has ended shows itself at the next request.
             self.counters.received_bytes += read.unwrap_or(0) as u64;
@@ -220,7 +220,7 @@ impl Wire {
     pub async fn listen(&mut self) -> LinkError {
         loop {
             let pause = if self.stray.is_empty() { Duration::from_secs(3_600) } else { self.frame_timeout };
-            self.stray.reserve(frame::MESSAGE_MAX);
+            self.stray.reserve(frame::FRAME_MAX);
             match tokio::time::timeout(pause, self.port.read_buf(&mut self.stray)).await.map(received) {
                 Err(_) => self.drop_stray(),
                 Ok(Ok(count)) => self.took_stray(count),
@@ -328,7 +328,7 @@ impl Wire {
         let limit = self.quiet_until + self.timeout;
         while Instant::now() < self.quiet_until.min(limit) {
             let until = self.quiet_until.min(limit);
-            self.stray.reserve(frame::MESSAGE_MAX);
+            self.stray.reserve(frame::FRAME_MAX);
             let read = tokio::select! {
                 () = self.pause.until(until) => break,
                 read = self.port.read_buf(&mut self.stray) => read,
@@ -347,7 +347,7 @@ impl Wire {
     /// Takes what lies in the kernel: it was sent before we asked. (Over Modbus TCP the transaction id tells.)
     fn drain(&mut self) -> Result<(), LinkError> {
         loop {
-            self.stray.reserve(frame::MESSAGE_MAX);
+            self.stray.reserve(frame::FRAME_MAX);
             let Some(read) = self.port.read_buf(&mut self.stray).now_or_never() else { return Ok(()) };
             self.took_stray(received(read)?);
         }

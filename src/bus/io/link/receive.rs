@@ -81,6 +81,16 @@ impl Link {
                 }
                 // Nothing, or noise: the answer may still come.
                 FrameMatch::Nothing => deadline,
+                // Its rest would have come with it; the answer may come in another.
+                FrameMatch::Begun if self.in_datagrams => {
+                    misfit = Some(framing::left_over(framing, message, &buffer));
+                    self.wire.record(
+                        false,
+                        std::mem::take(&mut buffer).into(),
+                        FrameResult::Wrong(FrameFault::CutShort),
+                    );
+                    continue;
+                }
                 // The frame may still grow, or it is corrupt; silence decides.
                 FrameMatch::Begun if framing == Framing::Ascii => (Instant::now() + ASCII_PAUSE).min(deadline),
                 // A network may hold the rest of a frame back as long as any answer.

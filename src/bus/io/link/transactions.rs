@@ -180,7 +180,9 @@ impl Link {
             deadlines.chain(self.transactions.short_since.map(|since| since + SHORT_WAIT)).fold(until, Instant::min);
         if self.wire.receive(until, &mut self.transactions.inbox).await? {
             // What stands behind an answer shows whether it was one.
-            self.wire.receive_waiting(&mut self.transactions.inbox);
+            if !self.in_datagrams {
+                self.wire.receive_waiting(&mut self.transactions.inbox);
+            }
             self.take_frames_mbap()?;
         } else if self.transactions.short_since.is_some() {
             self.take_frames_mbap()?;
@@ -193,11 +195,10 @@ impl Link {
             return Err(LinkError::Gone("a response was incomplete, the stream is out of sync".into()));
         }
         for request in expired {
-            let (id, strange) = (request.id, request.strange);
-            if strange.is_none() && self.transactions.silence_at <= request.sent_at {
+            let fault = request.fault;
+            if fault == Fault::Timeout && self.transactions.silence_at <= request.sent_at {
                 (self.transactions.silence_at, self.unanswered) = (Some(now), self.unanswered.saturating_add(1));
             }
-            let fault = strange.map_or(Fault::Timeout, |got| Fault::WrongTransaction { got, asked: id });
             let ended = self.end(request, Err(fault), Arc::default(), now);
             self.transactions.ended.push(ended);
         }
@@ -206,14 +207,14 @@ impl Link {
     }
 
     /// Assigns the whole frames that have come to their requests. If what stands behind them is no header, none of them is an
-    /// answer: each may be a piece of something else.
+    /// answer: each may be a piece of something else. No datagram goes on with another.
     fn take_frames_mbap(&mut self) -> Result<(), LinkError> {
         let (mut bytes, now) = (std::mem::take(&mut self.transactions.inbox), Instant::now());
-        let (frames, end) = self.transactions.cut(&bytes, now);
+        let (frames, end) = self.transactions.cut(&bytes, self.in_datagrams, now);
         if frame::is_out_of_sync(&bytes[end..]) {
             let words = no_frame(&bytes[end..]);
             self.wire.record(false, bytes.into(), FrameResult::Wrong(FrameFault::NoHeader));
-            return Err(LinkError::Gone(words));
+            return if self.in_datagrams { Ok(()) } else { Err(LinkError::Gone(words)) };
         }
         for (transaction, range) in frames {
             let frame = &bytes[range];
@@ -240,7 +241,12 @@ impl Link {
             }
         }
         bytes.drain(..end);
-        self.transactions.inbox = bytes;
+        if self.in_datagrams && !bytes.is_empty() {
+            self.transactions.note_cut_short(&bytes);
+            self.wire.record(false, bytes.into(), FrameResult::Wrong(FrameFault::CutShort));
+        } else {
+            self.transactions.inbox = bytes;
+        }
         Ok(())
     }
 

@@ -5,7 +5,13 @@ use std::{collections::VecDeque, ops::Range, sync::Arc, time::Duration};
 use tokio::time::Instant;
 
 use super::Ended;
-use crate::bus::frame::{self, Mbap, ShortException};
+use crate::{
+    bus::{
+        frame::{self, Mbap, ShortException},
+        framing,
+    },
+    plant::{def::Framing, event::Fault},
+};
 
 /// Ids of requests that were given up are remembered, and not used again, as long as there are no more than these.
 const GIVEN_UP_MAX: usize = 256;
@@ -24,8 +30,8 @@ pub struct Transaction {
     pub sent_at: Option<Instant>,
     /// The last answer to a request that was sent before it.
     pub begun_at: Instant,
-    /// An answer of its unit and function came with this transaction id.
-    pub strange: Option<u16>,
+    /// What is wrong if nothing better comes.
+    pub fault: Fault,
 }
 
 impl Transaction {
@@ -121,7 +127,7 @@ impl Transactions {
             timeout,
             sent_at: None,
             begun_at: now,
-            strange: None,
+            fault: Fault::Timeout,
         });
         id
     }
@@ -175,9 +181,9 @@ impl Transactions {
         !self.inbox.is_empty() && !self.under_way.iter().any(|request| Some(request.id) == id)
     }
 
-    /// The frames that the stream begins with, each with its transaction, and where they end.
-    pub fn cut(&mut self, bytes: &[u8], now: Instant) -> (Vec<(u16, Range<usize>)>, usize) {
-        let waited = self.short_since.is_some_and(|since| since + SHORT_WAIT <= now);
+    /// The frames that the stream begins with, each with its transaction, and where they end. Nothing follows on an `ended` one.
+    pub fn cut(&mut self, bytes: &[u8], ended: bool, now: Instant) -> (Vec<(u16, Range<usize>)>, usize) {
+        let waited = ended || self.short_since.is_some_and(|since| since + SHORT_WAIT <= now);
         let asked =
             |id: u16| self.under_way.iter().find(|request| request.id == id).map(|request| &request.message[..]);
         let (mut frames, mut start, mut is_open) = (Vec::new(), 0, false);
@@ -202,6 +208,15 @@ impl Transactions {
     /// An answer came with a transaction id of which nothing is known: those that it may be meant for.
     pub fn note_strange(&mut self, got: u16, answer: &[u8]) {
         let meant = |request: &&mut Transaction| frame::begins_answer(&request.message, answer);
-        self.under_way.iter_mut().filter(meant).for_each(|request| request.strange = Some(got));
+        let fault = |asked| Fault::WrongTransaction { got, asked };
+        self.under_way.iter_mut().filter(meant).for_each(|request| request.fault = fault(request.id));
+    }
+
+    /// No more will come of what an answer began with.
+    pub fn note_cut_short(&mut self, begun: &[u8]) {
+        let Some(id) = begun.first_chunk::<2>().map(|id| u16::from_be_bytes(*id)) else { return };
+        if let Some(request) = self.under_way.iter_mut().find(|request| request.id == id) {
+            request.fault = framing::left_over(Framing::Mbap, &request.message, begun);
+        }
     }
 }
