@@ -178,11 +178,15 @@ fn reports_that_find_no_room_are_made_once_there_is_some() {
         begin(&disk);
         let mut station = place.station();
         station.wait_for("a report is not made yet");
-        assert_eq!(place.names(), BTreeSet::new(), "nothing is left of what was not written");
+        // The report in the next format is tried meanwhile.
+        let is_empty = || place.names().is_empty();
+        assert!((0..LOOKS_MAX).any(|_| is_empty()), "something is left of what was not written: {:?}", place.names());
         end(&disk);
         let expected = place.expected();
-        let last = place.reports.join(expected.last().expect("reports"));
-        station.wait_for(&format!("report written file=\"{}\"", last.display()));
+        // A format that found no room is tried again later than the others, whose reports may all be there before.
+        for name in &expected {
+            station.expect(&format!("report written file=\"{}\"", place.reports.join(name).display()));
+        }
         station.signal("TERM");
         assert_eq!(station.end(), Some(0), "{:?}", station.said);
         let all = expected.iter().flat_map(|name| [name.clone(), format!("{name}.sha256")]);
