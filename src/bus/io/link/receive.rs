@@ -84,11 +84,8 @@ impl Link {
                 // Its rest would have come with it; the answer may come in another.
                 FrameMatch::Begun if self.in_datagrams => {
                     misfit = Some(framing::left_over(framing, message, &buffer));
-                    self.wire.record(
-                        false,
-                        std::mem::take(&mut buffer).into(),
-                        FrameResult::Wrong(FrameFault::CutShort),
-                    );
+                    let cut = FrameResult::Wrong(FrameFault::CutShort);
+                    self.wire.record(false, std::mem::take(&mut buffer).into(), cut);
                     continue;
                 }
                 // The frame may still grow, or it is corrupt; silence decides.
