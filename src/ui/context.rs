@@ -1,6 +1,6 @@
 //! What the parts of a terminal may read: the plant as it is, or as it was at an instant that is shown instead.
 
-use std::{sync::Arc, time::Duration};
+use std::{cell::Cell, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use ratatui::layout::Rect;
@@ -18,6 +18,18 @@ use crate::{
     access::SessionStatus,
     plant::{def::PlantDef, snapshot::Snapshot, time::elapsed},
 };
+
+/// Gives each query of a terminal a number of its own.
+#[derive(Debug, Default)]
+pub struct QueryNumbers(Cell<u32>);
+
+impl QueryNumbers {
+    /// The number of the next one.
+    pub fn next(&self) -> u32 {
+        self.0.set(self.0.get().wrapping_add(1));
+        self.0.get()
+    }
+}
 
 /// What every tab, window and widget may read.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +54,8 @@ pub struct ViewContext<'a> {
     pub extension: Option<&'a dyn Extension>,
     /// The session: user, role and lock.
     pub session: &'a SessionStatus,
+    /// For what is asked.
+    pub numbers: &'a QueryNumbers,
 }
 
 impl<'a> ViewContext<'a> {
@@ -90,8 +104,8 @@ pub(super) fn context(model: &Model, screen: Rect) -> ViewContext<'_> {
 
 /// What the parts may read that always show the present.
 pub(super) fn present_context(model: &Model, screen: Rect) -> ViewContext<'_> {
-    let Model { snapshot, theme, preferences, clock, extension, session, .. } = model;
-    view_context(snapshot, (theme, preferences), *clock, screen, extension, session)
+    let Model { snapshot, theme, preferences, clock, extension, session, numbers, .. } = model;
+    view_context(snapshot, (theme, preferences), *clock, screen, extension, (session, numbers))
 }
 
 /// A past instead of the present, if one is shown.
@@ -115,19 +129,20 @@ pub(super) fn view_context<'a>(
     clock: Clock,
     screen: Rect,
     extension: &'a Option<Arc<dyn Extension>>,
-    session: &'a SessionStatus,
+    (session, numbers): (&'a SessionStatus, &'a QueryNumbers),
 ) -> ViewContext<'a> {
     let ahead = jiff::SignedDuration::from_secs_f64(clock.silent.as_secs_f64() * snapshot.speed.clamp(0.0, 1e6));
     let now = snapshot.at.checked_add(ahead).unwrap_or(snapshot.at);
     let (area, size) = (layout(screen).body, Size::of(screen));
     let extension = extension.as_deref();
-    ViewContext { snapshot, theme, preferences, now, present: None, phase: clock.phase, area, size, extension, session }
+    let (present, phase) = (None, clock.phase);
+    ViewContext { snapshot, theme, preferences, now, present, phase, area, size, extension, session, numbers }
 }
 
 /// Lets the replay change while it reads the present.
 pub(super) fn with_replay<T>(model: &mut Model, change: impl FnOnce(&mut Replay, &ViewContext) -> T) -> T {
-    let Model { snapshot, theme, preferences, clock, extension, session, screen, replay, .. } = model;
-    change(replay, &view_context(snapshot, (theme, preferences), *clock, *screen, extension, session))
+    let Model { snapshot, theme, preferences, clock, extension, session, numbers, screen, replay, .. } = model;
+    change(replay, &view_context(snapshot, (theme, preferences), *clock, *screen, extension, (session, numbers)))
 }
 
 /// Lets the tabs change while they read the rest of the model.
@@ -135,7 +150,7 @@ pub(super) fn with_tabs(
     model: &mut Model,
     change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<UiAction>,
 ) -> Vec<UiAction> {
-    let Model { snapshot, theme, preferences, clock, extension, session, screen, tabs, replay, .. } = model;
-    let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, session);
+    let Model { snapshot, theme, preferences, clock, extension, session, numbers, screen, tabs, replay, .. } = model;
+    let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, (session, numbers));
     change(tabs, &past_context(present, replay))
 }

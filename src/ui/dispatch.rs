@@ -36,8 +36,9 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return actions;
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
-        let Model { snapshot, theme, preferences, clock, extension, session, screen, tabs, replay, .. } = model;
-        let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, session);
+        let Model { snapshot, theme, preferences, clock, extension, session, numbers, screen, tabs, replay, .. } =
+            model;
+        let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, (session, numbers));
         let cx = past_context(present, replay);
         let before = cx.is_past().then(|| modal.clone());
         let (rest, actions) = match modal.on_key(&cx, tabs, event) {

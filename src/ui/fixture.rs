@@ -10,7 +10,7 @@ use jiff::{SignedDuration, Timestamp};
 
 pub use traffic::more_frames;
 
-use super::{ViewContext, preferences::Preferences, theme::Theme};
+use super::{QueryNumbers, ViewContext, preferences::Preferences, theme::Theme};
 use crate::plant::{
     alarm::{AlarmMetrics, AlarmState},
     control_run::ControlRun,
@@ -233,6 +233,7 @@ pub fn with_cx<T>(snapshot: &Snapshot, call: impl FnOnce(&ViewContext) -> T) -> 
         size: super::layout::Size::Normal,
         extension: None,
         session: &session(),
+        numbers: &QueryNumbers::default(),
     })
 }
 

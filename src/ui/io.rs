@@ -303,8 +303,8 @@ impl Loop {
 
     /// Cancels the queries whose answers are not awaited any more.
     fn cancel(&mut self) {
-        let Model { tabs, replay, .. } = &self.model;
-        let awaits = |id: &QueryId| id.tab.map_or(replay.awaits(id.number), |tab| tabs.awaits(tab, id.number));
+        let Model { tabs, replay, .. } = &mut self.model;
+        let mut awaits = |id: &QueryId| id.tab.map_or(replay.awaits(id.number), |tab| tabs.awaits(tab, id.number));
         self.asked.extract_if(.., |(id, _)| !awaits(id)).for_each(|(_, waiting)| waiting.abort());
         self.asked.retain(|(_, waiting)| !waiting.is_finished());
     }

@@ -36,7 +36,7 @@ pub(crate) mod fixture;
 #[cfg(test)]
 mod tests;
 
-pub use context::ViewContext;
+pub use context::{QueryNumbers, ViewContext};
 use context::{past_context, view_context, with_replay, with_tabs};
 use dispatch::on_key;
 use effects::perform;
@@ -118,6 +118,8 @@ pub struct Model {
     pub visited: Visited,
     /// What was last gone to by the palette, the latest first.
     pub recent: Vec<Target>,
+    /// Of the queries that the tabs ask.
+    pub numbers: QueryNumbers,
     /// The window with work in it that waits for an unlock, and the tab that it stood on.
     pub kept: Option<(Tab, Modal)>,
     /// Commands given so far.
@@ -171,6 +173,7 @@ impl Model {
             session_lock: SessionLock::default(),
             visited: Visited::default(),
             recent: Vec::new(),
+            numbers: QueryNumbers::default(),
             kept: None,
             commands_sent: 0,
             plants: 0,

@@ -6,7 +6,7 @@ use jiff::{SignedDuration, Timestamp};
 use ratatui::layout::Rect;
 
 use super::{
-    Clock, ViewContext,
+    Clock, QueryNumbers, ViewContext,
     context::view_context,
     modal::{faceplate::unknown_text, reason::subject},
     preferences::Preferences,
@@ -65,8 +65,9 @@ impl Plain {
     /// A line for each fact that changed: time, and what stands now.
     pub(crate) fn lines(&mut self, snapshot: &Snapshot, session: &SessionStatus) -> Vec<String> {
         let (theme, preferences, extension) = (Theme::PLAIN, Preferences::default(), None);
+        let numbers = QueryNumbers::default();
         let parts = (&theme, &preferences);
-        let cx = &view_context(snapshot, parts, Clock::default(), Rect::default(), &extension, session);
+        let cx = &view_context(snapshot, parts, Clock::default(), Rect::default(), &extension, (session, &numbers));
         let at = stamp(snapshot.at, &cx.def().time_zone);
         let facts = facts(cx);
         let is_gone = |fact: &Fact| matches!(fact, Fact::Alarm(_) | Fact::Suppressed(_)) && !facts.contains_key(fact);

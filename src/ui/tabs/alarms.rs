@@ -96,8 +96,6 @@ pub struct Alarms {
     journal: Journal,
     metrics: Metrics,
     handover: Handover,
-    /// Queries asked so far.
-    asked: u32,
 }
 
 impl TabView for Alarms {
@@ -137,28 +135,19 @@ impl TabView for Alarms {
         match self.page {
             Page::Active | Page::System => {
                 let subject = self.selected(cx).map(|alarm| cx.def().alarm(alarm.id).subject);
-                self.recent.ask(cx, subject, &mut self.asked)
+                self.recent.ask(cx, subject)
             }
             Page::Suppressed => Vec::new(),
-            Page::Journal => self.journal.ask_both(cx, &mut self.asked),
-            Page::Metrics => self.metrics.ask(cx, &mut self.asked).into_iter().collect(),
-            Page::Handover => self.handover.ask(cx, &mut self.asked).into_iter().collect(),
+            Page::Journal => self.journal.ask_both(cx),
+            Page::Metrics => self.metrics.ask(cx).into_iter().collect(),
+            Page::Handover => self.handover.ask(cx).into_iter().collect(),
         }
     }
 
-    fn awaits(&self, number: u32) -> bool {
-        let Events { alarms, actions, .. } = &self.journal.of;
-        let queries = [&alarms.query, &actions.query, &self.metrics.figures.query, &self.handover.actions.query];
-        self.recent.awaits(number) || queries.iter().any(|query| query.awaits(number))
-    }
-
-    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        self.recent.on_answer(cx, number, &answer);
-        self.journal.of.alarms.on_answer(cx, number, &answer);
-        self.journal.of.actions.on_answer(cx, number, &answer);
-        self.metrics.figures.on_answer(cx, number, &answer);
-        self.handover.actions.on_answer(cx, number, &answer);
-        Vec::new()
+    fn queries(&mut self) -> Queries<'_> {
+        let Events { alarms, actions, .. } = &mut self.journal.of;
+        let own: Queries = vec![alarms, actions, &mut self.metrics.figures, &mut self.handover.actions];
+        own.into_iter().chain(self.recent.queries()).collect()
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {

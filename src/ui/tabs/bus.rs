@@ -159,11 +159,11 @@ impl TabView for Bus {
             Page::Registers => return self.registers.on_snapshot(&below(cx)),
             Page::Line => {}
         }
-        let (number, query) = ((Tab::Bus, &mut self.registers.number), line_trend::query(self.line, cx.now));
-        self.minutes.ask(cx, number, ASK_EVERY, TIMEOUT, query).into_iter().collect()
+        let query = line_trend::query(self.line, cx.now);
+        self.minutes.ask(cx, Tab::Bus, ASK_EVERY, TIMEOUT, query).into_iter().collect()
     }
 
-    fn awaits(&self, number: u32) -> bool {
+    fn awaits(&mut self, number: u32) -> bool {
         self.minutes.query.awaits(number) || self.registers.awaits(number)
     }
 

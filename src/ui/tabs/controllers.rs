@@ -83,7 +83,6 @@ pub struct Controllers {
     trend: Answered<Vec<Series>>,
     /// The tags that it was asked for last.
     curves: Vec<TagId>,
-    asked: u32,
 }
 
 impl TabView for Controllers {
@@ -156,11 +155,10 @@ impl TabView for Controllers {
             self.page = Page::Device;
         }
         let device = cx.def().devices.get(self.device.index());
-        let number = (Tab::Controllers, &mut self.asked);
         match (&self.page, device) {
-            (Page::Runs | Page::Overlay(_), _) => return self.runs.ask(cx, number),
-            (Page::Lamps, Some(device)) => return self.lamps.ask(cx, device, &mut self.asked),
-            (Page::Procedures, _) => return self.procedures.ask(cx, number).into_iter().collect(),
+            (Page::Runs | Page::Overlay(_), _) => return self.runs.ask(cx, Tab::Controllers),
+            (Page::Lamps, Some(device)) => return self.lamps.ask(cx, device),
+            (Page::Procedures, _) => return self.procedures.ask(cx, Tab::Controllers).into_iter().collect(),
             _ => {}
         }
         let faceplate = device.and_then(|device| device.faceplate.as_ref());
@@ -182,20 +180,17 @@ impl TabView for Controllers {
         }
         let from = cx.now.checked_sub(faceplate::WINDOW).unwrap_or(cx.now);
         let query = Query::Series { tags, from, to: cx.now, buckets: TREND_BUCKETS };
-        let number = (Tab::Controllers, &mut self.asked);
-        self.trend.ask(cx, number, TREND_EVERY, TIMEOUT, query).into_iter().collect()
+        self.trend.ask(cx, Tab::Controllers, TREND_EVERY, TIMEOUT, query).into_iter().collect()
     }
 
-    fn awaits(&self, number: u32) -> bool {
-        let queries = [&self.trend.query, &self.procedures.answered.query];
-        queries.iter().any(|query| query.awaits(number)) || self.runs.awaits(number) || self.lamps.awaits(number)
+    fn queries(&mut self) -> Queries<'_> {
+        let own: Queries = vec![&mut self.trend, &mut self.procedures.answered];
+        own.into_iter().chain(self.runs.queries()).chain(self.lamps.queries()).collect()
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        self.trend.on_answer(cx, number, &answer);
-        self.runs.on_answer(cx, number, &answer);
-        self.procedures.answered.on_answer(cx, number, &answer);
-        self.lamps.on_answer(cx, number, &answer);
+        self.queries().into_iter().for_each(|asked| asked.on_answer(cx, number, &answer));
+        self.runs.follow(cx);
         Vec::new()
     }
 
@@ -259,7 +254,6 @@ impl Controllers {
             sets: Sets::new(SetsOf { device }),
             trend,
             curves: Vec::new(),
-            asked: 0,
         }
     }
 
@@ -296,12 +290,7 @@ impl Controllers {
     pub fn show(&mut self, device: DeviceId) {
         let table = Table { defaults: self.table.defaults, ..Table::default() };
         let found = std::mem::take(&mut self.found);
-        *self = Controllers {
-            asked: self.asked,
-            wall: self.wall,
-            found,
-            ..Controllers::on_page(Page::Device, device, table)
-        };
+        *self = Controllers { wall: self.wall, found, ..Controllers::on_page(Page::Device, device, table) };
     }
 
     /// Shows a procedure.

@@ -281,9 +281,9 @@ impl<L: Listing> List<L> {
     }
 
     /// The query, if it is due.
-    pub fn ask(&mut self, cx: &ViewContext, number: (Tab, &mut u32)) -> Option<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext, tab: Tab) -> Option<UiAction> {
         let query = self.of.query(cx)?;
-        self.answered.ask(cx, number, real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
+        self.answered.ask(cx, tab, real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
     }
 
     /// Is there a filter?

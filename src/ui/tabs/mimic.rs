@@ -57,8 +57,6 @@ pub struct Mimic {
     at_a_glance: bool,
     overview: Overview,
     shift: Shift,
-    /// Queries asked so far.
-    asked: u32,
 }
 
 impl TabView for Mimic {
@@ -81,34 +79,27 @@ impl TabView for Mimic {
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if self.is_overview(cx) {
-            let shift = self.shift.ask(cx, Overview::columns(cx), &mut self.asked);
-            return self.overview.ask(cx, &self.shift, &mut self.asked).into_iter().chain(shift).collect();
+            let shift = self.shift.ask(cx, Overview::columns(cx));
+            return self.overview.ask(cx, &self.shift).into_iter().chain(shift).collect();
         }
         let (picture, parts) = self.shown(cx, cx.area);
         self.follow(picture);
-        let shift = parts.shift.map_or(Vec::new(), |area| self.shift.ask(cx, area.width, &mut self.asked));
-        let beside = self.companions.ask(cx, &parts, &mut self.asked);
+        let shift = parts.shift.map_or(Vec::new(), |area| self.shift.ask(cx, area.width));
+        let beside = self.companions.ask(cx, &parts);
         let asks = self.trends.iter_mut().filter_map(|(item, trend)| {
             let MimicItem::Trend { tag, window, place } = picture.items.get(*item)? else { return None };
             let from = cx.now.checked_sub(*window).ok()?;
             let buckets = usize::from(scale(picture, parts.picture).place(*place).width.max(1)) * 2;
             let query = Query::Series { tags: vec![*tag], from, to: cx.now, buckets };
-            trend.ask(cx, (Tab::Mimic, &mut self.asked), real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
+            trend.ask(cx, Tab::Mimic, real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
         });
         asks.chain(beside).chain(shift).collect()
     }
 
-    fn awaits(&self, number: u32) -> bool {
-        let pages = self.overview.awaits(number) || self.shift.awaits(number) || self.companions.awaits(number);
-        pages || self.trends.iter().any(|(_, trend)| trend.query.awaits(number))
-    }
-
-    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        self.companions.on_answer(cx, number, &answer);
-        self.overview.on_answer(cx, number, &answer);
-        self.shift.on_answer(cx, number, &answer);
-        self.trends.iter_mut().for_each(|(_, trend)| trend.on_answer(cx, number, &answer));
-        Vec::new()
+    fn queries(&mut self) -> Queries<'_> {
+        let parts = [self.companions.queries(), self.overview.queries(), self.shift.queries()];
+        let trends = self.trends.iter_mut().map(|(_, trend)| trend as &mut dyn Asked);
+        parts.into_iter().flatten().chain(trends).collect()
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {

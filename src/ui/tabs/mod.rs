@@ -27,6 +27,7 @@ use ratatui::{
 };
 
 pub use listing::ListPage;
+use periodic_query::Queries;
 
 use super::{
     Effect, UiAction, ViewContext,
@@ -125,13 +126,19 @@ pub trait TabView: Keyed {
         Vec::new()
     }
 
+    /// What it asks the history again and again.
+    fn queries(&mut self) -> Queries<'_> {
+        Vec::new()
+    }
+
     /// Is the answer to query `number` still waited for?
-    fn awaits(&self, _number: u32) -> bool {
-        false
+    fn awaits(&mut self, number: u32) -> bool {
+        self.queries().iter().any(|asked| asked.query().awaits(number))
     }
 
     /// The history answered query `number`; an answer to an older one is ignored.
-    fn on_answer(&mut self, _cx: &ViewContext, _number: u32, _answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
+        self.queries().into_iter().for_each(|asked| asked.on_answer(cx, number, &answer));
         Vec::new()
     }
 
@@ -343,7 +350,7 @@ impl Tabs {
         logged.into_iter().chain(self.shown_mut().on_snapshot(cx)).collect()
     }
     /// Does a tab still wait for the answer to its query?
-    pub fn awaits(&self, tab: Tab, number: u32) -> bool {
-        self.of(tab).awaits(number)
+    pub fn awaits(&mut self, tab: Tab, number: u32) -> bool {
+        self.of_mut(tab).awaits(number)
     }
 }

@@ -134,7 +134,7 @@ impl Overlay {
     }
 
     /// Asks for the curves: of what has ended once.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let now = cx.now;
         let (span, tag, columns) = (self.span(now), self.tags[self.tag], chart::dots(cx.theme, cx.area.width, 1));
         let ask = |(laid, curve): &mut (Laid, Answered<Vec<Series>>)| {
@@ -146,21 +146,16 @@ impl Overlay {
             let share = to.duration_since(laid.from).as_secs_f64() / span.as_secs_f64();
             let buckets = to_usize(columns as f64 * share).max(2);
             let query = Query::Series { tags: vec![tag], from: laid.from, to, buckets };
-            let asked = curve.ask(cx, (self.kind.tab(), number), every, real(cx, TIMEOUT_S), query)?;
+            let asked = curve.ask(cx, self.kind.tab(), every, real(cx, TIMEOUT_S), query)?;
             laid.is_whole = laid.to.is_some_and(|to| cx.present().duration_since(to) > real(cx, STORED_S));
             Some(asked)
         };
         self.curves.iter_mut().filter_map(ask).collect()
     }
 
-    /// Is the answer to query `number` still waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.curves.iter().any(|(_, curve)| curve.query.awaits(number))
-    }
-
-    /// Takes the answer to one of its queries.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.curves.iter_mut().for_each(|(_, curve)| curve.on_answer(cx, number, answer));
+    /// Those for its curves.
+    pub fn queries(&mut self) -> impl Iterator<Item = &mut dyn Asked> {
+        self.curves.iter_mut().map(|(_, curve)| curve as &mut dyn Asked)
     }
 
     /// Draws it.
@@ -309,26 +304,23 @@ impl<L: Laying> Overlaid<L> {
     }
 
     /// Asks the history when it is time to.
-    pub fn ask(&mut self, cx: &ViewContext, (tab, number): (Tab, &mut u32)) -> Vec<UiAction> {
-        let curves = self.overlay.as_mut().map_or(Vec::new(), |overlay| overlay.ask(cx, number));
+    pub fn ask(&mut self, cx: &ViewContext, tab: Tab) -> Vec<UiAction> {
+        let curves = self.overlay.as_mut().map_or(Vec::new(), |overlay| overlay.ask(cx));
         let is_listed = self.overlay.as_ref().is_none_or(Overlay::is_running);
-        let list = if is_listed { self.list.ask(cx, (tab, number)) } else { None };
+        let list = if is_listed { self.list.ask(cx, tab) } else { None };
         curves.into_iter().chain(list).collect()
     }
 
-    /// Is the answer to query `number` still waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.list.answered.query.awaits(number) || self.overlay.as_ref().is_some_and(|overlay| overlay.awaits(number))
+    /// Those for the list and for the curves.
+    pub fn queries(&mut self) -> Queries<'_> {
+        let curves = self.overlay.iter_mut().flat_map(Overlay::queries);
+        std::iter::once(&mut self.list.answered as &mut dyn Asked).chain(curves).collect()
     }
 
-    /// Takes the answer to one of its queries.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        let is_list = self.list.answered.query.awaits(number);
-        self.list.answered.on_answer(cx, number, answer);
+    /// An answer has come: what lies over each other follows the list.
+    pub fn follow(&mut self, cx: &ViewContext) {
         if let Some(overlay) = &mut self.overlay {
-            overlay.on_answer(cx, number, answer);
-            let listed = if is_list { self.list.all(cx) } else { Vec::new() };
-            overlay.follow(listed.iter().map(|row| L::laid(row)));
+            overlay.follow(self.list.all(cx).iter().map(|row| L::laid(row)));
         }
     }
 }

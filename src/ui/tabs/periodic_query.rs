@@ -56,11 +56,11 @@ impl PeriodicQuery {
         }
     }
 
-    /// The query, if it is due. It is numbered behind the other queries of the tab.
+    /// The query, if it is due.
     pub fn ask(
         &mut self,
         cx: &ViewContext,
-        (tab, number): (Tab, &mut u32),
+        tab: Tab,
         every: SignedDuration,
         timeout: SignedDuration,
         query: Query,
@@ -73,9 +73,9 @@ impl PeriodicQuery {
         self.wanted |= past != self.past;
         self.past = past;
         self.due(cx.monotonic_now(), every, timeout).then(|| {
-            *number = number.wrapping_add(1);
-            self.asked(*number, cx.monotonic_now());
-            UiAction::query(tab, *number, query)
+            let number = cx.numbers.next();
+            self.asked(number, cx.monotonic_now());
+            UiAction::query(tab, number, query)
         })
     }
 
@@ -165,7 +165,7 @@ impl<T: FromAnswer> Answered<T> {
     pub fn ask(
         &mut self,
         cx: &ViewContext,
-        number: (Tab, &mut u32),
+        tab: Tab,
         every: SignedDuration,
         timeout: SignedDuration,
         query: Query,
@@ -173,11 +173,28 @@ impl<T: FromAnswer> Answered<T> {
         if cx.is_past() != self.query.past.is_some() {
             (self.value, self.trouble) = (None, None);
         }
-        self.query.ask(cx, number, every, timeout, query)
+        self.query.ask(cx, tab, every, timeout, query)
     }
+}
+
+/// A query of a tab, and who takes its answer.
+pub trait Asked {
+    /// The query.
+    fn query(&self) -> &PeriodicQuery;
 
     /// Takes the answer to query `number` if it is waited for.
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>);
+}
+
+/// Queries of a tab, whether they are on their way or not.
+pub type Queries<'a> = Vec<&'a mut dyn Asked>;
+
+impl<T: FromAnswer> Asked for Answered<T> {
+    fn query(&self) -> &PeriodicQuery {
+        &self.query
+    }
+
+    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         if self.query.answered(number, cx.monotonic_now()).is_none() {
             return;
         }

@@ -14,7 +14,7 @@ pub(super) use super::{
     KeyTable, Keyed, Tab, TabView,
     draw::{self, around, open, row_style},
     listing::{self, Column, Heading, List, ListPage, Listing, left, rest, right},
-    periodic_query::{Answered, FromAnswer, PeriodicQuery, real},
+    periodic_query::{Answered, Asked, FromAnswer, PeriodicQuery, Queries, real},
     reports::period,
 };
 pub(super) use crate::{

@@ -86,8 +86,6 @@ pub struct Registers {
     pasted: Option<String>,
     /// Number and steady time of the read on its way, and what it reads.
     on_way: Option<(u32, Timestamp, AddressSpan)>,
-    /// Of the last query of the tab.
-    pub(super) number: u32,
     relearn: bool,
     last: Option<LiveReading>,
     replies: ReplyTimes,
@@ -148,7 +146,6 @@ impl TabView for Registers {
             preview: None,
             pasted: None,
             on_way: None,
-            number: 0,
             relearn: false,
             last: None,
             replies: ReplyTimes::default(),
@@ -219,7 +216,7 @@ impl TabView for Registers {
         actions
     }
 
-    fn awaits(&self, number: u32) -> bool {
+    fn awaits(&mut self, number: u32) -> bool {
         self.on_way.is_some_and(|(on_way, ..)| on_way == number)
             || self.value_search.as_ref().is_some_and(|(search, _)| *search == number)
             || self.recognition.awaits(number)

@@ -118,7 +118,6 @@ pub struct Reports {
     later_columns: bool,
     /// Also the events of alarms of which nothing was annunciated.
     quiet: bool,
-    number: u32,
 }
 
 impl TabView for Reports {
@@ -141,7 +140,6 @@ impl TabView for Reports {
             scroll: Scroll::default(),
             later_columns: false,
             quiet: false,
-            number: 0,
         }
     }
 
@@ -155,19 +153,15 @@ impl TabView for Reports {
         self.ask(cx)
     }
 
-    fn awaits(&self, number: u32) -> bool {
-        let text = self.made.open.as_ref().map(|open| &open.report.query);
-        let queries = [&self.made.list.answered.query, &self.curve.query, &self.report.query];
-        queries.into_iter().chain(text).any(|query| query.awaits(number)) || self.batches.awaits(number)
+    fn queries(&mut self) -> Queries<'_> {
+        let own: Queries = vec![&mut self.report, &mut self.curve];
+        own.into_iter().chain(self.batches.queries()).chain(self.made.queries()).collect()
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        self.report.on_answer(cx, number, &answer);
+        self.queries().into_iter().for_each(|asked| asked.on_answer(cx, number, &answer));
         self.set_preview(cx);
-        self.curve.on_answer(cx, number, &answer);
-        self.batches.on_answer(cx, number, &answer);
-        self.made.list.answered.on_answer(cx, number, &answer);
-        self.made.open.iter_mut().for_each(|open| open.report.on_answer(cx, number, &answer));
+        self.batches.follow(cx);
         self.ask(cx)
     }
 
@@ -335,17 +329,16 @@ impl Reports {
         let closed = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
         let every = if closed && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
         if self.made.shown {
-            return self.made.ask(cx, &mut self.number);
+            return self.made.ask(cx);
         }
         if self.batches_shown {
-            return self.batches.ask(cx, (Tab::Reports, &mut self.number));
+            return self.batches.ask(cx, Tab::Reports);
         }
         let Some(period) = self.period.clone() else { return Vec::new() };
-        let number = (Tab::Reports, &mut self.number);
-        let query = self.report.ask(cx, number, every, real(cx, TIMEOUT_S), Query::Report { period });
+        let query = self.report.ask(cx, Tab::Reports, every, real(cx, TIMEOUT_S), Query::Report { period });
         let curve = self.chart(cx).and_then(|(pen, view)| {
             let query = Query::Series { tags: vec![pen.tag], from: view.from, to: view.to, buckets: view.columns };
-            self.curve.ask(cx, (Tab::Reports, &mut self.number), every, real(cx, TIMEOUT_S), query)
+            self.curve.ask(cx, Tab::Reports, every, real(cx, TIMEOUT_S), query)
         });
         query.into_iter().chain(curve).collect()
     }

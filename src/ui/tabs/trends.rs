@@ -117,8 +117,6 @@ pub struct Trends {
     trouble: Option<String>,
     hours: Answered<Vec<Series>>,
     events: Events,
-    /// Queries asked so far.
-    asked: u32,
     /// Values without a unit have a scale each: nothing says that they are alike.
     apart: bool,
     /// Nothing comes any more: what is shown is a log.
@@ -162,20 +160,25 @@ impl TabView for Trends {
         self.ask(cx)
     }
 
-    fn awaits(&self, number: u32) -> bool {
-        let queries = [&self.curves, &self.hours.query].into_iter().chain(self.events.queries());
-        let queries = queries.chain([self.export.query(), self.response.query()]);
-        let overlay = self.overlay.as_ref().is_some_and(|overlay| overlay.awaits(number));
-        overlay || queries.chain(self.between.queries()).any(|query| query.awaits(number))
+    fn queries(&mut self) -> Queries<'_> {
+        let own: Queries = vec![&mut self.hours, self.export.asked(), self.response.asked()];
+        let parts = own.into_iter().chain(self.events.queries()).chain(self.between.queries());
+        parts.chain(self.overlay.iter_mut().flat_map(Overlay::queries)).collect()
+    }
+
+    fn awaits(&mut self, number: u32) -> bool {
+        self.curves.awaits(number) || self.queries().iter().any(|asked| asked.query().awaits(number))
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        self.hours.on_answer(cx, number, &answer);
-        self.events.on_answer(cx, number, &answer);
-        self.between.on_answer(cx, number, &answer);
-        self.response.on_answer(cx, number, &answer);
-        self.overlay.iter_mut().for_each(|overlay| overlay.on_answer(cx, number, &answer));
-        let exported = self.accept_export(cx, number, &answer);
+        let exports = self.export.asked().query().awaits(number);
+        let responds = self.response.asked().query().awaits(number);
+        self.queries().into_iter().for_each(|asked| asked.on_answer(cx, number, &answer));
+        self.between.drop_outdated();
+        if responds {
+            self.response.find();
+        }
+        let exported = if exports { self.accept_export(cx) } else { Vec::new() };
         if let Some(asked) = self.curves.answered(number, cx.monotonic_now()) {
             self.trouble = answer.as_ref().err().map(HistoryError::to_string);
             if let Ok(Answer::Series(series)) = answer {

@@ -49,8 +49,6 @@ pub struct Users {
     list: List<UserList>,
     /// The audit list while it is shown.
     audit: Option<Audit>,
-    /// Queries asked so far.
-    asked: u32,
 }
 
 impl TabView for Users {
@@ -68,18 +66,11 @@ impl TabView for Users {
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(audit) = &mut self.audit else { return Vec::new() };
-        audit.ask(cx, (Tab::Users, &mut self.asked)).into_iter().collect()
+        audit.ask(cx, Tab::Users).into_iter().collect()
     }
 
-    fn awaits(&self, number: u32) -> bool {
-        self.audit.as_ref().is_some_and(|audit| audit.answered.query.awaits(number))
-    }
-
-    fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if let Some(audit) = &mut self.audit {
-            audit.answered.on_answer(cx, number, &answer);
-        }
-        Vec::new()
+    fn queries(&mut self) -> Queries<'_> {
+        self.audit.iter_mut().map(|audit| &mut audit.answered as &mut dyn Asked).collect()
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {

@@ -66,13 +66,13 @@ impl Handover {
     }
 
     /// Asks the history if it is time.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext) -> Option<UiAction> {
         let shown = self.period(cx)?;
         // What the shift before wrote down is for this one.
         let from = period::before(cx.def(), &shown).map_or(shown.from, |before| before.from);
         let to = if cx.is_past() { shown.to.min(cx.now) } else { shown.to };
         let query = Query::Actions { from, to, limit: ROWS };
-        span::ask(cx, &mut self.actions, number, EVERY_S, Some(&shown), query)
+        span::ask(cx, &mut self.actions, EVERY_S, Some(&shown), query)
     }
 
     /// Draws it.

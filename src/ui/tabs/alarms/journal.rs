@@ -196,7 +196,7 @@ impl Journal {
     }
 
     /// Asks the history if it is time.
-    pub fn ask_both(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
+    pub fn ask_both(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let limit = if self.is_filtered() { SEARCHED_ROWS } else { ROWS };
         self.of.limit = Some(limit);
         let Events { alarms, actions, period, .. } = &mut self.of;
@@ -204,8 +204,8 @@ impl Journal {
         let end = |period: &Period| if cx.is_past() { period.to.min(to) } else { period.to };
         let (from, to) = period.as_ref().map_or((to - SPAN, to), |period| (period.from, end(period)));
         let queries = (Query::Journal { from, to, limit }, Query::Actions { from, to, limit });
-        let of_alarms = span::ask(cx, alarms, number, EVERY_S, period.as_ref(), queries.0);
-        let of_actions = span::ask(cx, actions, number, EVERY_S, period.as_ref(), queries.1);
+        let of_alarms = span::ask(cx, alarms, EVERY_S, period.as_ref(), queries.0);
+        let of_actions = span::ask(cx, actions, EVERY_S, period.as_ref(), queries.1);
         of_alarms.into_iter().chain(of_actions).collect()
     }
 }

@@ -44,11 +44,11 @@ impl Metrics {
     }
 
     /// Asks the history for a chosen shift if it is time.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Option<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext) -> Option<UiAction> {
         let period = self.period(cx)?;
         let to = if cx.is_past() { period.to.min(cx.now) } else { period.to };
         let query = Query::AlarmMetrics { from: period.from, to };
-        span::ask(cx, &mut self.figures, number, EVERY_S, Some(&period), query)
+        span::ask(cx, &mut self.figures, EVERY_S, Some(&period), query)
     }
 
     /// The period that the history is asked for: the chosen one; of a past instant the 24 hours before it.

@@ -57,7 +57,7 @@ pub struct Occurrence {
 
 impl Recent {
     /// Asks for what is due; `selected` is what the selected alarm watches.
-    pub fn ask(&mut self, cx: &ViewContext, selected: Option<Subject>, number: &mut u32) -> Vec<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext, selected: Option<Subject>) -> Vec<UiAction> {
         if cx.size < Size::Wide {
             return Vec::new();
         }
@@ -67,11 +67,11 @@ impl Recent {
         let (hour, from) = (since(RIBBON), since(days));
         let limit = EVENTS_MAX;
         let query = Query::Journal { from: hour, to, limit };
-        let hour = span::ask(cx, &mut self.hour, number, RIBBON_EVERY_S, None, query);
+        let hour = span::ask(cx, &mut self.hour, RIBBON_EVERY_S, None, query);
         let query = Query::Journal { from, to, limit };
-        let alarms = span::ask(cx, &mut self.alarms, number, DAYS_EVERY_S, None, query);
+        let alarms = span::ask(cx, &mut self.alarms, DAYS_EVERY_S, None, query);
         let query = Query::Actions { from, to, limit: ACTIONS_MAX };
-        let actions = span::ask(cx, &mut self.actions, number, DAYS_EVERY_S, None, query);
+        let actions = span::ask(cx, &mut self.actions, DAYS_EVERY_S, None, query);
         let tag = match selected {
             Some(Subject::Tag(tag)) => Some(tag),
             Some(Subject::Device(_) | Subject::Line(_) | Subject::Station) | None => None,
@@ -82,7 +82,7 @@ impl Recent {
         let curve = tag.and_then(|tag| {
             let view = view(cx);
             let query = Query::Series { tags: vec![tag], from: view.from, to: view.to, buckets: view.columns };
-            span::ask(cx, &mut self.curve, number, CURVE_EVERY_S, None, query)
+            span::ask(cx, &mut self.curve, CURVE_EVERY_S, None, query)
         });
         hour.into_iter().chain(alarms).chain(actions).chain(curve).collect()
     }
@@ -94,17 +94,8 @@ impl Recent {
         draw::curves(cx, canvas, t!("last hour"), (view(cx), None), &[Pen { tag, scale: None }], series);
     }
 
-    pub fn awaits(&self, number: u32) -> bool {
-        [&self.hour.query, &self.alarms.query, &self.actions.query, &self.curve.query]
-            .iter()
-            .any(|query| query.awaits(number))
-    }
-
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.hour.on_answer(cx, number, answer);
-        self.alarms.on_answer(cx, number, answer);
-        self.actions.on_answer(cx, number, answer);
-        self.curve.on_answer(cx, number, answer);
+    pub fn queries(&mut self) -> Queries<'_> {
+        vec![&mut self.hour, &mut self.alarms, &mut self.actions, &mut self.curve]
     }
 
     /// The last hour of an alarm in so many cells: `··▄▄██`, blank where it is not known. What the snapshot says of it is never late.

@@ -10,12 +10,11 @@ const TIMEOUT_S: f64 = 30.0;
 pub fn ask<T: FromAnswer>(
     cx: &ViewContext,
     answered: &mut Answered<T>,
-    number: &mut u32,
     seconds: f64,
     shown: Option<&Period>,
     query: Query,
 ) -> Option<UiAction> {
     let past = shown.is_some_and(|shown| shown.to <= cx.present());
     let every = real(cx, if past { 20.0 * seconds } else { seconds });
-    answered.ask(cx, (Tab::Alarms, number), every, real(cx, TIMEOUT_S), query)
+    answered.ask(cx, Tab::Alarms, every, real(cx, TIMEOUT_S), query)
 }

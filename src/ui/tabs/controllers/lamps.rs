@@ -25,24 +25,23 @@ pub struct Live {
 
 impl Live {
     /// Reads the lamps when it is time to, where this user may.
-    pub fn ask(&mut self, cx: &ViewContext, device: &DeviceDef, number: &mut u32) -> Vec<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext, device: &DeviceDef) -> Vec<UiAction> {
         if self.device != Some(device.id) {
             *self = Live { device: Some(device.id), ..Live::default() };
         }
         let (line, unit, spans) = (device.line, device.unit, spans(cx, device));
         let query = Query::Registers(LiveRead { line, unit, spans, not_before: None, relearn: false });
         let may = !cx.is_past() && !cx.def().listens_on(line) && rights::lacks(cx, needs_for_query(&query)).is_none();
-        let number = (Tab::Controllers, number);
         let (every, timeout) = (real(cx, EVERY_S), real(cx, TIMEOUT_S));
-        if may { self.reading.ask(cx, number, every, timeout, query).into_iter().collect() } else { Vec::new() }
+        if may {
+            self.reading.ask(cx, Tab::Controllers, every, timeout, query).into_iter().collect()
+        } else {
+            Vec::new()
+        }
     }
 
-    pub fn awaits(&self, number: u32) -> bool {
-        self.reading.query.awaits(number)
-    }
-
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.reading.on_answer(cx, number, answer);
+    pub fn queries(&mut self) -> Queries<'_> {
+        vec![&mut self.reading]
     }
 
     /// A bit, and when it was read.

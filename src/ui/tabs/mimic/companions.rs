@@ -92,7 +92,7 @@ pub struct Companions {
 
 impl Companions {
     /// Asks for what is due.
-    pub fn ask(&mut self, cx: &ViewContext, parts: &Parts, number: &mut u32) -> Vec<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext, parts: &Parts) -> Vec<UiAction> {
         let mut actions = Vec::new();
         let (every, timeout) = (real(cx, EVERY_S), real(cx, TIMEOUT_S));
         if parts.side.is_some() {
@@ -100,35 +100,26 @@ impl Companions {
             let from = to.checked_sub(EVENTS_SPAN).unwrap_or(to);
             let limit = EVENTS_MAX;
             let query = Query::Journal { from, to, limit: SEARCHED_MAX };
-            actions.extend(self.alarms.ask(cx, (Tab::Mimic, number), every, timeout, query));
+            actions.extend(self.alarms.ask(cx, Tab::Mimic, every, timeout, query));
             let query = Query::Actions { from, to, limit };
-            actions.extend(self.actions.ask(cx, (Tab::Mimic, number), every, timeout, query));
+            actions.extend(self.actions.ask(cx, Tab::Mimic, every, timeout, query));
             if let Some(shift) = period::at(cx.def(), cx.now) {
                 // What the shift has counted after a past moment belongs to a later one.
                 let query = Query::Report { period: Period { to: shift.to.min(cx.now), ..shift } };
-                actions.extend(self.shift.ask(cx, (Tab::Mimic, number), real(cx, SHIFT_EVERY_S), timeout, query));
+                actions.extend(self.shift.ask(cx, Tab::Mimic, real(cx, SHIFT_EVERY_S), timeout, query));
             }
         }
         let pens = pens(cx);
         if let (Some(trend), false) = (parts.trend, pens.is_empty()) {
             let (view, tags) = (view(cx, trend), pens.iter().map(|pen| pen.tag).collect());
             let query = Query::Series { tags, from: view.from, to: view.to, buckets: view.columns };
-            actions.extend(self.curves.ask(cx, (Tab::Mimic, number), real(cx, TREND_EVERY_S), timeout, query));
+            actions.extend(self.curves.ask(cx, Tab::Mimic, real(cx, TREND_EVERY_S), timeout, query));
         }
         actions
     }
 
-    pub fn awaits(&self, number: u32) -> bool {
-        [&self.alarms.query, &self.actions.query, &self.curves.query, &self.shift.query]
-            .iter()
-            .any(|query| query.awaits(number))
-    }
-
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.alarms.on_answer(cx, number, answer);
-        self.actions.on_answer(cx, number, answer);
-        self.curves.on_answer(cx, number, answer);
-        self.shift.on_answer(cx, number, answer);
+    pub fn queries(&mut self) -> Queries<'_> {
+        vec![&mut self.alarms, &mut self.actions, &mut self.curves, &mut self.shift]
     }
 
     /// Draws them.

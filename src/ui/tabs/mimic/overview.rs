@@ -59,7 +59,7 @@ fn parts(cx: &ViewContext, area: Rect, shift: u16) -> Parts {
 
 impl Overview {
     /// Asks for the curves of the values that are seen.
-    pub fn ask(&mut self, cx: &ViewContext, shift: &Shift, number: &mut u32) -> Vec<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext, shift: &Shift) -> Vec<UiAction> {
         let cards = cards::cards(cx);
         let parts = parts(cx, cx.area, shift.height(cx));
         let arrangement = cards::arrange(&cards, self.selected, (parts.cards.width, parts.cards.height));
@@ -75,15 +75,11 @@ impl Overview {
         let view = View::ending(cx.now, WINDOW_S, COLUMNS);
         let query = Query::Series { tags, from: view.from, to: cx.now, buckets: view.columns };
         let (every, timeout) = (real(cx, EVERY_S), real(cx, TIMEOUT_S));
-        self.curves.ask(cx, (Tab::Mimic, number), every, timeout, query).into_iter().collect()
+        self.curves.ask(cx, Tab::Mimic, every, timeout, query).into_iter().collect()
     }
 
-    pub fn awaits(&self, number: u32) -> bool {
-        self.curves.query.awaits(number)
-    }
-
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.curves.on_answer(cx, number, answer);
+    pub fn queries(&mut self) -> Queries<'_> {
+        vec![&mut self.curves]
     }
 
     /// The selected card.

@@ -14,7 +14,7 @@ use crate::{
         snapshot::{DeviceState, Snapshot},
         tag::{Bound, Decimals, TagDef},
     },
-    ui::{Clock, context::view_context, preferences::Preferences, tabs::TabView, theme::Theme},
+    ui::{Clock, QueryNumbers, context::view_context, preferences::Preferences, tabs::TabView, theme::Theme},
 };
 
 /// Half seconds in which a made-up value goes once through its range.
@@ -36,10 +36,11 @@ pub fn preview(def: &Arc<PlantDef>, page: usize, size: (u16, u16), phase: u32, t
     let mimic = Mimic { page, ..Mimic::default() };
     let mut backend = Terminal::new(TestBackend::new(size.0, size.1)).unwrap_or_else(|never| match never {});
     let (session, extension, preferences) = (SessionStatus::default(), None, Preferences::default());
+    let numbers = QueryNumbers::default();
     let clock = Clock { phase, ..Clock::default() };
     let drawn = backend.draw(|frame| {
         let area = frame.area();
-        let cx = view_context(&snapshot, (theme, &preferences), clock, area, &extension, &session);
+        let cx = view_context(&snapshot, (theme, &preferences), clock, area, &extension, (&session, &numbers));
         mimic.view(&cx, frame, area);
     });
     drawn.map(|frame| frame.buffer.clone()).unwrap_or_else(|never| match never {})

@@ -78,31 +78,22 @@ fn span(cx: &ViewContext) -> Option<(Timestamp, Timestamp)> {
 
 impl Shift {
     /// Asks for what is due, for a drawing of so many columns.
-    pub fn ask(&mut self, cx: &ViewContext, columns: u16, number: &mut u32) -> Vec<UiAction> {
+    pub fn ask(&mut self, cx: &ViewContext, columns: u16) -> Vec<UiAction> {
         let Some((from, _)) = span(cx) else { return Vec::new() };
         let (to, limit) = (cx.now, EVENTS_MAX);
         let (every, timeout) = (real(cx, EVERY_S), real(cx, TIMEOUT_S));
         let tags: Vec<TagId> = lanes(cx).into_iter().map(Lane::tag).collect();
         let buckets = usize::from(columns).max(1);
         let steps = Query::Series { tags: tags.clone(), from, to, buckets };
-        let steps = if tags.is_empty() || to <= from {
-            None
-        } else {
-            self.steps.ask(cx, (Tab::Mimic, number), every, timeout, steps)
-        };
-        let alarms = self.alarms.ask(cx, (Tab::Mimic, number), every, timeout, Query::Journal { from, to, limit });
-        let actions = self.actions.ask(cx, (Tab::Mimic, number), every, timeout, Query::Actions { from, to, limit });
+        let steps =
+            if tags.is_empty() || to <= from { None } else { self.steps.ask(cx, Tab::Mimic, every, timeout, steps) };
+        let alarms = self.alarms.ask(cx, Tab::Mimic, every, timeout, Query::Journal { from, to, limit });
+        let actions = self.actions.ask(cx, Tab::Mimic, every, timeout, Query::Actions { from, to, limit });
         [steps, alarms, actions].into_iter().flatten().collect()
     }
 
-    pub fn awaits(&self, number: u32) -> bool {
-        [&self.steps.query, &self.alarms.query, &self.actions.query].iter().any(|query| query.awaits(number))
-    }
-
-    pub fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.steps.on_answer(cx, number, answer);
-        self.alarms.on_answer(cx, number, answer);
-        self.actions.on_answer(cx, number, answer);
+    pub fn queries(&mut self) -> Queries<'_> {
+        vec![&mut self.steps, &mut self.alarms, &mut self.actions]
     }
 
     /// The lanes that are drawn: a program that rests all the time has none.

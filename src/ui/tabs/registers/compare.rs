@@ -90,10 +90,10 @@ impl Registers {
         if comparison.on_way.is_some_and(|(_, at, on_way)| on_way == span && now.duration_since(at) <= lost) {
             return None;
         }
-        self.number = self.number.wrapping_add(1);
-        comparison.on_way = Some((self.number, now, span));
+        let number = cx.numbers.next();
+        comparison.on_way = Some((number, now, span));
         let read = LiveRead { line, unit, spans: vec![span], not_before: None, relearn: false };
-        Some(UiAction::query(self.tab, self.number, Query::Registers(read)))
+        Some(UiAction::query(self.tab, number, Query::Registers(read)))
     }
 
     pub(super) fn on_compared(&mut self, reading: Option<LiveReading>) {

@@ -251,10 +251,10 @@ impl Registers {
         if spans.is_empty() {
             return Ok(self.list_of(cx, What::Hits(text.to_owned())));
         }
-        self.number = self.number.wrapping_add(1);
-        self.value_search = Some((self.number, text.to_owned()));
+        let number = cx.numbers.next();
+        self.value_search = Some((number, text.to_owned()));
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
-        Ok(vec![UiAction::query(self.tab, self.number, Query::Registers(read))])
+        Ok(vec![UiAction::query(self.tab, number, Query::Registers(read))])
     }
 
     /// Does what the selected row leads to.

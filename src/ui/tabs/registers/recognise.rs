@@ -133,10 +133,10 @@ impl Registers {
             return Vec::new();
         }
         let Some(spans) = spans else { return self.conclude(cx) };
-        self.number = self.number.wrapping_add(1);
-        *on_way = Some((self.number, now));
+        let number = cx.numbers.next();
+        *on_way = Some((number, now));
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
-        vec![UiAction::query(self.tab, self.number, Query::Registers(read))]
+        vec![UiAction::query(self.tab, number, Query::Registers(read))]
     }
 
     /// Takes what was asked. What could not be read does not fit.

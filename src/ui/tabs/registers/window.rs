@@ -91,8 +91,8 @@ impl Registers {
             self.trouble = Some(why);
             return Vec::new();
         }
-        self.number = self.number.wrapping_add(1);
-        self.on_way = Some((self.number, cx.monotonic_now(), span));
-        vec![UiAction::query(self.tab, self.number, query)]
+        let number = cx.numbers.next();
+        self.on_way = Some((number, cx.monotonic_now(), span));
+        vec![UiAction::query(self.tab, number, query)]
     }
 }

@@ -76,15 +76,21 @@ impl AutomaticReportsPage {
         open.scroll.on(motion, count, usize::from(cx.area.height.saturating_sub(2)).max(1));
     }
 
+    /// Those for the list and for the report that is open.
+    pub fn queries(&mut self) -> Queries<'_> {
+        let open = self.open.iter_mut().map(|open| &mut open.report as &mut dyn Asked);
+        open.chain([&mut self.list.answered as &mut dyn Asked]).collect()
+    }
+
     /// Asks the history when it is time to.
-    pub fn ask(&mut self, cx: &ViewContext, number: &mut u32) -> Vec<UiAction> {
-        let number = (Tab::Reports, number);
+    pub fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
+        let tab = Tab::Reports;
         let query = match &mut self.open {
             Some(Opened { period, report, .. }) => {
                 let query = Query::Report { period: period.clone() };
-                report.ask(cx, number, SignedDuration::MAX, real(cx, REPORT_TIMEOUT_S), query)
+                report.ask(cx, tab, SignedDuration::MAX, real(cx, REPORT_TIMEOUT_S), query)
             }
-            None => self.list.ask(cx, number),
+            None => self.list.ask(cx, tab),
         };
         query.into_iter().collect()
     }

@@ -48,8 +48,9 @@ impl Measured {
 }
 
 impl Between {
-    pub(super) fn queries(&self) -> impl Iterator<Item = &PeriodicQuery> {
-        [&self.figures.query].into_iter().chain(self.ends.iter().map(|end| &end.query))
+    pub(super) fn queries(&mut self) -> Queries<'_> {
+        let [a, b] = &mut self.ends;
+        vec![&mut self.figures, a, b]
     }
 
     /// Switches cursor B off.
@@ -67,13 +68,12 @@ impl Between {
         }
     }
 
-    pub(super) fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.figures.on_answer(cx, number, answer);
+    /// An answer has come: one about another interval does not count.
+    pub(super) fn drop_outdated(&mut self) {
         if self.figures.query.is_wanted() {
             self.figures.value = None;
         }
         for end in &mut self.ends {
-            end.on_answer(cx, number, answer);
             if end.query.is_wanted() {
                 end.value = None;
             }
@@ -147,13 +147,12 @@ impl Trends {
         let mut acts = Vec::new();
         if from < to {
             let query = Query::Series { tags: tags.clone(), from, to, buckets: 1 };
-            let number = (Tab::Trends, &mut self.asked);
-            acts.extend(self.between.figures.ask(cx, number, every(to), timeout, query));
+            acts.extend(self.between.figures.ask(cx, Tab::Trends, every(to), timeout, query));
         }
         for (end, at) in self.between.ends.iter_mut().zip([a, b]) {
             let from = at.checked_sub(BEFORE).unwrap_or(at);
             let query = Query::Values { tags: tags.clone(), from, every: BEFORE, count: 1 };
-            acts.extend(end.ask(cx, (Tab::Trends, &mut self.asked), every(at), timeout, query));
+            acts.extend(end.ask(cx, Tab::Trends, every(at), timeout, query));
         }
         acts
     }

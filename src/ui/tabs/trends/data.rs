@@ -45,7 +45,7 @@ impl Trends {
     /// Asks what is due.
     pub(super) fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if let Some(overlay) = &mut self.overlay {
-            return overlay.ask(cx, &mut self.asked);
+            return overlay.ask(cx);
         }
         let (now, timeout, view) = (cx.present(), real(cx, TIMEOUT_S), self.span(cx));
         let group: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
@@ -59,7 +59,7 @@ impl Trends {
         let mut acts = Vec::new();
         if self.values.is_none() && !group.is_empty() {
             let curves = series(&group, view.from, view.to, view.columns);
-            acts.extend(self.curves.ask(cx, (Tab::Trends, &mut self.asked), often, timeout, curves));
+            acts.extend(self.curves.ask(cx, Tab::Trends, often, timeout, curves));
             acts.extend(self.ask_events(cx, view, often));
         }
         if self.values.is_none() {
@@ -74,7 +74,7 @@ impl Trends {
         let hour = View::ending(cx.now, 3_600, HOUR_COLUMNS);
         if !tags.is_empty() {
             let hours = series(&tags, hour.from, hour.to, HOUR_COLUMNS);
-            acts.extend(self.hours.ask(cx, (Tab::Trends, &mut self.asked), real(cx, 20.0), timeout, hours));
+            acts.extend(self.hours.ask(cx, Tab::Trends, real(cx, 20.0), timeout, hours));
         }
         acts
     }

@@ -60,15 +60,16 @@ pub(super) struct Mark {
 }
 
 impl Events {
-    pub(super) fn queries(&self) -> [&PeriodicQuery; 3] {
-        [&self.alarms.query, &self.actions.query, &self.batches.query]
+    pub(super) fn queries(&mut self) -> Queries<'_> {
+        vec![&mut self.alarms, &mut self.actions, &mut self.batches]
     }
 
     /// Has the history answered all that is asked about the view?
     pub(super) fn is_known(&self) -> bool {
         let answered = self.alarms.value.is_some() && self.actions.value.is_some();
         let batches = self.batches.value.is_some() || !self.asks_batches;
-        answered && batches && self.queries().iter().all(|query| !query.is_wanted())
+        let queries = [&self.alarms.query, &self.actions.query, &self.batches.query];
+        answered && batches && !queries.iter().any(|query| query.is_wanted())
     }
 
     /// Why they could not be read.
@@ -81,12 +82,6 @@ impl Events {
             .into_iter()
             .for_each(PeriodicQuery::want);
     }
-
-    pub(super) fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        self.alarms.on_answer(cx, number, answer);
-        self.actions.on_answer(cx, number, answer);
-        self.batches.on_answer(cx, number, answer);
-    }
 }
 
 impl Trends {
@@ -97,21 +92,18 @@ impl Trends {
         }
         let (from, to, limit) = (view.from, view.to.min(cx.present()), EVENTS_MAX);
         let (every, timeout) = (every.max(real(cx, 10.0)), real(cx, TIMEOUT_S));
-        let Trends { events, asked, .. } = self;
-        let alarms = events.alarms.ask(cx, (Tab::Trends, asked), every, timeout, Query::Journal { from, to, limit });
+        let events = &mut self.events;
+        let alarms = events.alarms.ask(cx, Tab::Trends, every, timeout, Query::Journal { from, to, limit });
         let query = Query::Actions { from, to, limit };
-        let actions = events.actions.ask(cx, (Tab::Trends, asked), every, timeout, query);
+        let actions = events.actions.ask(cx, Tab::Trends, every, timeout, query);
         events.asks_batches = !cx.def().batches.is_empty() && view.width() <= BATCHES_SPAN;
         if !events.asks_batches {
             // Those of an earlier window would look like all of this one.
             events.batches.value = None;
         }
         let query = Query::Batches { from, to, limit };
-        let batches = if events.asks_batches {
-            events.batches.ask(cx, (Tab::Trends, asked), every * 6, timeout, query)
-        } else {
-            None
-        };
+        let batches =
+            if events.asks_batches { events.batches.ask(cx, Tab::Trends, every * 6, timeout, query) } else { None };
         [alarms, actions, batches].into_iter().flatten().collect()
     }
 

@@ -35,8 +35,8 @@ fn user(cx: &ViewContext) -> Option<Arc<str>> {
 }
 
 impl Export {
-    pub(super) fn query(&self) -> &PeriodicQuery {
-        &self.values.query
+    pub(super) fn asked(&mut self) -> &mut dyn Asked {
+        &mut self.values
     }
 
     /// Is something on its way?
@@ -80,22 +80,12 @@ impl Trends {
         self.export.check_user(cx);
         let (from, every, count, tags) = self.export.wanted.clone()?;
         let query = Query::Values { tags, from, every, count };
-        let number = (Tab::Trends, &mut self.asked);
-        self.export.values.ask(cx, number, SignedDuration::MAX, real(cx, 60.0), query)
+        self.export.values.ask(cx, Tab::Trends, SignedDuration::MAX, real(cx, 60.0), query)
     }
 
-    /// Takes the values of a CSV, and asks the station to record the file.
-    pub(super) fn accept_export(
-        &mut self,
-        cx: &ViewContext,
-        number: u32,
-        answer: &Result<Answer, HistoryError>,
-    ) -> Vec<UiAction> {
+    /// The values of a CSV have come: asks the station to record the file.
+    pub(super) fn accept_export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         self.export.check_user(cx);
-        if !self.export.values.query.awaits(number) {
-            return Vec::new();
-        }
-        self.export.values.on_answer(cx, number, answer);
         let Some((from, every, _, tags)) = self.export.wanted.take() else { return Vec::new() };
         let Some(values) = self.export.values.value.take() else {
             self.export.said = self.export.values.trouble.take().map(Err);

@@ -27,15 +27,12 @@ pub(super) struct Response {
 }
 
 impl Response {
-    pub(super) fn query(&self) -> &PeriodicQuery {
-        &self.curves.query
+    pub(super) fn asked(&mut self) -> &mut dyn Asked {
+        &mut self.curves
     }
 
-    pub(super) fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
-        if !self.curves.query.awaits(number) {
-            return;
-        }
-        self.curves.on_answer(cx, number, answer);
+    /// The curves have come.
+    pub(super) fn find(&mut self) {
         let curves = self.curves.value.take().filter(|_| !self.curves.query.is_wanted());
         self.found = curves.and_then(|curves| <[Series; 2]>::try_from(curves).ok()).map(|curves| {
             let (found, step) = (last_step(&curves), curves[1].step);
@@ -78,7 +75,7 @@ impl Trends {
         }
         let every = if view.holds(cx.present()) { often } else { SignedDuration::MAX };
         let query = Query::Series { tags: tags.to_vec(), from: view.from, to: view.to, buckets: COLUMNS };
-        self.response.curves.ask(cx, (Tab::Trends, &mut self.asked), every, real(cx, TIMEOUT_S), query)
+        self.response.curves.ask(cx, Tab::Trends, every, real(cx, TIMEOUT_S), query)
     }
 }
 
