@@ -114,7 +114,8 @@ pub fn loopback(unit: u8, number: u16) -> Vec<u8> {
 
 /// Reads of the first part of a block, the shortest first: each has a signature of its own.
 fn probes(block: &Block) -> impl Iterator<Item = Vec<u8>> {
-    let (first, step) = if block.table.is_bits() { (1, 8) } else { (block.alignment.max(1), block.alignment.max(1)) };
+    let first = block.alignment.max(1);
+    let step = if block.table.is_bits() { first.max(8) } else { first };
     let counts = (first..block.count).step_by(usize::from(step)).chain([block.count]);
     let block = block.clone();
     counts.map(move |count| Block { count, ..block.clone() }.request())

@@ -156,7 +156,7 @@ fn together(device: &DeviceDef, tags: &[&TagDef]) -> Block {
         tags: tags.iter().map(|tag| tag.id).collect(),
         poll: first.poll,
         class: tags.iter().map(|tag| tag.class).min().unwrap_or(first.class),
-        alignment: device.limits.alignment,
+        alignment: device.limits.step(extent.table),
     }
 }
 
@@ -166,11 +166,11 @@ fn end_of(point: Point) -> u32 {
 
 /// Most registers or bits of one request, as stated or found.
 fn most(device: &DeviceDef, table: Table, unreadable: &UnreadableRanges) -> u32 {
-    let stated = device.limits.most(table);
+    let stated = u32::from(device.limits.most(table));
     unreadable.most(device.unit, table).map_or(stated, |found| stated.min(found.into()))
 }
 
-/// The registers or bits of one request, moved outwards to multiples of the alignment (registers only).
+/// The registers or bits of one request, moved outwards to multiples of the alignment of their table.
 #[derive(Debug, Clone, Copy)]
 struct Extent {
     table: Table,
@@ -181,7 +181,7 @@ struct Extent {
 impl Extent {
     fn new(first: Point, end: u32, device: &DeviceDef) -> Extent {
         let (table, start) = (first.table, u32::from(first.address));
-        let step = if table.is_bits() { 1 } else { u32::from(device.limits.alignment.max(1)) };
+        let step = u32::from(device.limits.step(table));
         Extent { table, start: start - start % step, end: end.next_multiple_of(step).min(0x1_0000) }
     }
 
@@ -193,10 +193,5 @@ impl Extent {
     fn allowed(self, device: &DeviceDef, unreadable: &UnreadableRanges) -> bool {
         self.count() <= most(device, self.table, unreadable)
             && !unreadable.touch(device.unit, self.table, self.start, self.end)
-    }
-
-    /// Most unused registers or bits between two tags: sixteen bits cost as much on the wire as one register.
-    fn gap_max(self, device: &DeviceDef) -> u32 {
-        u32::from(device.limits.gap_registers_max) * if self.table.is_bits() { 16 } else { 1 }
     }
 }

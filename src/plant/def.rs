@@ -246,12 +246,41 @@ pub struct Limits {
     pub alignment: u16,
     /// Requests that may be under way at once, over Modbus TCP only.
     pub in_flight_max: u16,
+    /// What tables have of their own, in the order of [`Table`].
+    pub of_tables: [TableLimits; 4],
+}
+
+/// What reads of one table have of their own; `None` is as for the others.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TableLimits {
+    /// Registers or bits.
+    pub read_max: Option<u16>,
+    /// Unused registers or bits between two tags.
+    pub gap_max: Option<u16>,
+    /// Multiple of an address and a count.
+    pub alignment: Option<u16>,
 }
 
 impl Limits {
+    fn of(&self, table: Table) -> TableLimits {
+        self.of_tables[table as usize]
+    }
+
     /// Registers or bits that one read of a table may ask for.
-    pub fn most(&self, table: Table) -> u32 {
-        u32::from(if table.is_bits() { self.read_bits_max } else { self.read_registers_max })
+    pub fn most(&self, table: Table) -> u16 {
+        self.of(table).read_max.unwrap_or(if table.is_bits() { self.read_bits_max } else { self.read_registers_max })
+    }
+
+    /// Unused registers or bits that may be read over: sixteen bits cost as much on the wire as one register.
+    pub fn gap(&self, table: Table) -> u32 {
+        let as_others = u32::from(self.gap_registers_max) * if table.is_bits() { 16 } else { 1 };
+        self.of(table).gap_max.map_or(as_others, u32::from)
+    }
+
+    /// Multiple of the addresses and counts of reads.
+    pub fn step(&self, table: Table) -> u16 {
+        let of_registers = if table.is_bits() { 1 } else { self.alignment };
+        self.of(table).alignment.unwrap_or(of_registers).max(1)
     }
 
     /// What the standard allows (Modbus application protocol V1.1b3, section 6), one request at a time.
@@ -262,6 +291,7 @@ impl Limits {
         gap_registers_max: 8,
         alignment: 1,
         in_flight_max: 1,
+        of_tables: [TableLimits { read_max: None, gap_max: None, alignment: None }; 4],
     };
 }
 

@@ -6,15 +6,15 @@ use super::{
     diagnostic::{Problems, Span},
     names::{Names, Scope, check_number, held_number_of, number_of},
     reader::{At, OptionalKey, Raw, text},
-    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, Stated},
+    schema::{ActionTable, DeviceTable, FaceplateTable, LimitsTable, ProfileFile, Roles, Stated, TableLimitsTable},
     simulate::simulate,
     tag::{Defined, range_of},
     units,
 };
 use crate::plant::{
-    def::{ActionDef, Faceplate, Limits, TagId},
+    def::{ActionDef, Faceplate, Limits, TableLimits, TagId},
     output::Output,
-    tag::{Access, Bound, Point, Poll, TagDef},
+    tag::{Access, Bound, Point, Poll, Table, TagDef},
 };
 
 /// The keys of a device profile that stand in the plant file itself; `None` where there is no map at all.
@@ -101,26 +101,16 @@ pub(super) fn limits(device: &DeviceTable, profile: &ProfileFile, problems: &mut
         return (standard, Timing::default());
     }
     let table = LimitsTable::of(&layers, problems);
-    let mut within = |value: Option<At<u16>>, default: u16, word: &str| {
-        let Some(value) = value else { return default };
-        if value.value == 0 || value.value > default {
-            let problem = problems.add(value.at, format!("{word} = {} is not possible", value.value));
-            problem.label(format!("the Modbus standard allows 1 to {default}"));
-            return default;
-        }
-        value.value
-    };
+    let mut within = |value, most, word| within(value, most, word, problems).unwrap_or(most);
     let limits = Limits {
         read_registers_max: within(table.read_registers_max, standard.read_registers_max, "read_registers_max"),
         read_bits_max: within(table.read_bits_max, standard.read_bits_max, "read_bits_max"),
         write_registers_max: within(table.write_registers_max, standard.write_registers_max, "write_registers_max"),
         gap_registers_max: table.gap_registers_max.value_or(8),
-        alignment: table.alignment.value_or(1),
+        alignment: alignment(table.alignment, false, problems).unwrap_or(1),
         in_flight_max: table.in_flight_max.value_or(1),
+        of_tables: of_tables(&table, problems),
     };
-    if let Some(alignment) = table.alignment.filter(|alignment| !matches!(alignment.value, 1 | 2 | 4)) {
-        problems.add(alignment.at, format!("alignment = {} is not known", alignment.value)).label("expected 1, 2 or 4");
-    }
     if let Some(count) = table.in_flight_max.filter(|count| !(1..=64).contains(&count.value)) {
         problems.add(count.at, format!("in_flight_max = {} is not possible", count.value)).label("expected 1 to 64");
     }
@@ -139,6 +129,43 @@ pub(super) fn limits(device: &DeviceTable, profile: &ProfileFile, problems: &mut
         units_max: table.units_max.map(|count| count.value),
     };
     (limits, timing)
+}
+
+/// What its tables have of their own.
+fn of_tables(limits: &LimitsTable, problems: &mut Problems) -> [TableLimits; 4] {
+    let written = [&limits.coil, &limits.discrete, &limits.input, &limits.holding];
+    let tables = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
+    let mut of_tables = [TableLimits::default(); 4];
+    for (table, raw) in tables.into_iter().zip(written) {
+        let Some(raw) = raw else { continue };
+        let own = TableLimitsTable::of(std::slice::from_ref(&raw.value), problems);
+        let read_max = within(own.read_max, Limits::STANDARD.most(table), "read_max", problems);
+        let gap_max = own.gap_max.map(|gap| gap.value);
+        let alignment = alignment(own.alignment, table.is_bits(), problems);
+        of_tables[table as usize] = TableLimits { read_max, gap_max, alignment };
+    }
+    of_tables
+}
+
+/// A limit that the standard allows.
+fn within(value: Option<At<u16>>, most: u16, word: &str, problems: &mut Problems) -> Option<u16> {
+    let value = value?;
+    let is_possible = (1..=most).contains(&value.value);
+    if !is_possible {
+        let problem = problems.add(value.at, format!("{word} = {} is not possible", value.value));
+        problem.label(format!("the Modbus standard allows 1 to {most}"));
+    }
+    is_possible.then_some(value.value)
+}
+
+fn alignment(value: Option<At<u16>>, of_bits: bool, problems: &mut Problems) -> Option<u16> {
+    let alignment = value?;
+    let (most, expected) = if of_bits { (16, "1, 2, 4, 8 or 16") } else { (4, "1, 2 or 4") };
+    if !alignment.value.is_power_of_two() || most < alignment.value {
+        let problem = problems.add(alignment.at, format!("alignment = {} is not known", alignment.value));
+        problem.label(format!("expected {expected}"));
+    }
+    Some(alignment.value)
 }
 
 /// A poll period that a line can keep and an operator can wait for.

@@ -11,7 +11,7 @@ use jiff::civil::Time;
 pub(super) use self::{
     device::{
         ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, RepeatTable, Scheme,
-        SignatureTable, SimulateTable, StepTable, TagTable,
+        SignatureTable, SimulateTable, StepTable, TableLimitsTable, TagTable,
     },
     keys::{CounterKey, PollKey, Priorities, Roles, Stated, TypeName},
     line::{ListenFraming, ListenSerialTable, ListenTcpTable, SerialTable, TcpTable, UdpTable},

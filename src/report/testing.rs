@@ -70,6 +70,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
                 gap_registers_max: 4,
                 alignment: 1,
                 in_flight_max: 1,
+                ..Limits::STANDARD
             },
             functions: Vec::new(),
             exception_status: Vec::new(),

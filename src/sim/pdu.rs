@@ -82,7 +82,9 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Exception
     let limits = device.limits();
     match (function, &fields[..]) {
         (0x01 | 0x02, &[address, count]) => {
-            read_bits(device, function, span(function, 0, address, count, limits.read_bits_max)?)
+            let most = limits.most(names::table(function));
+            check_step(&limits, names::table(function), address, count)?;
+            read_bits(device, function, span(function, 0, address, count, most)?)
         }
         (0x03 | 0x04, &[address, count]) => read_words(device, function, address, count),
         (0x05, &[address, state @ (0x0000 | 0xFF00)]) => {
@@ -133,17 +135,23 @@ fn read_bits<D: Registers>(device: &D, function: u8, addresses: Addresses) -> Re
     Ok(reply)
 }
 
+/// Address and count are multiples of the alignment of their table.
+fn check_step(limits: &Limits, table: Table, address: u16, count: u16) -> Result<(), ExceptionCode> {
+    let step = limits.step(table);
+    match (address.is_multiple_of(step), count.is_multiple_of(step)) {
+        (false, _) => Err(ExceptionCode::ILLEGAL_ADDRESS),
+        (_, false) => Err(ExceptionCode::ILLEGAL_VALUE),
+        (true, true) => Ok(()),
+    }
+}
+
 fn read_words<D: Registers>(device: &D, function: u8, address: u16, count: u16) -> Result<Vec<u8>, ExceptionCode> {
     let table = names::table(function);
-    let Limits { read_registers_max, alignment, .. } = device.limits();
-    let mut reply = vec![function, to_u8(count.min(read_registers_max) * 2)];
-    let addresses = span(function, 0, address, count, read_registers_max)?;
-    if !address.is_multiple_of(alignment) {
-        return Err(ExceptionCode::ILLEGAL_ADDRESS);
-    }
-    if !count.is_multiple_of(alignment) {
-        return Err(ExceptionCode::ILLEGAL_VALUE);
-    }
+    let limits = device.limits();
+    let most = limits.most(table);
+    let mut reply = vec![function, to_u8(count.min(most) * 2)];
+    let addresses = span(function, 0, address, count, most)?;
+    check_step(&limits, table, address, count)?;
     for at in addresses {
         reply.extend_from_slice(&device.word(table, at)?.to_be_bytes());
     }

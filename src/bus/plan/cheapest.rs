@@ -43,7 +43,9 @@ pub(super) fn cut<'a>(
             let extent = Extent::new(tags[values[start].tags.start].point, end, device);
             let alone = start == last;
             // From here on the run only grows: what is forbidden now stays forbidden.
-            if !alone && (values[start + 1].gap > extent.gap_max(device) || !extent.allowed(device, unreadable)) {
+            if !alone
+                && (values[start + 1].gap > device.limits.gap(extent.table) || !extent.allowed(device, unreadable))
+            {
                 break;
             }
             let (spent, requests) = best[start];

@@ -1,12 +1,12 @@
 //! What the plan must keep, and that nothing cheaper exists.
 
-use std::time::Duration;
+use std::{ops::Range, time::Duration};
 
 use proptest::prelude::*;
 
 use super::*;
 use crate::plant::{
-    def::{Framing, Limits, LineDef, Parity, Protocol, Rs485, Serial, Transport},
+    def::{Framing, Limits, LineDef, Parity, Protocol, Rs485, Serial, TableLimits, Transport},
     fixture,
     tag::DataType,
 };
@@ -263,11 +263,22 @@ fn plant_of(rows: &[Row], limits: Limits, transport: Transport) -> PlantDef {
 }
 
 fn limits() -> impl Strategy<Value = Limits> {
-    (4u16..125, 1u16..2000, 0u16..40, 1u16..3).prop_map(|(words, bits, gap, alignment)| Limits {
+    let own = |most: Range<u16>| {
+        let (read_max, gap_max) = (proptest::option::of(most), proptest::option::of(0u16..40));
+        let alignment = proptest::option::of((0u16..3).prop_map(|power| 1 << power));
+        (read_max, gap_max, alignment).prop_map(|(read_max, gap_max, alignment)| TableLimits {
+            read_max,
+            gap_max,
+            alignment,
+        })
+    };
+    let tables = (own(1..2000), own(4..125));
+    (4u16..125, 1u16..2000, 0u16..40, 1u16..3, tables).prop_map(|(words, bits, gap, alignment, (coil, input))| Limits {
         read_registers_max: words,
         read_bits_max: bits,
         gap_registers_max: gap,
         alignment,
+        of_tables: [coil, TableLimits::default(), input, TableLimits::default()],
         ..Limits::STANDARD
     })
 }
@@ -326,16 +337,14 @@ proptest! {
         }
         for block in &plan {
             // A single value that is larger than the limit must be read all the same, and alignment may add to it.
-            let words_max = limits.read_registers_max.max(4 + 2 * (limits.alignment - 1));
-            let max = if block.table.is_bits() { limits.read_bits_max } else { words_max };
-            prop_assert!(block.count <= max, "{:?}", block);
+            let step = limits.step(block.table);
+            let longest = if block.table.is_bits() { step } else { 4 + 2 * (step - 1) };
+            prop_assert!(block.count <= limits.most(block.table).max(longest), "{:?}", block);
             let (start, end) = block.range();
             let over = unreadable.touch(block.unit, block.table, start, end);
             prop_assert_eq!(over, refused.contains(&block.tags[0]), "{:?} and a is_unreadable", block);
             prop_assert!(!over || block.tags.len() == 1);
-            if !block.table.is_bits() {
-                prop_assert_eq!((block.address % limits.alignment, block.count % limits.alignment), (0, 0));
-            }
+            prop_assert_eq!((block.address % step, block.count % step), (0, 0));
         }
     }
 
@@ -361,7 +370,7 @@ proptest! {
         limits in limits(), transport in transport(),
     ) {
         // Fixed blocks read over gaps of any length, so the limit of gaps must not stand in the way of the plan.
-        let def = plant_of(&rows, Limits { gap_registers_max: 200, alignment: 1, ..limits }, transport);
+        let def = plant_of(&rows, Limits { gap_registers_max: 200, alignment: 1, of_tables: Limits::STANDARD.of_tables, ..limits }, transport);
         let ours = alternatives::wire_time(&def, &blocks(&def, LineId(0), &UnreadableRanges::default()));
         let tags = alternatives::sorted(&def);
         let groups = alternatives::groups(&def, &tags);

@@ -91,6 +91,17 @@ toml_tables! {
         opt "response_time_ms" response_time_ms: u16,
         /// Most devices on its line, as its manual says.
         opt "units_max" units_max: u16,
+        opt "coil" coil: Raw,
+        opt "discrete" discrete: Raw,
+        opt "input" input: Raw,
+        opt "holding" holding: Raw,
+    }
+
+    /// What reads of one table may hold.
+    TableLimitsTable, "limits of a table" {
+        opt "read_max" read_max: u16,
+        opt "gap_max" gap_max: u16,
+        opt "alignment" alignment: u16,
     }
 
     /// A `[[tag]]` of a profile, or a `[[device.tag]]` of a plant file.

@@ -96,16 +96,15 @@ fn check_place(point: Point, at: Span, limits: Limits, problems: &mut Problems) 
         problems.add(at, "the value extends past the last address").label("the last is 65535");
         return false;
     }
-    if words > 1 && !point.address.is_multiple_of(limits.alignment.max(1)) {
-        let alignment = limits.alignment;
+    let (alignment, max) = (limits.step(point.table), limits.most(point.table));
+    if words > 1 && !point.address.is_multiple_of(alignment) {
         let problem = problems.add(
             at,
             format!("a value of {words} registers at address {} breaks alignment = {alignment}", point.address),
         );
         problem.label(format!("expected a multiple of {alignment}"));
     }
-    if !point.table.is_bits() && words > limits.read_registers_max {
-        let max = limits.read_registers_max;
+    if !point.table.is_bits() && words > max {
         problems
             .add(at, format!("the value takes {words} registers, the device reads at most {max}"))
             .label("too long");

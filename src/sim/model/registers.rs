@@ -53,10 +53,9 @@ impl Chart {
 /// The addresses that answer: those of tags, and what lies between two of them where the profile allows reading over it.
 fn cells<'a>(tags: impl Iterator<Item = &'a TagDef>, limits: Limits) -> BTreeSet<u16> {
     let mut cells: BTreeSet<u16> = BTreeSet::new();
-    let mut gap_max = u32::from(limits.gap_registers_max);
+    let mut gap_max = 0;
     for tag in tags {
-        // The profile counts gaps in words, of bits too.
-        gap_max = u32::from(limits.gap_registers_max) * if tag.point.table.is_bits() { 16 } else { 1 };
+        gap_max = limits.gap(tag.point.table);
         cells.extend((tag.point.address..).take(usize::from(tag.point.len())));
     }
     let taken: Vec<u16> = cells.iter().copied().collect();

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::*;
 use crate::{
-    plant::{PlantDef, def::LineId},
+    bus::plan::{UnreadableRanges, blocks},
+    plant::{PlantDef, def::LineId, tag::Table},
     profile::{self, Search},
     sim::simulator::Simulator,
 };
@@ -106,6 +107,21 @@ fn a_device_with_an_alignment_refuses_odd_requests() {
     assert_eq!(simulator.respond(L1, 1, &[4, 0, 0, 0, 4]), Some(vec![4, 8, 0, 0, 0, 0, 0, 0, 0, 0]));
     assert_eq!(simulator.respond(L1, 1, &[4, 0, 1, 0, 2]), Some(vec![0x84, 2]));
     assert_eq!(simulator.respond(L1, 1, &[4, 0, 0, 0, 3]), Some(vec![0x84, 3]));
+}
+
+#[test]
+fn a_device_refuses_what_one_of_its_tables_does_not_give() {
+    let tags = "[{ name = 'V1', table = 'input', address = 0, type = 'float32' }, { name = 'V2', table = 'holding', address = 0, type = 'float32' }, { name = 'B', table = 'coil', address = 0 }]";
+    let meter = plant(&format!(
+        "limits = {{ input = {{ read_max = 2 }}, coil = {{ alignment = 8, gap_max = 15 }} }}\ntag = {tags}"
+    ));
+    let mut simulator = Simulator::new(&meter).expect("no rig is named");
+    assert_eq!(simulator.respond(L1, 1, &[4, 0, 0, 0, 2]), Some(vec![4, 4, 0, 0, 0, 0]));
+    assert_eq!(simulator.respond(L1, 1, &[4, 0, 0, 0, 3]), Some(vec![0x84, 3]));
+    assert_eq!(simulator.respond(L1, 1, &[1, 0, 0, 0, 1]), Some(vec![0x81, 3]));
+    let plan = blocks(&meter, L1, &UnreadableRanges::default());
+    let counts: Vec<_> = plan.iter().map(|block| (block.table, block.address, block.count)).collect();
+    assert_eq!(counts, [(Table::Coil, 0, 8), (Table::Input, 0, 2), (Table::Holding, 0, 2)]);
 }
 
 #[test]

@@ -105,8 +105,8 @@ pub fn plant(mode: Mode) -> PlantDef {
         read_bits_max: 100,
         write_registers_max: 60,
         gap_registers_max: 0,
-        alignment: 1,
         in_flight_max: if mode == Mode::Tcp16 { 16 } else { 1 },
+        ..Limits::STANDARD
     };
     let first = def.devices[0].clone();
     let device = |id, unit| DeviceDef { id, name: format!("U{unit}"), unit, limits, ..first.clone() };
