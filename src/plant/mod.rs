@@ -17,6 +17,7 @@ pub mod mqtt_request;
 pub mod north_def;
 pub mod id;
 pub mod role;
+pub mod request_refusal;
 pub mod sample;
 pub(crate) mod expr;
 pub mod line;

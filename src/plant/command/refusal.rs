@@ -8,6 +8,7 @@ use crate::{
         event::{ExceptionCode, Fault},
         exact::Exact,
         parameter_set::Problem,
+        request_refusal::RequestRefusal,
     },
     t,
     text::said,
@@ -17,11 +18,11 @@ use crate::{
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum Refusal {
     /// The role does not permit it, or no user is logged in.
-    #[error("{}", said(.0))]
-    NotPermitted(String),
+    #[error("{0}")]
+    NotPermitted(RequestRefusal),
     /// The tag requires a password or a second user, which is missing or wrong.
-    #[error("{}", said(.0))]
-    NotReauthenticated(String),
+    #[error("{0}")]
+    NotReauthenticated(RequestRefusal),
     /// The value changed after it was shown; this is the present one.
     #[error("{}", t!("it was changed to {what} after it was shown", what = .0))]
     ChangedTo(String),
