@@ -64,7 +64,7 @@ use crate::{
     access::io::users::UsersError,
     attach::io::serve,
     history::{HistoryError, io::probe},
-    plant::{request_refusal::RequestRefusal, visible::visible},
+    plant::{line_trouble::LineTrouble, request_refusal::RequestRefusal, visible::visible},
     profile, ui,
 };
 
@@ -206,6 +206,8 @@ enum CliError {
     Failed(String),
     #[error(transparent)]
     Refused(#[from] RequestRefusal),
+    #[error(transparent)]
+    Line(#[from] LineTrouble),
     #[error("{0}\nstart one: `sightglass run PLANT`; or try it out: `sightglass demo`")]
     NotRunning(String),
     #[error("the audit log is intact, but {0}")]
@@ -239,6 +241,7 @@ impl CliError {
             | CliError::StationGone
             | CliError::Failed(_)
             | CliError::Refused(_)
+            | CliError::Line(_)
             | CliError::Io { .. } => 1,
         }
     }

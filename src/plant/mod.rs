@@ -45,6 +45,7 @@ pub mod parameter_set;
 pub(crate) mod admission;
 pub mod port_signals;
 pub mod event;
+pub mod line_trouble;
 pub mod request_stats;
 pub mod device_time;
 pub mod line_report;

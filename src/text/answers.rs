@@ -1,42 +1,7 @@
 //! What the station says in words of its own is English, because it stands in the audit log and in logs too; here a terminal
-//! reads it in its language: what is on record, and why a line is not connected.
+//! reads it in its language: what is on record.
 
 use super::{fill, patterns, translate, translation};
-
-/// Why a line is not connected, or a device answers nothing.
-fn line_words() -> &'static [&'static str] {
-    &[
-        "no setting of the device could be read",
-        "the port accepts no bytes",
-        "the port is gone",
-        "this port has no RTS and DTR: a pseudo-terminal, or a driver without them",
-        "closed by the other side",
-        "a request was incomplete, the stream is out of sync",
-        "a response was incomplete, the stream is out of sync",
-        "bytes came that are no Modbus TCP frame",
-        "no answer to {count} requests over this connection",
-        "cancelled by an urgent stop",
-        "the line was closed",
-        "the plant file was reloaded",
-        "the users file was reloaded",
-        "the line is not connected",
-        "{place}: no connection within {seconds} s",
-        "{place}: refused (is the device on, is the TCP port right?)",
-        "{place}: no route to this address",
-        "{path}: no such port ({known})",
-        "{path}: no permission{why}",
-        "{path}: in use by {holder}",
-        "{path}: not a serial port",
-        "this machine has no serial port",
-        "there are: {ports}",
-        ": it belongs to root; ask the administrator for access (a udev rule)",
-        ": it belongs to the group {name} (usermod -aG {name} USER, then log in again)",
-        "another program",
-        "this program, on another line",
-        "this process",
-        "unknown",
-    ]
-}
 
 /// What actions are called on record, and parts of their outcomes.
 fn action_words() -> &'static [&'static str] {
@@ -104,14 +69,6 @@ fn action_words() -> &'static [&'static str] {
     ]
 }
 
-/// Why a line is not connected, in the language of this thread; as it is where it is none of the known ones.
-pub fn said(answer: &str) -> String {
-    let known = |pattern: &&'static str| Some((translation(pattern)?, values(pattern, answer)?));
-    let found = line_words().iter().find_map(known);
-    // A reason may stand within another.
-    found.map_or_else(|| answer.to_owned(), |(translated, values)| filled(translated, values, said))
-}
-
 /// What an action is called on record, in the language of this thread.
 pub fn recorded_action(action: &str) -> &str {
     if action_words().contains(&action) { translate(action) } else { action }
@@ -164,15 +121,6 @@ fn values<'a>(pattern: &'static str, text: &'a str) -> Option<Vec<(&'static str,
 mod tests {
     use super::*;
     use crate::text::Language;
-
-    #[test]
-    fn an_answer_is_read_in_the_language_of_the_terminal() {
-        let thai = |answer: &str| Language::THAI.locale().within(|| said(answer));
-        assert_eq!(thai("the disk is full"), "the disk is full");
-        assert_eq!(thai("this process"), "โปรแกรมนี้");
-        let held = thai("/dev/ttyUSB0: in use by another program");
-        assert!(held.starts_with("/dev/ttyUSB0") && !held.contains("use by") && !held.contains("program"), "{held}");
-    }
 
     #[test]
     fn a_refusal_on_record_is_read_in_the_language_of_the_terminal() {

@@ -11,7 +11,6 @@ use crate::{
         request_refusal::RequestRefusal,
     },
     t,
-    text::said,
 };
 
 /// Why a command was refused.
@@ -92,8 +91,11 @@ pub enum Refusal {
     #[error("{}", t!("stopped before anything was written"))]
     Stopped,
     /// The settings could not be written into the plant file, or a parameter set into its folder.
-    #[error("{}", t!("not saved: {what}", what = said(.0)))]
+    #[error("{}", t!("not saved: {what}", what = .0))]
     NotSaved(String),
+    /// A parameter set without a value.
+    #[error("{}", t!("not saved: no setting of the device could be read"))]
+    NothingToSave,
     /// No line has this name and place.
     #[error("{}", t!("no such line"))]
     NotALine,
