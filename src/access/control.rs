@@ -40,14 +40,12 @@ use crate::{
         PlantDef,
         command::{CommandStatus, Refusal},
         record::ActionRecord,
+        request_refusal::RequestRefusal,
         role::Role,
     },
 };
 
 pub use jobs::{JobId, JobOutcome, PasswordJob};
-
-/// Said where a terminal asks more than it may.
-const TOO_MANY: &str = "too many requests from this terminal, wait a moment";
 
 /// Where a terminal is.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,8 +70,8 @@ impl Requester {
         Effect::Reply(self.ticket, Ok(()))
     }
 
-    fn refused(self, why: impl Into<String>) -> Vec<Effect> {
-        vec![Effect::Reply(self.ticket, Err(why.into()))]
+    fn refused(self, why: RequestRefusal) -> Vec<Effect> {
+        vec![Effect::Reply(self.ticket, Err(why))]
     }
 }
 
@@ -85,7 +83,7 @@ pub enum Effect {
     /// Put this into the audit log.
     Record(ActionRecord),
     /// Answer a request.
-    Reply(u64, Result<(), String>),
+    Reply(u64, Result<(), RequestRefusal>),
     /// The session status of this terminal has changed.
     SessionStatus(u32),
     /// Run this job, then call [`AccessControl::on_job_done`]. At most `JOBS_MAX` are under way or wait.
@@ -148,10 +146,7 @@ impl AccessControl {
 
     /// Login is closed because the users file is damaged; `why` is the reply to each attempt.
     pub fn closed(def: Arc<PlantDef>, why: &str, service_account: Option<Arc<str>>) -> AccessControl {
-        AccessControl {
-            closed: Some(format!("login is disabled: {why}").into()),
-            ..AccessControl::with_users(def, Users::default(), service_account)
-        }
+        AccessControl { closed: Some(why.into()), ..AccessControl::with_users(def, Users::default(), service_account) }
     }
 
     /// The same, in this run of the station.
@@ -165,8 +160,8 @@ impl AccessControl {
     }
 
     /// Why login is disabled, if it is.
-    pub fn is_closed(&self) -> Option<&Arc<str>> {
-        self.closed.as_ref()
+    pub fn is_closed(&self) -> Option<RequestRefusal> {
+        self.closed.as_ref().map(|why| RequestRefusal::LoginDisabled(why.to_string()))
     }
 
     /// A terminal has attached.
@@ -224,7 +219,7 @@ impl AccessControl {
     /// May this terminal ask this of the history? `Err` says why not, and what must happen because of it.
     pub fn may_ask(&mut self, terminal: u32, query: &Query, at: Timestamp) -> Result<(), (String, Vec<Effect>)> {
         if !self.within_rate(terminal, at) {
-            return Err((TOO_MANY.to_owned(), Vec::new()));
+            return Err((RequestRefusal::TooManyRequests.to_string(), Vec::new()));
         }
         let needed = right::needs_for_query(query);
         let may =
@@ -240,20 +235,20 @@ impl AccessControl {
         // Only a refused read of the audit log is recorded.
         let is_audit = matches!(query, Query::Audit { .. });
         let entry = if is_audit { self.refused(terminal, "read audit log", "", &why, at) } else { None };
-        Err((why, entry.into_iter().collect()))
+        Err((why.to_string(), entry.into_iter().collect()))
     }
 
-    fn session(&self, terminal: u32) -> Result<&SessionState, &'static str> {
-        self.sessions.get(&terminal).ok_or("this terminal is not attached")
+    fn session(&self, terminal: u32) -> Result<&SessionState, RequestRefusal> {
+        self.sessions.get(&terminal).ok_or(RequestRefusal::NotAttached)
     }
 
-    fn may_look(&self, terminal: u32) -> Result<(), String> {
+    fn may_look(&self, terminal: u32) -> Result<(), RequestRefusal> {
         match &self.session(terminal)?.who {
             // Locked or not: the snapshot stays, and so does what lies behind it.
-            Some(who) if who.must_change => Err(CHANGE_FIRST.to_owned()),
+            Some(who) if who.must_change => Err(RequestRefusal::ChoosePasswordFirst),
             Some(_) => Ok(()),
             None if self.def.access.anonymous_view => Ok(()),
-            None => Err(LOG_IN_FIRST.to_owned()),
+            None => Err(RequestRefusal::LogInFirst),
         }
     }
 
@@ -261,7 +256,7 @@ impl AccessControl {
     pub fn on_request(&mut self, terminal: u32, ticket: u64, request: SessionRequest, at: Timestamp) -> Vec<Effect> {
         let requester = Requester { terminal, ticket };
         if !self.within_rate(terminal, at) {
-            return requester.refused(TOO_MANY);
+            return requester.refused(RequestRefusal::TooManyRequests);
         }
         let needed = right::needs_for_request(&request);
         if let (Some(_), Err(why)) = (needed, self.may(terminal, needed))
@@ -369,30 +364,24 @@ impl AccessControl {
     }
 
     /// The user, if the role is sufficient. `Err` is the reply to the user.
-    fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&LoggedInUser, String> {
+    fn may(&self, terminal: u32, needed: Option<Role>) -> Result<&LoggedInUser, RequestRefusal> {
         let session = self.session(terminal)?;
         let unknown = || match &session.acts_as {
-            Some(user) => format!("{user} is not a user of this station, or is disabled"),
-            None => LOG_IN_FIRST.to_owned(),
+            Some(user) => RequestRefusal::NoSuchDelegate(user.to_string()),
+            None => RequestRefusal::LogInFirst,
         };
         let who = session.who.as_ref().ok_or_else(unknown)?;
         if session.locked {
-            return Err("this terminal is locked".to_owned());
+            return Err(RequestRefusal::Locked);
         }
         if who.must_change {
-            return Err(CHANGE_FIRST.to_owned());
+            return Err(RequestRefusal::ChoosePasswordFirst);
         }
         enough(who.role, needed.unwrap_or(Role::Viewer))?;
         Ok(who)
     }
 }
 
-const LOG_IN_FIRST: &str = "log in first";
-const CHANGE_FIRST: &str = "choose a new password first";
-
-fn enough(role: Role, needed: Role) -> Result<(), String> {
-    if needed <= role {
-        return Ok(());
-    }
-    Err(format!("this is for a {}, you are {}", needed.word(), role.word()))
+fn enough(role: Role, needed: Role) -> Result<(), RequestRefusal> {
+    if needed <= role { Ok(()) } else { Err(RequestRefusal::Role { needed, role }) }
 }

@@ -14,6 +14,8 @@ use argon2::{
 };
 use unicode_normalization::UnicodeNormalization;
 
+use crate::plant::request_refusal::RequestRefusal;
+
 /// Most characters of a password: enough for a passphrase, too few to load the station.
 pub const CHARS_MAX: usize = 128;
 /// Letters and digits that must be left of a password without names and repetitions: more than the least password of NIST SP
@@ -59,30 +61,28 @@ pub fn one_form(text: &str) -> String {
 
 /// Checks a new password of a user. `names`: of the user and of the plant, which are the first that an attacker tries, and so
 /// are repetitions (NIST SP 800-63B, 5.1.1.2). `Err` says what is expected.
-pub fn check(password: &str, names: &[&str], chars_min: u16) -> Result<(), String> {
+pub fn check(password: &str, names: &[&str], chars_min: u16) -> Result<(), RequestRefusal> {
     let password = one_form(password);
     let chars = password.chars().count();
     if chars < usize::from(chars_min) {
-        return Err(format!(
-            "the password has {chars} characters, at least {chars_min} are needed; several words are best"
-        ));
+        return Err(RequestRefusal::PasswordShort { chars, least: chars_min });
     }
     if CHARS_MAX < chars {
-        return Err(format!("the password has {chars} characters, at most {CHARS_MAX} can be"));
+        return Err(RequestRefusal::PasswordLong { chars, most: CHARS_MAX });
     }
     if password.chars().any(char::is_control) {
-        return Err("the password has a character that cannot be typed".to_owned());
+        return Err(RequestRefusal::PasswordUntypable);
     }
     let is_common = |plain: &str| COMMON.iter().any(|common| made_of(plain, common));
     let (whole, unnamed) = (plain(&password), without(&password.to_lowercase(), names));
     if is_common(&whole) || is_common(&plain(&unnamed)) {
-        return Err("this password is too common".to_owned());
+        return Err(RequestRefusal::PasswordCommon);
     }
     if own_chars(&password) < OWN_CHARS_MIN {
-        return Err("the password repeats itself; several different words are best".to_owned());
+        return Err(RequestRefusal::PasswordRepeats);
     }
     if own_chars(&unnamed) < OWN_CHARS_MIN {
-        return Err("the password is little more than the name of the user or of the plant".to_owned());
+        return Err(RequestRefusal::PasswordIsName);
     }
     Ok(())
 }
@@ -247,13 +247,15 @@ mod tests {
             "a b c d a b c d a b c d",
         ];
         let named = ["anna at the tank", "t.a.n.k.a.n.n.a 1234567", "ANNA kessel anna 12", "north works anna 99!!"];
-        for (passwords, why) in [(&repeats[..], "repeats itself"), (&named[..], "little more than the name")] {
+        for (passwords, why) in
+            [(&repeats[..], RequestRefusal::PasswordRepeats), (&named[..], RequestRefusal::PasswordIsName)]
+        {
             for password in passwords {
                 let refused = check(password, &["anna", "tank", "Kessel North Works"], 15).expect_err(password);
-                assert!(refused.contains(why), "{password}: {refused}");
+                assert_eq!(refused, why, "{password}");
             }
         }
-        assert_eq!(check("anna password tank password", NAMES, 15), Err("this password is too common".into()));
+        assert_eq!(check("anna password tank password", NAMES, 15), Err(RequestRefusal::PasswordCommon));
         for good in [
             "anna is on a wet horse",
             "the wet horse and the dry horse",

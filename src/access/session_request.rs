@@ -5,7 +5,7 @@ use std::{fmt, sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use crate::plant::{command::CommandId, role::Role};
+use crate::plant::{command::CommandId, request_refusal::RequestRefusal, role::Role};
 
 /// A password on its way: never shown, not even in a log.
 #[derive(Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -183,7 +183,7 @@ pub struct SessionStatus {
     /// Who is attached; only for a Supervisor.
     pub sessions: Arc<Vec<SessionRow>>,
     /// The latest commands that did not reach the plant, and why; the latest last.
-    pub undelivered: Vec<(CommandId, Arc<str>)>,
+    pub undelivered: Vec<(CommandId, RequestRefusal)>,
     /// The station has gone, and why; set by the terminal's own end of the socket.
     pub gone: Option<Arc<str>>,
 }

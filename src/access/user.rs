@@ -5,7 +5,10 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use super::{audit_log::sha256, password::one_form};
-use crate::plant::role::Role;
+use crate::plant::{
+    request_refusal::{Alphabet, RequestRefusal},
+    role::Role,
+};
 
 /// Most users of a plant.
 pub const USERS_MAX: usize = 200;
@@ -119,14 +122,14 @@ impl Users {
     }
 
     /// These users. `Err` says what is wrong with which of them, by its place.
-    pub fn new(list: Vec<User>) -> Result<Users, (usize, String)> {
+    pub fn new(list: Vec<User>) -> Result<Users, (usize, RequestRefusal)> {
         let mut users = Users::default();
         for (place, user) in list.into_iter().enumerate() {
             users.check_new(&user.name).map_err(|why| (place, why))?;
             users.list.push(user);
         }
         if !users.list.is_empty() && !users.has_supervisor() {
-            return Err((0, NO_SUPERVISOR.to_owned()));
+            return Err((0, RequestRefusal::LastSupervisor));
         }
         Ok(users)
     }
@@ -155,13 +158,13 @@ impl Users {
     }
 
     /// The users after a change. `Err`: why the change is not permitted, for the operator.
-    pub fn with(&self, change: &UserChange) -> Result<Users, String> {
+    pub fn with(&self, change: &UserChange) -> Result<Users, RequestRefusal> {
         let mut users = self.clone();
         users.change(change)?;
-        if users.has_supervisor() { Ok(users) } else { Err(NO_SUPERVISOR.to_owned()) }
+        if users.has_supervisor() { Ok(users) } else { Err(RequestRefusal::LastSupervisor) }
     }
 
-    fn change(&mut self, change: &UserChange) -> Result<(), String> {
+    fn change(&mut self, change: &UserChange) -> Result<(), RequestRefusal> {
         let new = |user: &Arc<str>, role, hash: &Arc<str>, must_change| User {
             name: one_form(user).into(),
             role,
@@ -174,9 +177,9 @@ impl Users {
             self.check_new(change.user())?;
         }
         let place = self.place(change.user());
-        let place = place.ok_or_else(|| format!("there is no user {}", change.user()));
+        let place = place.ok_or_else(|| RequestRefusal::UnknownUser(change.user().to_string()));
         match change {
-            UserChange::First { .. } if !self.list.is_empty() => return Err("users already exist".to_owned()),
+            UserChange::First { .. } if !self.list.is_empty() => return Err(RequestRefusal::UsersExist),
             UserChange::First { user, hash } => self.list.push(new(user, Role::Supervisor, hash, false)),
             UserChange::Add { user, role, hash } => self.list.push(new(user, *role, hash, true)),
             UserChange::Role(_, role) => self.list[place?].role = *role,
@@ -190,13 +193,13 @@ impl Users {
         Ok(())
     }
 
-    fn check_new(&self, name: &str) -> Result<(), String> {
+    fn check_new(&self, name: &str) -> Result<(), RequestRefusal> {
         check_name(name)?;
         if self.get(name).is_some() {
-            return Err(format!("user {name} already exists"));
+            return Err(RequestRefusal::UserExists(name.to_owned()));
         }
         if USERS_MAX <= self.list.len() {
-            return Err(format!("there are {USERS_MAX} users, no more can be"));
+            return Err(RequestRefusal::UsersFull(USERS_MAX));
         }
         Ok(())
     }
@@ -211,38 +214,38 @@ impl Users {
     }
 }
 
-const NO_SUPERVISOR: &str = "at least one enabled supervisor must remain";
-
 /// The form in which names are compared: however the letters are written.
 pub fn key(name: &str) -> String {
     one_form(&name.to_lowercase())
 }
 
 /// Checks a name: letters of any script, digits, `.`, `_` and `-`.
-pub fn check_name(name: &str) -> Result<(), String> {
+pub fn check_name(name: &str) -> Result<(), RequestRefusal> {
     let chars = one_form(name).chars().count();
     if !(1..=NAME_MAX).contains(&chars) {
-        return Err(format!("a name has 1 to {NAME_MAX} characters, this has {chars}"));
+        return Err(RequestRefusal::NameLength { most: NAME_MAX, count: chars });
     }
     let permitted = |letter: char| letter.is_alphanumeric() || is_mark(letter) || "._-".contains(letter);
     match one_form(name).chars().find(|letter| !permitted(*letter)) {
-        Some(letter) => Err(format!("a name has letters, digits, `.`, `_` and `-`, found {letter:?}")),
+        Some(letter) => Err(RequestRefusal::NameLetter(letter)),
         None => one_alphabet(name),
     }
 }
 
 /// Latin, Greek and Cyrillic have letters that look the same: together they make a name that looks like another one.
-fn one_alphabet(name: &str) -> Result<(), String> {
+fn one_alphabet(name: &str) -> Result<(), RequestRefusal> {
     let alphabet = |letter: char| match letter {
-        'A'..='Z' | 'a'..='z' | '\u{aa}' | '\u{ba}' | '\u{c0}'..='\u{2af}' | '\u{1e00}'..='\u{1eff}' => Some("Latin"),
-        '\u{370}'..='\u{3ff}' | '\u{1f00}'..='\u{1fff}' => Some("Greek"),
-        '\u{400}'..='\u{52f}' | '\u{1c80}'..='\u{1c8f}' => Some("Cyrillic"),
+        'A'..='Z' | 'a'..='z' | '\u{aa}' | '\u{ba}' | '\u{c0}'..='\u{2af}' | '\u{1e00}'..='\u{1eff}' => {
+            Some(Alphabet::Latin)
+        }
+        '\u{370}'..='\u{3ff}' | '\u{1f00}'..='\u{1fff}' => Some(Alphabet::Greek),
+        '\u{400}'..='\u{52f}' | '\u{1c80}'..='\u{1c8f}' => Some(Alphabet::Cyrillic),
         _ => None,
     };
     let mut found = name.chars().filter_map(|letter| Some((letter, alphabet(letter)?)));
     let Some((_, first)) = found.next() else { return Ok(()) };
     match found.find(|(_, alphabet)| *alphabet != first) {
-        Some((letter, other)) => Err(format!("a name is of one alphabet, found {letter:?} of {other} beside {first}")),
+        Some((letter, other)) => Err(RequestRefusal::NameAlphabets { letter, other, first }),
         None => Ok(()),
     }
 }
@@ -273,7 +276,9 @@ mod tests {
             assert!(check_name(name).is_err(), "{name:?}");
         }
         let again = first().with(&UserChange::Add { user: "ANNA".into(), role: Role::Viewer, hash: "h".into() });
-        assert_eq!(again.unwrap_err(), "user ANNA already exists");
+        assert_eq!(again.unwrap_err().to_string(), "user ANNA already exists");
+        let mixed = check_name("ann\u{3b1}").unwrap_err().to_string();
+        assert_eq!(mixed, "a name is of one alphabet, found '\u{3b1}' of Greek beside Latin");
     }
 
     #[test]
@@ -284,7 +289,7 @@ mod tests {
             UserChange::Disable(anna.clone(), true),
             UserChange::Role(anna, Role::Technician),
         ] {
-            assert_eq!(first().with(&change).unwrap_err(), NO_SUPERVISOR, "{change:?}");
+            assert_eq!(first().with(&change).unwrap_err(), RequestRefusal::LastSupervisor, "{change:?}");
         }
         assert!(first().with(&UserChange::First { user: "bert".into(), hash: "h".into() }).is_err());
     }

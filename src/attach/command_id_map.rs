@@ -8,10 +8,9 @@ use crate::plant::{
     Snapshot,
     command::{Command, CommandId, CommandStatus, NotConfirmed, Outcome},
     diagnostics::DiagnosticRun,
+    request_refusal::RequestRefusal,
 };
 
-/// Said of a command that never left this terminal.
-pub const GONE: &str = "station has gone";
 /// Numbers of earlier connections that are still known as one's own.
 const NUMBERS_MAX: usize = 64;
 /// Own commands that are remembered; a snapshot has no more.
@@ -31,7 +30,7 @@ pub struct CommandIdMap {
     /// Commands without a final status in any snapshot.
     lost: VecDeque<CommandStatus>,
     /// Commands that did not reach the plant, and why; the latest last.
-    undelivered: VecDeque<(CommandId, Arc<str>)>,
+    undelivered: VecDeque<(CommandId, RequestRefusal)>,
     /// The station is there: what its snapshots say of a command under way is still true.
     connected: bool,
 }
@@ -68,12 +67,12 @@ impl CommandIdMap {
     }
 
     /// A command did not leave this terminal.
-    pub fn refuse(&mut self, id: CommandId, why: &str) {
-        push(&mut self.undelivered, (id, why.into()), COMMANDS_MAX);
+    pub fn refuse(&mut self, id: CommandId, why: RequestRefusal) {
+        push(&mut self.undelivered, (id, why), COMMANDS_MAX);
     }
 
     /// A command that was sent did not reach the plant.
-    pub fn on_undelivered(&mut self, id: CommandId, why: Arc<str>) {
+    pub fn on_undelivered(&mut self, id: CommandId, why: RequestRefusal) {
         if let Some(place) = self.sent.iter().position(|status| status.command.id.number == id.number) {
             self.sent.remove(place);
             let own = self.renumbered(id);
@@ -82,7 +81,7 @@ impl CommandIdMap {
     }
 
     /// The commands that did not reach the plant, and why; the latest last.
-    pub fn undelivered(&self) -> Vec<(CommandId, Arc<str>)> {
+    pub fn undelivered(&self) -> Vec<(CommandId, RequestRefusal)> {
         self.undelivered.iter().cloned().collect()
     }
 

@@ -16,12 +16,13 @@ use crate::{
         def::LineId,
         line_report::LineReport,
         number::to_u32,
+        request_refusal::RequestRefusal,
         visible::is_control_or_bidi,
     },
 };
 
 /// The number of this protocol; goes up with every change of a message.
-pub const PROTOCOL: u32 = 24;
+pub const PROTOCOL: u32 = 26;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// A rejection that ends so may not be one a moment later: the terminal tries again by itself.
@@ -120,14 +121,14 @@ pub enum ServerMessage {
         /// Of the request.
         ticket: u64,
         /// Done, or why not.
-        answer: Result<Completion, String>,
+        answer: Result<Completion, RequestRefusal>,
     },
     /// A command did not reach the plant.
     Undelivered {
         /// Which.
         id: CommandId,
         /// Why.
-        why: String,
+        why: RequestRefusal,
     },
 }
 

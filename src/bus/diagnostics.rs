@@ -20,6 +20,7 @@ use crate::plant::{
         Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, DiagnosticStep, FINDINGS_MAX, Finding, RegisterWrite,
     },
     event::Fault,
+    line_trouble::LineTrouble,
     live::AddressSpan,
     number::{to_u16, to_u32},
     port_signals::{OutputSignal, PortSignals},
@@ -61,7 +62,7 @@ pub enum StepResult {
     /// Every byte that came back, after raw bytes were sent.
     Bytes(Vec<u8>, Option<Duration>),
     /// How the signals of the port stand, or why they cannot be set.
-    Signals(Result<PortSignals, String>),
+    Signals(Result<PortSignals, LineTrouble>),
 }
 
 /// A running diagnostic. Its steps are made one by one: a scan may have thousands.

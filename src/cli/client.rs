@@ -82,8 +82,7 @@ async fn attach_with_password(plant: Option<&str>, login: &Login) -> Result<(Ses
     let mut session = open(plant).await?;
     let Some(user) = login.user.clone() else { return Ok((session, None)) };
     let password = Secret(password(&user)?);
-    let reply =
-        session.request(SessionRequest::Login { user, password: password.clone() }).await.map_err(CliError::Failed)?;
+    let reply = session.request(SessionRequest::Login { user, password: password.clone() }).await?;
     warn_not_recorded("logged in", reply);
     let seen = async {
         // The answer may come before the status, and the status before the snapshot that belongs to it.
@@ -167,9 +166,7 @@ impl Actor {
             self.password.clone().filter(|_| required).map(|password| Credentials { user: None, password });
         let note = self.note.as_deref().map(Into::into);
         let command = Command { note, ..Command::on(&self.session.snapshots.borrow(), id, kind) };
-        self.session
-            .send(crate::station::Request::Command(command, credentials))
-            .map_err(|why| CliError::Failed(why.to_owned()))?;
+        self.session.send(crate::station::Request::Command(command, credentials))?;
         let ended = |snapshot: &Snapshot| {
             snapshot.commands.iter().find(|status| status.command.id == id && !status.is_pending()).cloned()
         };

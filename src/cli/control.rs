@@ -35,7 +35,7 @@ pub fn stop(args: Args) -> Result<(), CliError> {
             drop(session);
             gone(&station).await?;
         } else {
-            reply.map_err(CliError::Failed)?;
+            reply?;
         }
         say("stopped");
         Ok(())
@@ -58,7 +58,7 @@ async fn gone(station: &FoundStation) -> Result<(), CliError> {
 pub fn reload(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let session = client::attach(args.plant.as_deref(), &args.login).await?;
-        let done = session.complete(SessionRequest::Reload).await.map_err(CliError::Usage)?;
+        let done = session.complete(SessionRequest::Reload).await.map_err(|why| CliError::Usage(why.to_string()))?;
         let recorded = client::recorded_words(done.durability == Durability::Recorded);
         say(&format!("reloaded{recorded}: {}", done.summary.as_deref().unwrap_or("done")));
         Ok(())

@@ -64,7 +64,7 @@ use crate::{
     access::io::users::UsersError,
     attach::io::serve,
     history::{HistoryError, io::probe},
-    plant::visible::visible,
+    plant::{line_trouble::LineTrouble, request_refusal::RequestRefusal, visible::visible},
     profile, ui,
 };
 
@@ -204,6 +204,10 @@ enum CliError {
     Ui(#[from] ui::io::UiError),
     #[error("{0}")]
     Failed(String),
+    #[error(transparent)]
+    Refused(#[from] RequestRefusal),
+    #[error(transparent)]
+    Line(#[from] LineTrouble),
     #[error("{0}\nstart one: `sightglass run PLANT`; or try it out: `sightglass demo`")]
     NotRunning(String),
     #[error("the audit log is intact, but {0}")]
@@ -236,6 +240,8 @@ impl CliError {
             | CliError::Ui(_)
             | CliError::StationGone
             | CliError::Failed(_)
+            | CliError::Refused(_)
+            | CliError::Line(_)
             | CliError::Io { .. } => 1,
         }
     }

@@ -255,7 +255,7 @@ async fn first_answer(
     let deaf = |finding: &&Finding| matches!(finding, Finding::Conclusion(Conclusion::Deaf(_)));
     run.findings.iter().find(deaf).into_iter().flat_map(tools::scan::describe).for_each(|words| say(&words));
     match &run.state {
-        DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
+        DiagnosticState::Failed(why) => Err(why.clone().into()),
         DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => {
             Ok(answer(&run).ok_or_else(|| trace(&run).map_or(String::new(), |trace| format!(", {trace}"))))
         }

@@ -185,7 +185,7 @@ impl Source {
         let Source::Station(session) = self else { return Ok(()) };
         let file = path.display().to_string();
         let exported = format!("exported to {file}");
-        let durability = session.request(SessionRequest::Exported { file, sha256 }).await.map_err(CliError::Failed)?;
+        let durability = session.request(SessionRequest::Exported { file, sha256 }).await?;
         client::warn_not_recorded(&exported, durability);
         Ok(())
     }
@@ -194,7 +194,7 @@ impl Source {
 /// Queries the history of a station.
 pub async fn query_station(session: &Session, query: Query) -> Result<Answer, CliError> {
     let (reply, answer) = oneshot::channel();
-    session.ask(QueryRequest { query, reply }).map_err(|why| CliError::Failed(why.to_owned()))?;
+    session.ask(QueryRequest { query, reply })?;
     Ok(answer.await.map_err(|_| CliError::StationGone)??)
 }
 

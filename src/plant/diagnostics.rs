@@ -14,6 +14,7 @@ use super::{
     command::CommandId,
     line::{LineDef, Serial},
     line_check::{TIMEOUT_MIN, WAIT_MAX},
+    line_trouble::LineTrouble,
     port_signals::{HOLD_MAX_S, SignalTest},
     sweep::Sweep,
     tag::Table,
@@ -302,5 +303,5 @@ pub enum DiagnosticState {
     /// Stopped by an operator.
     Cancelled,
     /// The line went away, or would not open.
-    Failed(String),
+    Failed(LineTrouble),
 }

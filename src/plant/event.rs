@@ -12,6 +12,7 @@ use super::{
     exact::Exact,
     id::{DeviceId, LineId, TagId, WriteId},
     line_report::LineReport,
+    line_trouble::LineTrouble,
     north_def::NorthStatus,
     port_signals::PortSignals,
     process_load::ProcessLoad,
@@ -327,8 +328,8 @@ pub enum LineState {
     Connected,
     /// It went away or would not open; the next try is at `retry_at`.
     Waiting {
-        /// In the words of the system: `No such file or directory`.
-        why: String,
+        /// Why.
+        why: LineTrouble,
         /// When it is tried again.
         retry_at: Timestamp,
     },

@@ -30,6 +30,7 @@ use super::{
     heard,
     interlock::ActuatorTracker,
     line_minute::LineMinuteTracker,
+    line_trouble::LineTrouble,
     north_def::NorthStatus,
     parameter_set::StoredSet,
     procedure::ProcedureRun,
@@ -43,7 +44,6 @@ use super::{
     traffic::Exchange,
     tuning::TuningTracker,
 };
-use crate::t;
 
 pub use redefine::Redefined;
 pub use restore::SetWork;
@@ -304,7 +304,7 @@ impl Plant {
     /// The station stops: ends all pending commands and the runs at work.
     pub fn on_stop(&mut self) -> Effects {
         let mut effects = Effects::of_actions(self.commands.stop(&self.image, self.at));
-        effects.records.extend(self.end_tests(|_| true, t!("the station stopped")));
+        effects.records.extend(self.end_tests(|_| true, &LineTrouble::StationStopped));
         self.stop_procedures(&mut effects);
         effects.records.extend(self.stop_runs());
         effects

@@ -21,6 +21,7 @@ use crate::{
     plant::{
         Snapshot,
         record::{ActionRecord, AlarmRecord, ChainHash},
+        request_refusal::RequestRefusal,
     },
     profile::PlantFile,
 };
@@ -31,7 +32,7 @@ const BACKLOG_MAX: usize = 1_000;
 const REPLIES_MAX: usize = 64;
 
 /// Where the result of a request goes.
-pub(crate) type ReplySender = oneshot::Sender<Result<Completion, String>>;
+pub(crate) type ReplySender = oneshot::Sender<Result<Completion, RequestRefusal>>;
 
 /// A message of the session server. Their order matters.
 #[derive(Debug)]
@@ -39,7 +40,7 @@ pub(crate) enum AuditMessage {
     /// Append this entry.
     Entry(ActionRecord),
     /// Send this result, its summary if it has one, once everything before it is on disk, or say that it is not.
-    Reply(ReplySender, Result<Option<String>, String>),
+    Reply(ReplySender, Result<Option<String>, RequestRefusal>),
     /// This many entries did not fit into the queue.
     Lost(u64),
 }
@@ -49,7 +50,7 @@ pub(crate) enum AuditMessage {
 struct Reply {
     wait: Wait,
     sender: ReplySender,
-    result: Result<Option<String>, String>,
+    result: Result<Option<String>, RequestRefusal>,
 }
 
 impl Reply {
@@ -158,7 +159,7 @@ impl AuditQueue {
     }
 
     /// Sends a result once everything that was put before it is on disk; see [`AuditQueue::send_due`].
-    pub fn reply(&mut self, sender: ReplySender, result: Result<Option<String>, String>) {
+    pub fn reply(&mut self, sender: ReplySender, result: Result<Option<String>, RequestRefusal>) {
         self.replies.push_back(Reply { wait: self.barrier.wait(self.began.elapsed()), sender, result });
         let _ = self.send_due();
     }

@@ -10,6 +10,7 @@ use crate::{
     plant::{
         Snapshot,
         command::{Command, CommandId, CommandKind},
+        request_refusal::RequestRefusal,
     },
 };
 
@@ -40,7 +41,7 @@ pub enum Request {
     /// A query to the history.
     Ask(QueryRequest),
     /// A session request.
-    SessionRequest(SessionRequest, oneshot::Sender<Result<Completion, String>>),
+    SessionRequest(SessionRequest, oneshot::Sender<Result<Completion, RequestRefusal>>),
     /// For the audit log: requests from outside that were refused before one became a command. Never over a socket.
     RecordRefusal {
         /// What was requested.
@@ -52,18 +53,18 @@ pub enum Request {
 
 impl Session {
     /// Hands a request to the station; `Err` says why not.
-    pub fn send(&self, request: Request) -> Result<(), &'static str> {
+    pub fn send(&self, request: Request) -> Result<(), RequestRefusal> {
         if self.status.borrow().gone.is_some() {
-            return Err("station has gone");
+            return Err(RequestRefusal::StationGone);
         }
         self.requests.try_send((self.terminal, request)).map_err(|error| match error {
-            mpsc::error::TrySendError::Full(_) => "station too busy",
-            mpsc::error::TrySendError::Closed(_) => "station has ended",
+            mpsc::error::TrySendError::Full(_) => RequestRefusal::StationBusy,
+            mpsc::error::TrySendError::Closed(_) => RequestRefusal::StationEnded,
         })
     }
 
     /// Gives a command without note and credentials; its outcome is seen in a later snapshot.
-    pub fn send_command(&self, number: u32, kind: CommandKind) -> Result<CommandId, &'static str> {
+    pub fn send_command(&self, number: u32, kind: CommandKind) -> Result<CommandId, RequestRefusal> {
         let id = CommandId { terminal: self.terminal, number };
         let command = Command::on(&self.snapshots.borrow(), id, kind);
         self.send(Request::Command(command, None))?;
@@ -71,19 +72,19 @@ impl Session {
     }
 
     /// Asks the history.
-    pub fn ask(&self, query: QueryRequest) -> Result<(), &'static str> {
+    pub fn ask(&self, query: QueryRequest) -> Result<(), RequestRefusal> {
         self.send(Request::Ask(query))
     }
 
     /// Sends a request and waits for the reply.
-    pub async fn request(&self, request: SessionRequest) -> Result<Durability, String> {
+    pub async fn request(&self, request: SessionRequest) -> Result<Durability, RequestRefusal> {
         self.complete(request).await.map(|completion| completion.durability)
     }
 
     /// The same, with what was done in words.
-    pub async fn complete(&self, request: SessionRequest) -> Result<Completion, String> {
+    pub async fn complete(&self, request: SessionRequest) -> Result<Completion, RequestRefusal> {
         let (reply, answer) = oneshot::channel();
         self.send(Request::SessionRequest(request, reply))?;
-        answer.await.unwrap_or_else(|_| Err("the station has stopped".to_owned()))
+        answer.await.unwrap_or_else(|_| Err(RequestRefusal::StationStopped))
     }
 }

@@ -24,7 +24,7 @@ use crate::{
         Answer, HistoryError, Query,
         io::{JobRequest, QueryRequest},
     },
-    plant::command::CommandStatus,
+    plant::{command::CommandStatus, request_refusal::RequestRefusal},
 };
 
 pub(super) use reload::{NewPlant, NewUsers, Reload};
@@ -86,7 +86,7 @@ pub struct SessionServer {
     terminals: BTreeMap<u32, watch::Sender<Arc<SessionStatus>>>,
     /// The session of requests from outside.
     delegate: Option<u32>,
-    tickets: BTreeMap<u64, oneshot::Sender<Result<Completion, String>>>,
+    tickets: BTreeMap<u64, oneshot::Sender<Result<Completion, RequestRefusal>>>,
     /// Reloads whose outcome is awaited, with their tickets.
     reloads: JoinSet<(u64, Result<String, String>)>,
     /// The same of backups and imports.
@@ -151,7 +151,7 @@ impl SessionServer {
                     self.apply_effects(effects);
                 }
                 Some(Ok((ticket, answer))) = self.reloads.join_next() => {
-                    self.reply(ticket, answer.map(Some), EntryDelivery::Sent);
+                    self.reply(ticket, answer.map(Some).map_err(RequestRefusal::Failed), EntryDelivery::Sent);
                 }
                 Some(Ok((ticket, done))) = self.history_jobs.join_next() => {
                     let effects = self.access.on_history_job_done(ticket, done, self.clock.now());
@@ -281,7 +281,7 @@ impl SessionServer {
                         tracing::error!(%error, "a command did not reach the plant");
                         let (mpsc::error::TrySendError::Full(status) | mpsc::error::TrySendError::Closed(status)) =
                             error;
-                        let effects = self.access.undelivered(status.command.id, "station too busy");
+                        let effects = self.access.undelivered(status.command.id, RequestRefusal::StationBusy);
                         self.apply_effects(effects);
                     }
                 }
@@ -331,7 +331,7 @@ impl SessionServer {
         }
     }
 
-    fn reply(&mut self, ticket: u64, answer: Result<Option<String>, String>, entry: EntryDelivery) {
+    fn reply(&mut self, ticket: u64, answer: Result<Option<String>, RequestRefusal>, entry: EntryDelivery) {
         let Some(reply) = self.tickets.remove(&ticket) else { return };
         // A terminal that has left needs no answer.
         let (reply, answer, durability) = match entry {

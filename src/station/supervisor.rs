@@ -25,6 +25,7 @@ use crate::{
         def::{DeviceId, LineId},
         event::{Event, Fault, LineState, WriteResult},
         line_finding::DeviceFinding,
+        line_trouble::LineTrouble,
         station::{FaultState, StationFault},
     },
 };
@@ -67,7 +68,7 @@ pub(super) async fn run(
         (def, line) = requests.take_definition().unwrap_or((def, line));
         let retry_at = clock.now() + backoff.fail().mul_f64(clock.speed());
         tracing::error!(line = def.line(line).name, "a line task has panicked and is restarted");
-        let state = LineState::Waiting { why: "internal error, see the log".to_owned(), retry_at };
+        let state = LineState::Waiting { why: LineTrouble::Internal, retry_at };
         let words = format!("line {} was started again; see the log", def.line(line).name);
         let (fault, occurred) = (StationFault::LineTask, FaultState::Occurred(words.into()));
         // Without a plant task there is nothing to report to, and nothing to start again for.
@@ -152,8 +153,7 @@ mod tests {
             assert_eq!(alarms, 1);
             // What had been sent of it is not known.
             assert_eq!(ended, [(WriteId(1), WriteResult::NoValidResponse(Fault::NotConnected))]);
-            let why = "internal error, see the log".to_owned();
-            let waits = |state: &LineState| matches!(state, LineState::Waiting { why: words, .. } if *words == why);
+            let waits = |state: &LineState| matches!(state, LineState::Waiting { why: LineTrouble::Internal, .. });
             assert_eq!(states[..2], [LineState::Connecting, LineState::Connected]);
             assert!(states.last().is_some_and(waits), "{states:?}");
         }

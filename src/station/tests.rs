@@ -13,7 +13,10 @@ use crate::{
     },
     bus::io::{clock::Clock, transport::Connector},
     history::{Answer, Query, io::QueryRequest},
-    plant::{command::CommandKind, def::AlarmId, fixture, record::ActionRecord, station::StationFault},
+    plant::{
+        command::CommandKind, def::AlarmId, fixture, record::ActionRecord, request_refusal::RequestRefusal,
+        station::StationFault,
+    },
 };
 
 fn options(history: &Path) -> Options {
@@ -85,7 +88,7 @@ async fn every_action_is_in_the_audit_log_and_in_the_history() {
 }
 
 /// Whether the station raises an alarm, and the answers to a login and to a first Supervisor.
-async fn without_users(history: &Path) -> (bool, Result<(), String>, Result<(), String>) {
+async fn without_users(history: &Path) -> (bool, Result<(), RequestRefusal>, Result<(), RequestRefusal>) {
     let mut options = options(history);
     let mut def = fixture::plant();
     let own = def.alarms.len();
@@ -120,8 +123,11 @@ async fn a_damaged_users_file_closes_only_the_login() {
     std::fs::write(&users, &good[..good.len() / 2]).unwrap();
     let (alarmed, login, first) = without_users(&history).await;
     assert!(alarmed, "polling and alarms go on");
-    assert!(login.is_err_and(|why| why.starts_with("login is disabled: ")), "a damaged file is not an empty one");
-    assert!(first.is_err_and(|why| why.starts_with("login is disabled: ")), "and no first Supervisor is made");
+    assert!(
+        login.is_err_and(|why| matches!(why, RequestRefusal::LoginDisabled(_))),
+        "a damaged file is not an empty one"
+    );
+    assert!(first.is_err_and(|why| matches!(why, RequestRefusal::LoginDisabled(_))), "and no first Supervisor is made");
     assert_eq!(std::fs::read(&users).unwrap(), good[..good.len() / 2], "it is left as it is");
     std::fs::remove_file(&users).unwrap();
     let (alarmed, login, first) = without_users(&history).await;

@@ -1,96 +1,7 @@
 //! What the station says in words of its own is English, because it stands in the audit log and in logs too; here a terminal
-//! reads it in its language: answers to requests, and why a line is not connected.
+//! reads it in its language: what is on record.
 
 use super::{fill, patterns, translate, translation};
-
-/// Answers to requests by their texts in `access` and `plant`, with names for what differs. A test finds each of them there.
-fn words() -> &'static [&'static str] {
-    &[
-        "wrong name or password",
-        "wrong name or password; wait {seconds} s",
-        "password not checked after wrong ones; wait {seconds} s",
-        "too many requests from this terminal, wait a moment",
-        "the station is busy with other logins, try again",
-        "the login or the password has changed in the meantime, try again",
-        "another change is being saved, try again",
-        "login is disabled: {why}",
-        "log in first",
-        "log in, or unlock this terminal, first",
-        "choose a new password first",
-        "this terminal is locked",
-        "this is for a {needed}, you are {role}",
-        "this station has no users",
-        "there is no user {name}",
-        "user {name} already exists",
-        "users already exist",
-        "at least one enabled supervisor must remain",
-        "only the user who started the station creates the first Supervisor",
-        "a name has 1 to {most} characters, this has {count}",
-        "this is the current password, choose another one",
-        "the operating system identifies you here; there is no password to change",
-        "the password is little more than the name of the user or of the plant",
-        "the password repeats itself; several different words are best",
-        "this password is too common",
-        "the password has {chars} characters, at least {least} are needed; several words are best",
-        "no user is logged in here",
-        "no users exist: the user who started the station creates the first Supervisor",
-        "this station does not require login",
-        "this terminal is already locked",
-        "this terminal is not locked",
-        "there are {most} users, no more can be",
-        "a name has letters, digits, `.`, `_` and `-`, found {letter}",
-        "a name is of one alphabet, found {letter} of {other} beside {first}",
-        "{name} is a user of the operating system who needs no password here",
-        "the operating system identifies you here; no password is needed",
-        "the password has {chars} characters, at most {most} can be",
-        "the password has a character that cannot be typed",
-        "this tag requires a password, and your account has none",
-        "the second user must be another user",
-        "{name} must choose a new password first",
-        "{name} cannot approve this: it is for a {needed}",
-        "found the path `{path}`, expected an absolute one",
-        "found the path `{path}`, expected the name of a file in the import folder",
-        "this tag requires your password again",
-        "this tag requires your own password",
-        "this tag requires a second user",
-        "the station was restarted, or its plant file reloaded, since this was shown: check and confirm again",
-    ]
-}
-
-/// Why a line is not connected, or a device answers nothing.
-fn line_words() -> &'static [&'static str] {
-    &[
-        "no setting of the device could be read",
-        "the port accepts no bytes",
-        "the port is gone",
-        "this port has no RTS and DTR: a pseudo-terminal, or a driver without them",
-        "closed by the other side",
-        "a request was incomplete, the stream is out of sync",
-        "a response was incomplete, the stream is out of sync",
-        "bytes came that are no Modbus TCP frame",
-        "no answer to {count} requests over this connection",
-        "cancelled by an urgent stop",
-        "the line was closed",
-        "the plant file was reloaded",
-        "the users file was reloaded",
-        "the line is not connected",
-        "{place}: no connection within {seconds} s",
-        "{place}: refused (is the device on, is the TCP port right?)",
-        "{place}: no route to this address",
-        "{path}: no such port ({known})",
-        "{path}: no permission{why}",
-        "{path}: in use by {holder}",
-        "{path}: not a serial port",
-        "this machine has no serial port",
-        "there are: {ports}",
-        ": it belongs to root; ask the administrator for access (a udev rule)",
-        ": it belongs to the group {name} (usermod -aG {name} USER, then log in again)",
-        "another program",
-        "this program, on another line",
-        "this process",
-        "unknown",
-    ]
-}
 
 /// What actions are called on record, and parts of their outcomes.
 fn action_words() -> &'static [&'static str] {
@@ -158,14 +69,6 @@ fn action_words() -> &'static [&'static str] {
     ]
 }
 
-/// An answer of the station in the language of this thread, as it is where it is none of the known ones.
-pub fn said(answer: &str) -> String {
-    let known = |pattern: &&'static str| Some((translation(pattern)?, values(pattern, answer)?));
-    let found = words().iter().chain(line_words()).find_map(known);
-    // A reason may stand within another.
-    found.map_or_else(|| answer.to_owned(), |(translated, values)| filled(translated, values, said))
-}
-
 /// What an action is called on record, in the language of this thread.
 pub fn recorded_action(action: &str) -> &str {
     if action_words().contains(&action) { translate(action) } else { action }
@@ -220,15 +123,14 @@ mod tests {
     use crate::text::Language;
 
     #[test]
-    fn an_answer_is_read_in_the_language_of_the_terminal() {
-        let thai = |answer: &str| Language::THAI.locale().within(|| said(answer));
-        assert_eq!(said("wrong name or password; wait 8 s"), "wrong name or password; wait 8 s");
-        assert_eq!(thai("wrong name or password; wait 8 s"), "ชื่อผู้ใช้\u{200b}หรือรหัสผ่าน\u{200b}ไม่ถูกต้อง; รอ 8 s");
-        assert!(thai("this is for a supervisor, you are viewer").contains("supervisor"));
-        assert_eq!(thai("the disk is full"), "the disk is full");
-        assert_eq!(thai("this process"), "โปรแกรมนี้");
-        let held = thai("/dev/ttyUSB0: in use by another program");
-        assert!(held.starts_with("/dev/ttyUSB0") && !held.contains("use by") && !held.contains("program"), "{held}");
+    fn a_refusal_on_record_is_read_in_the_language_of_the_terminal() {
+        let thai = |outcome: &str| Language::THAI.locale().within(|| recorded(outcome));
+        for refusal in ["wrong name or password; wait 8 s", "this is for a supervisor, you are viewer", "log in first"]
+        {
+            let shown = thai(&format!("refused: {refusal}"));
+            assert!(!shown.contains(refusal.split(' ').next().unwrap_or_default()), "{shown}");
+        }
+        assert!(thai("refused: wrong name or password; wait 8 s").ends_with("8 s"));
     }
 
     #[test]

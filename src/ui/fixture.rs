@@ -132,7 +132,7 @@ impl Fixture {
     pub fn line_down() -> Fixture {
         let mut plant = Fixture::normal();
         let retry_at = now() + SignedDuration::from_secs(4);
-        plant.line.state = LineState::Waiting { why: "No such file or directory".to_owned(), retry_at };
+        plant.line.state = LineState::Waiting { why: "No such file or directory".into(), retry_at };
         let at = now() - SignedDuration::from_secs(12);
         for (tag, sample) in plant.def.tags.iter().zip(&mut plant.samples) {
             sample.at = at;

@@ -318,7 +318,7 @@ impl Loop {
                 Ok(()) => {
                     answer.await.unwrap_or_else(|_| Err(HistoryError::Engine("the history is closed".to_owned())))
                 }
-                Err(why) => Err(HistoryError::Engine(why.to_owned())),
+                Err(why) => Err(HistoryError::Engine(why.to_string())),
             };
             // A terminal that has left needs no answer.
             let _ = outbox.send((plants, Msg::Answer(id, answer))).await;

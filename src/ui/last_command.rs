@@ -1,12 +1,13 @@
 //! The last command of this terminal, from the key to its outcome.
 
-use std::sync::Arc;
-
 use super::{Effect, Model, chrome, modal::Modal};
 use crate::t;
 use crate::{
     access::Credentials,
-    plant::command::{Command, CommandId, CommandStatus, Outcome, Refusal},
+    plant::{
+        command::{Command, CommandId, CommandStatus, Outcome, Refusal},
+        request_refusal::RequestRefusal,
+    },
 };
 
 /// An outcome that is no worry is shown for this many ticks: a minute of real time.
@@ -22,7 +23,7 @@ pub struct LastCommand {
     /// Tick at which it was given, and at which its outcome last changed.
     pub changed_at: u32,
     /// Why it did not reach the plant.
-    pub undelivered: Option<Arc<str>>,
+    pub undelivered: Option<RequestRefusal>,
 }
 
 impl LastCommand {
@@ -50,7 +51,7 @@ impl Model {
     pub(super) fn send_command(&mut self, command: Command, credentials: Option<Credentials>) -> Option<Effect> {
         self.commands_sent = self.commands_sent.wrapping_add(1);
         let id = CommandId { terminal: self.terminal, number: self.commands_sent };
-        let undelivered = self.session.gone.as_ref().map(|_| Arc::from(t!("the station is disconnected")));
+        let undelivered = self.session.gone.as_ref().map(|_| RequestRefusal::Disconnected);
         let changed_at = self.clock.phase;
         let expected_value = command.expected_value.or_else(|| self.snapshot.expected_value(&command.kind));
         let command = Command { id, run: self.snapshot.run, expected_value, ..command };
@@ -60,7 +61,7 @@ impl Model {
     }
 
     /// Notes that the last command did not reach the plant.
-    pub(super) fn note_undelivered(&mut self, id: CommandId, why: Arc<str>) {
+    pub(super) fn note_undelivered(&mut self, id: CommandId, why: RequestRefusal) {
         if let Some(last) = self.last_command.as_mut().filter(|last| last.command.id == id) {
             last.undelivered = Some(why);
         }
@@ -83,7 +84,7 @@ impl Model {
         let Some(last) = &self.last_command else { return };
         let refused = match (&last.undelivered, last.status.as_ref().map(|status| &status.outcome)) {
             (Some(why), _) => Some(t!("not sent: {why}", why)),
-            (None, Some(Outcome::Refused(Refusal::NotReauthenticated(why)))) => Some(why.clone()),
+            (None, Some(Outcome::Refused(Refusal::NotReauthenticated(why)))) => Some(why.to_string()),
             (None, Some(_)) => None,
             (None, None) => return,
         };

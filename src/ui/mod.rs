@@ -274,7 +274,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
         }
         Msg::Loaded(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_loaded(cx, result)),
         Msg::Undelivered(id, why) => {
-            model.note_undelivered(id, why.into());
+            model.note_undelivered(id, why);
             Vec::new()
         }
         Msg::Tick { silent } => on_tick(model, silent),

@@ -18,6 +18,7 @@ use crate::{
     plant::{
         command::{Command, CommandId, CommandKind},
         def::{DeviceId, ProcedureId, TagId},
+        request_refusal::RequestRefusal,
         snapshot::Snapshot,
     },
     text::Locale,
@@ -41,7 +42,7 @@ pub enum Msg {
     /// The session has changed.
     SessionStatus(Arc<SessionStatus>),
     /// The reply to a request, or why it failed.
-    RequestDone(QueryId, Result<Durability, String>),
+    RequestDone(QueryId, Result<Durability, RequestRefusal>),
     /// The extension has a new state.
     Extension(Arc<dyn Extension>),
     /// The history answered.
@@ -53,7 +54,7 @@ pub enum Msg {
     /// The text of a file that this tab wanted, or why not.
     Loaded(Tab, Result<Vec<u8>, String>),
     /// The station did not take this command: its queue is full, or it has gone.
-    Undelivered(CommandId, &'static str),
+    Undelivered(CommandId, RequestRefusal),
     /// The preferences were kept, and what the file holds now; or why not.
     Preferences(Result<PreferencesFile, String>),
     /// A frame was drawn: what it showed may be meant by the next key.

@@ -26,7 +26,7 @@ use crate::{
         tag::{Access, TagDef},
     },
     t,
-    text::{said, translate},
+    text::translate,
 };
 
 /// What a line is about, in the order in which the first lines stand.
@@ -166,7 +166,7 @@ fn line_label(line: &LineDef, state: &LineState) -> String {
         LineState::Connected => t!("connected").to_owned(),
         LineState::Disconnected => t!("disconnected by an operator").to_owned(),
         LineState::Testing => t!("in use by a test").to_owned(),
-        LineState::Waiting { why, .. } => format!("{}, {}", t!("not connected"), said(why)),
+        LineState::Waiting { why, .. } => format!("{}, {}", t!("not connected"), why),
     }
 }
 

@@ -17,6 +17,7 @@ pub(crate) use self::cells::{GROUND, INK, drawing, rgb};
 use super::{Effect, Model, QueryId, UiAction};
 use crate::{
     access::{SessionRequest, audit_log::sha256},
+    plant::request_refusal::RequestRefusal,
     t,
 };
 
@@ -54,7 +55,7 @@ fn next(model: &mut Model) -> Vec<UiAction> {
 }
 
 /// The record of a file was made, or refused.
-pub(super) fn on_request_done(model: &mut Model, number: u32, answer: Result<(), String>) -> Vec<UiAction> {
+pub(super) fn on_request_done(model: &mut Model, number: u32, answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
     let dump = &mut model.screen_dump;
     if number != dump.number || dump.files.is_empty() {
         return Vec::new();

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     access::{Durability, SessionRequest, SessionStatus},
-    plant::snapshot::Snapshot,
+    plant::{request_refusal::RequestRefusal, snapshot::Snapshot},
 };
 
 /// Ticks between two words that keys are pressed: 30 s of real time.
@@ -214,7 +214,7 @@ pub(super) fn hold_back(model: &mut Model, actions: Vec<UiAction>) -> Vec<UiActi
 
 /// A file that waits to be recorded is not.
 fn give_up_export(model: &mut Model, tab: Tab) {
-    let why = t!("the terminal was locked, or its user changed").to_owned();
+    let why = RequestRefusal::Failed(t!("the terminal was locked, or its user changed").to_owned());
     with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_request_done(cx, Err(why)));
 }
 
@@ -239,8 +239,11 @@ pub(super) fn active(model: &mut Model) -> Option<Effect> {
 
 /// The station's answer to a request: for the window that waits for it, also one that a lock has hidden, else for the tab,
 /// which waits for its last request only.
-pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Durability, String>) -> Vec<UiAction> {
-    let answer = answer.map_err(|why| crate::text::said(&why));
+pub(super) fn on_request_done(
+    model: &mut Model,
+    id: QueryId,
+    answer: Result<Durability, RequestRefusal>,
+) -> Vec<UiAction> {
     if answer == Ok(Durability::NotRecorded) {
         model.note = Some(t!("Done, but NOT RECORDED: the station cannot write to its disk").into());
     }
@@ -267,7 +270,7 @@ pub(super) fn on_request_done(model: &mut Model, id: QueryId, answer: Result<Dur
     Vec::new()
 }
 
-fn answered(model: &Model, mut form: Box<UserForm>, answer: Result<(), String>) -> Option<Modal> {
+fn answered(model: &Model, mut form: Box<UserForm>, answer: Result<(), RequestRefusal>) -> Option<Modal> {
     let done = form.answered(&model.cx(), answer);
     if done { form.below() } else { Some(Modal::UserForm(form)) }
 }

@@ -28,6 +28,7 @@ use sightglass::{
         PlantDef, Snapshot,
         command::{Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome},
         def::TagId,
+        request_refusal::RequestRefusal,
         sample::{Cause, Sample},
     },
     profile::{self, Search},
@@ -159,7 +160,7 @@ fn answer(request: Request, commands: &watch::Sender<Arc<Snapshot>>) {
         Request::SessionRequest(SessionRequest::Stop, reply) => {
             drop(reply.send(Ok(Completion::new(Durability::Recorded, None))))
         }
-        Request::SessionRequest(_, reply) => drop(reply.send(Err("not yet".into()))),
+        Request::SessionRequest(_, reply) => drop(reply.send(Err(RequestRefusal::BeingSaved))),
         Request::RecordRefusal { .. } => {}
     }
 }
@@ -233,7 +234,7 @@ async fn a_terminal_sees_the_plant_and_sends_commands() {
     until(&mut session, "the command has an outcome", |snapshot| !snapshot.commands.is_empty()).await;
     assert_eq!(of(&session, 7), Some(Outcome::Verified));
     assert_eq!(session.request(SessionRequest::Stop).await, Ok(Durability::Recorded));
-    assert_eq!(session.request(SessionRequest::Logout).await, Err("not yet".to_owned()));
+    assert_eq!(session.request(SessionRequest::Logout).await, Err(RequestRefusal::BeingSaved));
     let (reply, answer) = oneshot::channel();
     let at = session.snapshots.borrow().at;
     session.ask(QueryRequest { query: Query::Journal { from: at, to: at, limit: 1 }, reply }).unwrap();
@@ -289,8 +290,8 @@ async fn a_terminal_shows_a_lost_station_at_once_and_reconnects() {
     let mut session = stand.session().await;
     let folder = stand.end().await;
     until_status(&mut session, "gone", |status| status.gone.is_some()).await;
-    assert_eq!(session.send_command(1, CommandKind::Alarm(AlarmCommand::Silence)), Err("station has gone"));
-    assert_eq!(session.request(SessionRequest::Stop).await, Err("station has gone".to_owned()));
+    assert_eq!(session.send_command(1, CommandKind::Alarm(AlarmCommand::Silence)), Err(RequestRefusal::StationGone));
+    assert_eq!(session.request(SessionRequest::Stop).await, Err(RequestRefusal::StationGone));
     assert_eq!(session.snapshots.borrow().samples[0].value, Some(1.0), "the last snapshot stays");
 
     let mut stand = Stand::start_in(folder);

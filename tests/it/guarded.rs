@@ -20,6 +20,7 @@ use sightglass::{
         PlantDef, Snapshot,
         command::{Command, CommandId, CommandKind, CommandStatus},
         def::{TagId, Transport},
+        request_refusal::RequestRefusal,
         role::Role,
         snapshot::DeviceState,
     },
@@ -211,7 +212,7 @@ fn everybody() -> Users {
     Users::new(rows.into()).unwrap()
 }
 
-pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), String> {
+pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), RequestRefusal> {
     session.request(SessionRequest::Login { user: user.into(), password: password.into() }).await.map(drop)
 }
 

@@ -101,7 +101,7 @@ async fn the_station_imports_nothing_but_what_lies_in_its_folder() {
         ("pipe.csv".into(), "not a regular file"),
         ("none.csv".into(), "No such file"),
     ] {
-        let why = import(file.clone()).await.unwrap_err();
+        let why = import(file.clone()).await.unwrap_err().to_string();
         assert!(why.contains(expect) && !why.contains(secret), "{file}: {why}");
     }
     assert_eq!(import("day.csv".into()).await, Ok(()));

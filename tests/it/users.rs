@@ -10,6 +10,8 @@ use sightglass::{
         PlantDef, Snapshot,
         command::{Command, CommandKind, Outcome, Refusal},
         def::Reauthentication,
+        request_refusal::RequestRefusal,
+        role::Role,
         sample::Cause,
     },
     station::Session,
@@ -21,24 +23,26 @@ use crate::guarded::{Guarded, PASSWORD, login, request, until};
 const TRIES: u16 = 3;
 /// For how long, plant time: longer than any machine needs for the passwords that must be wrong within it.
 const LOCK_OUT: Duration = Duration::from_secs(3_600);
-/// The reply to a wrong name or password.
-const WRONG: &str = "wrong name or password";
-/// The reply to a password that was not even checked.
-const NOT_CHECKED: &str = "password not checked after wrong ones";
 
 fn strict(def: &mut PlantDef) {
     (def.access.login_attempts_max, def.access.lockout) = (TRIES, LOCK_OUT);
 }
 
-fn wait(seconds: u64) -> String {
-    format!("{WRONG}; wait {seconds} s")
+/// The reply to a wrong name or password.
+fn wait(seconds: u64) -> RequestRefusal {
+    RequestRefusal::WrongPassword { wait: seconds }
+}
+
+/// Was the password not even checked?
+fn is_not_checked(why: &RequestRefusal) -> bool {
+    matches!(why, RequestRefusal::NotChecked { .. })
 }
 
 /// Tries until he is in, and gives the plant time of it.
 async fn login_at_last(guarded: &Guarded, session: &Session, user: &str) -> Timestamp {
     let written = guarded.entries().len();
     while let Err(why) = login(session, user, PASSWORD).await {
-        assert!(why.starts_with(NOT_CHECKED), "{why}");
+        assert!(is_not_checked(&why), "{why}");
         guarded.pass(Duration::from_secs(2)).await;
     }
     guarded.written(written, "the login", |entry| &*entry.action == "login" && &*entry.target == user).await.utc
@@ -63,7 +67,7 @@ async fn who_is_locked_out_still_sees_alarms_and_others_enter() {
     assert_eq!((&*locked.target, &*locked.outcome), ("tom", "done: for 3600 s, system user eve"));
     // Nothing is even looked at: not the right password either.
     let why = login(&script, "tom", PASSWORD).await.unwrap_err();
-    assert!(why.starts_with(NOT_CHECKED), "{why}");
+    assert!(is_not_checked(&why), "{why}");
 
     // For another user of the system nothing is shut, and for this one no other name is.
     let far = guarded.far("panel");
@@ -78,7 +82,7 @@ async fn who_is_locked_out_still_sees_alarms_and_others_enter() {
     let is_alarmed = |snapshot: &Arc<Snapshot>| snapshot.alarms.iter().any(|alarm| alarm.returned_at.is_none());
     let alarmed = until(&mut looks.snapshots, "an alarm", is_alarmed).await;
     let why = login(&script, "tom", PASSWORD).await.unwrap_err();
-    assert!(why.starts_with(NOT_CHECKED), "it is still locked out when the alarm is there: {why}");
+    assert!(is_not_checked(&why), "it is still locked out when the alarm is there: {why}");
     assert!(alarmed.samples.iter().all(|sample| sample.quality.cause() == Some(Cause::NotAuthorised)));
     assert_eq!(failed_logins(&guarded), ["tom refused: wrong password"; 3], "what was not looked at is no try");
     guarded.end().await;
@@ -111,9 +115,9 @@ async fn a_system_user_who_tries_every_name_is_locked_out() {
     let script = guarded.far("eve");
     for number in 0..TRIES * 8 {
         let reply = login(&script, &format!("name{number}"), "wrong").await.unwrap_err();
-        assert!(reply.starts_with(WRONG), "{reply}");
+        assert!(matches!(reply, RequestRefusal::WrongPassword { .. }), "{reply}");
     }
-    assert!(login(&script, "tina", PASSWORD).await.unwrap_err().starts_with(NOT_CHECKED));
+    assert!(is_not_checked(&login(&script, "tina", PASSWORD).await.unwrap_err()));
     for user in ["vera", "tom", "sue"] {
         let elsewhere = guarded.person(user).await;
         elsewhere.request(SessionRequest::Logout).await.unwrap();
@@ -168,7 +172,7 @@ async fn an_idle_terminal_is_locked_and_still_shows_alarms() {
     let alarmed = until(&mut idle.snapshots, "an alarm", |snapshot| !snapshot.alarms.is_empty()).await;
     let acknowledge = request(&idle, 1, alarmed.alarms[0].acknowledge());
     let status = guarded.send_command(&idle, acknowledge.clone()).await;
-    assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted("this terminal is locked".into())));
+    assert_eq!(status.outcome, Outcome::Refused(Refusal::NotPermitted(RequestRefusal::Locked)));
     assert_eq!(idle.request(SessionRequest::Unlock("wrong".into())).await, Err(wait(1)));
     while idle.request(SessionRequest::Unlock(PASSWORD.into())).await.is_err() {
         guarded.pass(Duration::from_secs(1)).await;
@@ -196,10 +200,10 @@ async fn a_tag_for_two_users_is_written_after_the_second_approves() {
     let credentials =
         |(user, password): (&str, &str)| Credentials { user: Some(user.into()), password: password.into() };
     let refused = [
-        (None, "this tag requires a second user".to_owned()),
-        (Some(("TOM", PASSWORD)), "the second user must be another user".to_owned()),
-        (Some(("vera", PASSWORD)), "vera cannot approve this: it is for a technician".to_owned()),
-        (Some(("mia", PASSWORD)), "mia must choose a new password first".to_owned()),
+        (None, RequestRefusal::SecondUser),
+        (Some(("TOM", PASSWORD)), RequestRefusal::SecondUserIsFirst),
+        (Some(("vera", PASSWORD)), RequestRefusal::ApproverRole { name: "vera".into(), needed: Role::Technician }),
+        (Some(("mia", PASSWORD)), RequestRefusal::ApproverMustChange("mia".into())),
         (Some(("sue", "wrong")), wait(1)),
         (Some(("nobody-here", PASSWORD)), wait(1)),
     ];

@@ -12,6 +12,7 @@ use sightglass::{
         command::{Command, CommandId, CommandKind},
         def::{ProcedureId, TagId},
         diagnostics::Diagnostic,
+        request_refusal::RequestRefusal,
         role::Role,
     },
     station::{Request, Session},
@@ -170,7 +171,7 @@ impl Supervisor {
         let _ = request_of(&self.session, SessionRequest::DeleteUser { user }).await;
     }
 
-    async fn log_in(&self, user: &str, password: &str) -> Result<Completion, String> {
+    async fn log_in(&self, user: &str, password: &str) -> Result<Completion, RequestRefusal> {
         let _ = request_of(&self.terminal, SessionRequest::Logout).await;
         let request = SessionRequest::Login { user: user.to_owned(), password: Secret(password.to_owned()) };
         request_of(&self.terminal, request).await
@@ -182,8 +183,8 @@ impl Supervisor {
     }
 }
 
-async fn request_of(session: &Session, request: SessionRequest) -> Result<Completion, String> {
+async fn request_of(session: &Session, request: SessionRequest) -> Result<Completion, RequestRefusal> {
     let (reply, answer) = oneshot::channel();
     session.send(Request::SessionRequest(request, reply))?;
-    answer.await.map_err(|_| "the station has ended".to_owned())?
+    answer.await.map_err(|_| RequestRefusal::StationEnded)?
 }

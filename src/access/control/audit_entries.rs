@@ -12,6 +12,7 @@ use crate::{
     access::{SessionRequest, user},
     plant::{
         record::{ActionRecord, BACKUP, IMPORT},
+        request_refusal::RequestRefusal,
         time::elapsed,
         visible::is_control_or_bidi,
     },
@@ -58,7 +59,7 @@ impl AccessControl {
         requester: Requester,
         action: &str,
         target: &str,
-        why: String,
+        why: RequestRefusal,
         at: Timestamp,
     ) -> Vec<Effect> {
         let entry = self.refused(requester.terminal, action, target, &why, at);
@@ -71,7 +72,7 @@ impl AccessControl {
         terminal: u32,
         action: &str,
         target: &str,
-        why: &str,
+        why: &RequestRefusal,
         at: Timestamp,
     ) -> Option<Effect> {
         let session = self.sessions.get(&terminal)?;

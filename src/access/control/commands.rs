@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Effect, TOO_MANY,
+    AccessControl, Effect,
     audit_entries::{actor_name, clean},
     right,
 };
@@ -12,12 +12,9 @@ use crate::{
     plant::{
         command::{self, Command, CommandId, CommandKind, CommandStatus, Refusal},
         interlock,
+        request_refusal::RequestRefusal,
     },
 };
-
-/// Said of a command that was made before the station was started again, with the same plant file or with another.
-const OTHER_RUN: &str =
-    "the station was restarted, or its plant file reloaded, since this was shown: check and confirm again";
 
 impl AccessControl {
     /// Checks a command of a terminal and passes it on to the plant, permitted or refused.
@@ -35,25 +32,25 @@ impl AccessControl {
         let stops = matches!(command.kind, CommandKind::AbortProcedure(_))
             || command.kind.written().is_some_and(|(tag, value)| interlock::is_stop(&self.def, tag, value, None));
         if !self.within_rate(terminal, at) && !stops {
-            return self.undelivered(command.id, TOO_MANY);
+            return self.undelivered(command.id, RequestRefusal::TooManyRequests);
         }
         if command.run != self.run {
             // On record it would name what the plant file of this run has in its place.
-            return self.undelivered(command.id, OTHER_RUN);
+            return self.undelivered(command.id, RequestRefusal::OtherRun);
         }
         let mut effects = self.follow_delegates();
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let number = command.id.number;
         if session.last_command.is_some_and(|last| number <= last) {
             // Its outcome would be taken for that of the command that had the number first.
-            return self.undelivered(command.id, "this command repeats an earlier number: send it again");
+            return self.undelivered(command.id, RequestRefusal::RepeatedNumber);
         }
         session.last_command = Some(number);
         if !session.locked {
             session.active = at;
         }
         let passed = match self.may(terminal, Some(right::needs(&self.def, &command.kind))) {
-            Err(why) => self.refuse_command(terminal, command, Refusal::NotPermitted(why), at),
+            Err(why) => self.refuse_command(terminal, command, why, Refusal::NotPermitted, at),
             Ok(_) => self.reauthenticate(terminal, command, credentials, at),
         };
         effects.extend(passed);
@@ -81,7 +78,7 @@ impl AccessControl {
     }
 
     /// A command did not reach the plant: the session status reports it, as no snapshot will.
-    pub fn undelivered(&mut self, id: CommandId, why: &str) -> Vec<Effect> {
+    pub fn undelivered(&mut self, id: CommandId, why: RequestRefusal) -> Vec<Effect> {
         let Some(session) = self.sessions.get_mut(&id.terminal) else { return Vec::new() };
         session.undelivered(id, why);
         vec![Effect::SessionStatus(id.terminal)]
@@ -93,14 +90,15 @@ impl AccessControl {
         &mut self,
         terminal: u32,
         command: Command,
-        why: Refusal,
+        why: RequestRefusal,
+        as_outcome: fn(RequestRefusal) -> Refusal,
         at: Timestamp,
     ) -> Vec<Effect> {
         let Some(session) = self.sessions.get(&terminal) else { return Vec::new() };
         let (origin, in_process) = (session.origin.clone(), session.peer.in_process);
         if !in_process && !self.may_record(&origin, at) {
-            return self.undelivered(command.id, &why.to_string());
+            return self.undelivered(command.id, why);
         }
-        self.forward_to_plant(terminal, command, None, command::Outcome::Refused(why), at)
+        self.forward_to_plant(terminal, command, None, command::Outcome::Refused(as_outcome(why)), at)
     }
 }

@@ -8,7 +8,10 @@ use super::{
     AccessControl, Effect, Requester,
     audit_entries::{clean, record},
 };
-use crate::plant::record::{ActionRecord, BACKUP, IMPORT};
+use crate::plant::{
+    record::{ActionRecord, BACKUP, IMPORT},
+    request_refusal::RequestRefusal,
+};
 
 impl AccessControl {
     pub(super) fn begin_backup(&mut self, requester: Requester, folder: String, at: Timestamp) -> Vec<Effect> {
@@ -23,7 +26,7 @@ impl AccessControl {
         &mut self,
         requester: Requester,
         action: &str,
-        checked: Result<(), String>,
+        checked: Result<(), RequestRefusal>,
         path: String,
         effect: fn(u64, String) -> Effect,
         at: Timestamp,
@@ -45,23 +48,23 @@ impl AccessControl {
             Err(why) => format!("failed: {why}"),
         };
         let entry = ActionRecord { at, outcome: clean(&outcome).into(), ..entry };
-        vec![Effect::Record(entry), Effect::Reply(ticket, done.map(drop))]
+        vec![Effect::Record(entry), Effect::Reply(ticket, done.map(drop).map_err(RequestRefusal::Failed))]
     }
 }
 
 /// The station stands in a folder of its own.
-fn absolute(path: &str) -> Result<(), String> {
+fn absolute(path: &str) -> Result<(), RequestRefusal> {
     match Path::new(path).is_absolute() {
         true => Ok(()),
-        false => Err(format!("found the path `{path}`, expected an absolute one")),
+        false => Err(RequestRefusal::PathNotAbsolute(path.to_owned())),
     }
 }
 
 /// A file of the import folder: the station reads no other of its user's files for whoever asks.
-fn plain_name(path: &str) -> Result<(), String> {
+fn plain_name(path: &str) -> Result<(), RequestRefusal> {
     let mut parts = Path::new(path).components();
     match (parts.next(), parts.next()) {
         (Some(Component::Normal(name)), None) if name == path => Ok(()),
-        _ => Err(format!("found the path `{path}`, expected the name of a file in the import folder")),
+        _ => Err(RequestRefusal::PathNotName(path.to_owned())),
     }
 }

@@ -6,18 +6,14 @@ use jiff::Timestamp;
 
 use super::{AccessControl, Effect, Requester, audit_entries::audit};
 use crate::access::{Secret, lockout::Key, password, user, user::UserChange};
-use crate::plant::command::Command;
+use crate::plant::{command::Command, request_refusal::RequestRefusal};
 
-/// Passwords of all users of the operating system that may be checked or wait; more are refused as [`BUSY`].
+/// Passwords of all users of the operating system that may be checked or wait; more are refused.
 pub(super) const JOBS_MAX: usize = 64;
 /// This many of one user: the others still have room.
 pub(super) const JOBS_OF_USER_MAX: usize = 24;
 /// This many places are kept for root and the station's own user.
 const JOBS_KEPT: usize = 8;
-/// The reply when there are more.
-pub(super) const BUSY: &str = "the station is busy with other logins, try again";
-/// The reply when a password was right, but the session or the stored hash has changed since.
-const CHANGED: &str = "the login or the password has changed in the meantime, try again";
 
 /// Number of a password job.
 pub type JobId = u64;
@@ -93,12 +89,12 @@ pub(super) struct JobError {
     /// For the audit log.
     pub why: &'static str,
     /// For the operator: the same for every reason, and how long to wait.
-    pub message: String,
+    pub message: RequestRefusal,
 }
 
 impl AccessControl {
     /// Has the password for this name checked. The time that takes must not tell whether the name exists.
-    /// `Err` says in words for the operator why it is not checked.
+    /// `Err` says why it is not checked.
     pub(super) fn verify_password(
         &mut self,
         terminal: u32,
@@ -106,7 +102,7 @@ impl AccessControl {
         password: Secret,
         what: JobPurpose,
         at: Timestamp,
-    ) -> Result<Vec<Effect>, String> {
+    ) -> Result<Vec<Effect>, RequestRefusal> {
         let session = self.session(terminal)?;
         let inside = || format!("{} at terminal {terminal}", session.origin).into();
         let key = Key {
@@ -118,7 +114,7 @@ impl AccessControl {
         if let Some(wait) = self.attempts.wait(&job.key, &self.def.access, at)
             && !job.key.never_locked
         {
-            return Err(not_checked(wait));
+            return Err(RequestRefusal::NotChecked { wait: seconds(wait) });
         }
         self.waiting.push_back((job, password));
         Ok(self.start_waiting_jobs(at))
@@ -130,7 +126,7 @@ impl AccessControl {
         requester: Requester,
         password: Secret,
         change: UserChange,
-    ) -> Result<Vec<Effect>, String> {
+    ) -> Result<Vec<Effect>, RequestRefusal> {
         let session = self.session(requester.terminal)?;
         let origin = format!("hash for terminal {}", requester.terminal).into();
         let key = Key { origin, account: None, never_locked: self.is_station_owner(&session.peer) };
@@ -139,12 +135,12 @@ impl AccessControl {
     }
 
     /// `Err` where too many are under way.
-    fn pending_job(&self, terminal: u32, key: Key, what: JobPurpose) -> Result<PendingJob, String> {
+    fn pending_job(&self, terminal: u32, key: Key, what: JobPurpose) -> Result<PendingJob, RequestRefusal> {
         let session = self.session(terminal)?;
         let users = || self.jobs.values().chain(self.waiting.iter().map(|(job, _)| job)).map(|job| &job.user);
         let most = if key.never_locked { JOBS_MAX } else { JOBS_MAX - JOBS_KEPT };
         if most <= users().count() || JOBS_OF_USER_MAX <= users().filter(|user| **user == session.origin).count() {
-            return Err(BUSY.to_owned());
+            return Err(RequestRefusal::BusyWithLogins);
         }
         Ok(PendingJob {
             terminal,
@@ -168,7 +164,12 @@ impl AccessControl {
                     effects.extend(self.start_job(job, PasswordJob::Verify { password, hash }));
                 }
                 Some(wait) if !job.key.never_locked => {
-                    effects.extend(self.refuse_job(job.terminal, job.what, not_checked(wait), at));
+                    effects.extend(self.refuse_job(
+                        job.terminal,
+                        job.what,
+                        RequestRefusal::NotChecked { wait: seconds(wait) },
+                        at,
+                    ));
                 }
                 None | Some(_) => self.waiting.push_back((job, password)),
             }
@@ -198,18 +199,18 @@ impl AccessControl {
         let Some(job) = self.jobs.remove(&job) else { return Vec::new() };
         let mut effects = match outcome {
             JobOutcome::Verified(right) => self.on_verified(job, right, at),
-            JobOutcome::Hashed(_) if self.is_stale(&job) => self.on_hashed(job, Err(CHANGED.to_owned()), at),
-            JobOutcome::Hashed(hash) => self.on_hashed(job, hash, at),
-            JobOutcome::Failed(why) => self.refuse_job(job.terminal, job.what, why, at),
+            JobOutcome::Hashed(_) if self.is_stale(&job) => self.on_hashed(job, Err(RequestRefusal::LoginChanged), at),
+            JobOutcome::Hashed(hash) => self.on_hashed(job, hash.map_err(RequestRefusal::Failed), at),
+            JobOutcome::Failed(why) => self.refuse_job(job.terminal, job.what, RequestRefusal::Failed(why), at),
         };
         effects.extend(self.start_waiting_jobs(at));
         effects
     }
 
-    fn on_hashed(&mut self, job: PendingJob, hash: Result<String, String>, at: Timestamp) -> Vec<Effect> {
+    fn on_hashed(&mut self, job: PendingJob, hash: Result<String, RequestRefusal>, at: Timestamp) -> Vec<Effect> {
         match job.what {
             JobPurpose::Hash { requester, change } => self.set_password(requester, change, hash, at),
-            other => self.refuse_job(job.terminal, other, "internal error".to_owned(), at),
+            other => self.refuse_job(job.terminal, other, RequestRefusal::Failed("internal error".to_owned()), at),
         }
     }
 
@@ -219,7 +220,7 @@ impl AccessControl {
         let mut effects = Vec::new();
         let wrong = match self.failure_reason(&what, right) {
             // Right when it was checked: it does not count as a wrong attempt.
-            None if stale => Some(JobError { why: "changed meanwhile", message: CHANGED.to_owned() }),
+            None if stale => Some(JobError { why: "changed meanwhile", message: RequestRefusal::LoginChanged }),
             None => {
                 self.attempts.on_success(&key);
                 None
@@ -269,7 +270,7 @@ impl AccessControl {
         effects
     }
 
-    fn refuse_job(&mut self, terminal: u32, what: JobPurpose, why: String, at: Timestamp) -> Vec<Effect> {
+    fn refuse_job(&mut self, terminal: u32, what: JobPurpose, why: RequestRefusal, at: Timestamp) -> Vec<Effect> {
         match what {
             JobPurpose::Login { requester, .. }
             | JobPurpose::Unlock { requester, .. }
@@ -280,16 +281,15 @@ impl AccessControl {
     }
 
     /// The reply to a wrong attempt: the same whatever was wrong, and how long the next one must wait.
-    fn failure_reply(&self, key: &Key, at: Timestamp) -> String {
-        match self.attempts.wait(key, &self.def.access, at) {
-            Some(wait) => format!("{WRONG}; wait {} s", wait.as_secs_f64().ceil()),
-            None => WRONG.to_owned(),
-        }
+    fn failure_reply(&self, key: &Key, at: Timestamp) -> RequestRefusal {
+        let wait = self.attempts.wait(key, &self.def.access, at).map_or(0, seconds);
+        RequestRefusal::WrongPassword { wait }
     }
 }
 
-fn not_checked(wait: Duration) -> String {
-    format!("password not checked after wrong ones; wait {} s", wait.as_secs_f64().ceil())
+/// Whole seconds after which a wait is certainly over.
+fn seconds(wait: Duration) -> u64 {
+    wait.as_secs() + u64::from(wait.subsec_nanos() > 0)
 }
 
 impl JobPurpose {
@@ -313,6 +313,3 @@ impl JobPurpose {
         }
     }
 }
-
-/// The one message for a wrong name, a wrong password and a disabled user.
-pub(super) const WRONG: &str = "wrong name or password";

@@ -5,25 +5,22 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    AccessControl, Effect, LOG_IN_FIRST, Requester, SessionState,
+    AccessControl, Effect, Requester, SessionState,
     audit_entries::audit,
     jobs::{JobError, JobPurpose},
     session_status::LOCK_NEAR,
 };
 use crate::access::{LoggedInUser, Secret, user};
-use crate::plant::time::elapsed;
-
-const NO_LOGIN: &str = "this station does not require login";
-const NO_PASSWORD: &str = "the operating system identifies you here; no password is needed";
+use crate::plant::{request_refusal::RequestRefusal, time::elapsed};
 
 impl AccessControl {
     pub(super) fn login(&mut self, requester: Requester, user: &str, password: Secret, at: Timestamp) -> Vec<Effect> {
-        let Some(users) = &self.users else { return requester.refused(NO_LOGIN) };
-        if let Some(why) = &self.closed {
-            return requester.refused(&**why);
+        let Some(users) = &self.users else { return requester.refused(RequestRefusal::NoLogin) };
+        if let Some(why) = self.is_closed() {
+            return requester.refused(why);
         }
         if users.is_empty() {
-            return requester.refused("no users exist: the user who started the station creates the first Supervisor");
+            return requester.refused(RequestRefusal::NoUsersYet);
         }
         let (name, user) = (user.to_owned(), users.get(user).map(|user| user.name.clone()));
         let checked =
@@ -87,7 +84,7 @@ impl AccessControl {
     pub(super) fn logout(&mut self, requester: Requester, at: Timestamp) -> Vec<Effect> {
         let mut effects = self.log_out(requester.terminal, "done", at);
         if effects.is_empty() {
-            return requester.refused("no user is logged in here");
+            return requester.refused(RequestRefusal::NotLoggedIn);
         }
         effects.push(requester.done());
         self.publish_status(requester.terminal, &mut effects);
@@ -106,7 +103,9 @@ impl AccessControl {
 
     pub(super) fn lock(&mut self, requester: Requester, at: Timestamp) -> Vec<Effect> {
         match self.sessions.get_mut(&requester.terminal) {
-            Some(session) if session.acting().is_some() && session.trusted => requester.refused(NO_PASSWORD),
+            Some(session) if session.acting().is_some() && session.trusted => {
+                requester.refused(RequestRefusal::NoPasswordNeeded)
+            }
             Some(session) if session.acting().is_some() => {
                 session.locked = true;
                 let target = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
@@ -114,15 +113,15 @@ impl AccessControl {
                 self.publish_status(requester.terminal, &mut effects);
                 effects
             }
-            Some(session) if session.locked => requester.refused("this terminal is already locked"),
-            Some(_) | None => requester.refused(LOG_IN_FIRST),
+            Some(session) if session.locked => requester.refused(RequestRefusal::AlreadyLocked),
+            Some(_) | None => requester.refused(RequestRefusal::LogInFirst),
         }
     }
 
     pub(super) fn unlock(&mut self, requester: Requester, password: Secret, at: Timestamp) -> Vec<Effect> {
         let session = self.sessions.get(&requester.terminal).filter(|session| session.locked);
         let Some(user) = session.and_then(|session| session.who.as_ref()).map(|who| who.user.clone()) else {
-            return requester.refused("this terminal is not locked");
+            return requester.refused(RequestRefusal::NotLocked);
         };
         let checked = self.verify_password(
             requester.terminal,

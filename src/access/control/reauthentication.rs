@@ -18,6 +18,7 @@ use crate::{
         def::{Reauthentication, TagId},
         exact::Exact,
         interlock,
+        request_refusal::RequestRefusal,
     },
 };
 
@@ -36,24 +37,23 @@ impl AccessControl {
         };
         let Some(by) = session.who.as_ref().map(|who| who.user.clone()) else { return Vec::new() };
         let own = |name: &str| user::key(name) == user::key(&by);
-        let why = match (needed, &credentials) {
-            (Reauthentication::Password, None) => Some("this tag requires your password again"),
-            (Reauthentication::Password, Some(Credentials { user: Some(user), .. })) if !own(user) => {
-                Some("this tag requires your own password")
+        let given = match (needed, credentials) {
+            (Reauthentication::Password, None) => Err(RequestRefusal::PasswordAgain),
+            (Reauthentication::Password, Some(Credentials { user: Some(user), .. })) if !own(&user) => {
+                Err(RequestRefusal::OwnPassword)
             }
-            (Reauthentication::Password, Some(_)) if session.trusted => {
-                Some("this tag requires a password, and your account has none")
-            }
+            (Reauthentication::Password, Some(_)) if session.trusted => Err(RequestRefusal::AccountWithoutPassword),
             (Reauthentication::SecondUser, None | Some(Credentials { user: None, .. })) => {
-                Some("this tag requires a second user")
+                Err(RequestRefusal::SecondUser)
             }
-            (Reauthentication::SecondUser, Some(Credentials { user: Some(user), .. })) if own(user) => {
-                Some("the second user must be another user")
+            (Reauthentication::SecondUser, Some(Credentials { user: Some(user), .. })) if own(&user) => {
+                Err(RequestRefusal::SecondUserIsFirst)
             }
-            (Reauthentication::Password | Reauthentication::SecondUser, Some(_)) => None,
+            (Reauthentication::Password | Reauthentication::SecondUser, Some(given)) => Ok(given),
         };
-        let (None, Some(Credentials { user, password })) = (why, credentials) else {
-            return self.refuse_reauthentication(terminal, command, why.unwrap_or_default().to_owned(), at);
+        let Credentials { user, password } = match given {
+            Ok(given) => given,
+            Err(why) => return self.refuse_reauthentication(terminal, command, why, at),
         };
         let name = user.as_deref().unwrap_or(&by).to_owned();
         let approver = self.users.as_ref().and_then(|users| users.get(&name)).map(|user| user.name.clone());
@@ -86,17 +86,17 @@ impl AccessControl {
         let needed = right::needs(&self.def, &command.kind);
         // Meanwhile the terminal may have been locked.
         if let Err(why) = self.may(terminal, Some(needed)) {
-            return self.refuse_command(terminal, command, Refusal::NotPermitted(why), at);
+            return self.refuse_command(terminal, command, why, Refusal::NotPermitted, at);
         }
         let other = approver.as_ref().filter(|approver| **approver != by);
         let other = other.and_then(|approver| self.users.as_ref()?.get(approver));
         match other {
             Some(other) if other.must_change => {
-                let why = format!("{} must choose a new password first", other.name);
+                let why = RequestRefusal::ApproverMustChange(other.name.to_string());
                 self.refuse_reauthentication(terminal, command, why, at)
             }
             Some(other) if other.role < needed => {
-                let why = format!("{} cannot approve this: it is for a {}", other.name, needed.word());
+                let why = RequestRefusal::ApproverRole { name: other.name.to_string(), needed };
                 self.refuse_reauthentication(terminal, command, why, at)
             }
             Some(_) | None => self.forward_to_plant(terminal, command, approver.as_deref(), Outcome::Pending, at),
@@ -107,10 +107,10 @@ impl AccessControl {
         &mut self,
         terminal: u32,
         command: Command,
-        why: String,
+        why: RequestRefusal,
         at: Timestamp,
     ) -> Vec<Effect> {
-        self.refuse_command(terminal, command, Refusal::NotReauthenticated(why), at)
+        self.refuse_command(terminal, command, why, Refusal::NotReauthenticated, at)
     }
 }
 

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use super::Peer;
 use crate::{
     access::{LoggedInUser, RateLimit},
-    plant::{command::CommandId, time::elapsed},
+    plant::{command::CommandId, request_refusal::RequestRefusal, time::elapsed},
 };
 
 /// Requests of one terminal.
@@ -43,7 +43,7 @@ pub struct SessionState {
     /// The number of its last command: each has a higher one.
     pub last_command: Option<u32>,
     /// Its latest commands that did not reach the plant, and why.
-    pub undelivered: VecDeque<(CommandId, Arc<str>)>,
+    pub undelivered: VecDeque<(CommandId, RequestRefusal)>,
 }
 
 impl SessionState {
@@ -77,11 +77,11 @@ impl SessionState {
     }
 
     /// A command that did not reach the plant.
-    pub fn undelivered(&mut self, id: CommandId, why: &str) {
+    pub fn undelivered(&mut self, id: CommandId, why: RequestRefusal) {
         if UNDELIVERED_MAX <= self.undelivered.len() {
             self.undelivered.pop_front();
         }
-        self.undelivered.push_back((id, why.into()));
+        self.undelivered.push_back((id, why));
     }
 
     /// A user has logged in.

@@ -115,7 +115,7 @@ impl Bench {
         });
         let answers: Vec<_> = answers.collect();
         assert_eq!(answers.len(), 1, "each request is answered once");
-        answers.into_iter().next().unwrap()
+        answers.into_iter().next().unwrap().map_err(|why| why.to_string())
     }
 
     fn login(&mut self, terminal: u32, user: &str, password: &str) -> Result<(), String> {

@@ -18,7 +18,7 @@ use crate::{
         password,
         user::{self, UserChange},
     },
-    plant::{record::ActionRecord, role::Role},
+    plant::{record::ActionRecord, request_refusal::RequestRefusal, role::Role},
 };
 
 /// In a change until the new password is hashed.
@@ -39,10 +39,10 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         if self.users.is_none() {
-            return requester.refused("this station has no users");
+            return requester.refused(RequestRefusal::WithoutUsers);
         }
         let (action, target) = words(&request);
-        if let Some(why) = self.closed.as_ref().map(ToString::to_string) {
+        if let Some(why) = self.is_closed() {
             // The damaged file is not overwritten.
             return self.refuse(requester, action, &target, why, at);
         }
@@ -82,13 +82,13 @@ impl AccessControl {
         peer.in_process || user == Some("root") || (user.is_some() && user == self.service_account.as_deref())
     }
 
-    fn first(&mut self, requester: Requester, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, String> {
+    fn first(&mut self, requester: Requester, user: Arc<str>, password: Secret) -> Result<Vec<Effect>, RequestRefusal> {
         let session = self.session(requester.terminal)?;
         if !self.is_station_owner(&session.peer) {
-            return Err("only the user who started the station creates the first Supervisor".to_owned());
+            return Err(RequestRefusal::NotStationOwner);
         }
         if self.users.as_ref().is_none_or(|users| !users.is_empty()) {
-            return Err("users already exist".to_owned());
+            return Err(RequestRefusal::UsersExist);
         }
         self.new_password(requester, password, UserChange::First { user, hash: NO_HASH.into() })
     }
@@ -99,15 +99,15 @@ impl AccessControl {
         old: Secret,
         new: Secret,
         at: Timestamp,
-    ) -> Result<Vec<Effect>, String> {
+    ) -> Result<Vec<Effect>, RequestRefusal> {
         let session = self.session(requester.terminal)?;
         if session.trusted {
-            return Err("the operating system identifies you here; there is no password to change".to_owned());
+            return Err(RequestRefusal::NoPasswordToChange);
         }
-        let user = session.acting().ok_or("log in, or unlock this terminal, first")?.user.clone();
+        let user = session.acting().ok_or(RequestRefusal::LogInOrUnlockFirst)?.user.clone();
         self.check_password(&new, &user)?;
         if password::one_form(&new.0) == password::one_form(&old.0) {
-            return Err("this is the current password, choose another one".to_owned());
+            return Err(RequestRefusal::SamePassword);
         }
         self.verify_password(
             requester.terminal,
@@ -139,25 +139,25 @@ impl AccessControl {
         requester: Requester,
         password: Secret,
         change: UserChange,
-    ) -> Result<Vec<Effect>, String> {
+    ) -> Result<Vec<Effect>, RequestRefusal> {
         // Checked before the hash and again after it.
         self.check_change(&change)?;
         self.check_password(&password, change.user())?;
         self.hash(requester, password, change)
     }
 
-    fn check_password(&self, password: &Secret, user: &str) -> Result<(), String> {
+    fn check_password(&self, password: &Secret, user: &str) -> Result<(), RequestRefusal> {
         let names = [user, &self.def.name, &self.def.title];
         password::check(&password.0, &names, self.def.access.password_chars_min)
     }
 
-    fn check_change(&self, change: &UserChange) -> Result<crate::access::Users, String> {
-        let users = self.users.as_ref().ok_or("this station has no users")?;
+    fn check_change(&self, change: &UserChange) -> Result<Users, RequestRefusal> {
+        let users = self.users.as_ref().ok_or(RequestRefusal::WithoutUsers)?;
         let name = user::key(change.user());
         if let UserChange::Add { .. } | UserChange::First { .. } = change
             && self.def.access.trusted.iter().any(|(trusted, _)| user::key(trusted) == name)
         {
-            return Err(format!("{} is a user of the operating system who needs no password here", change.user()));
+            return Err(RequestRefusal::TrustedUser(change.user().to_string()));
         }
         users.with(change)
     }
@@ -166,7 +166,7 @@ impl AccessControl {
         &mut self,
         requester: Requester,
         change: UserChange,
-        hash: Result<String, String>,
+        hash: Result<String, RequestRefusal>,
         at: Timestamp,
     ) -> Vec<Effect> {
         match hash {
@@ -176,7 +176,12 @@ impl AccessControl {
     }
 
     /// Starts a change, which takes effect when it is on disk. Checks the rights again, because hashing takes time.
-    fn change(&mut self, requester: Requester, change: UserChange, at: Timestamp) -> Result<Vec<Effect>, String> {
+    fn change(
+        &mut self,
+        requester: Requester,
+        change: UserChange,
+        at: Timestamp,
+    ) -> Result<Vec<Effect>, RequestRefusal> {
         let session = self.session(requester.terminal)?;
         match &change {
             UserChange::First { .. } | UserChange::Password { must_change: false, .. } => {}
@@ -185,7 +190,7 @@ impl AccessControl {
             | UserChange::Disable(..)
             | UserChange::Delete(_)
             | UserChange::Password { must_change: true, .. } => {
-                let who = session.acting().ok_or(super::LOG_IN_FIRST)?;
+                let who = session.acting().ok_or(RequestRefusal::LogInFirst)?;
                 enough(who.role, right::Right::ManageUsers.role())?;
             }
         }
@@ -194,7 +199,7 @@ impl AccessControl {
                 self.next = Some((requester, change));
                 return Ok(Vec::new());
             }
-            Some(_) => return Err("another change is being saved, try again".to_owned()),
+            Some(_) => return Err(RequestRefusal::BeingSaved),
             None => {}
         }
         let after = self.check_change(&change)?;
@@ -237,7 +242,7 @@ impl AccessControl {
             let next = self.next.take();
             return next.map_or_else(Vec::new, |(requester, change)| self.change_or_refuse(requester, change, at));
         };
-        let after = result.and_then(|()| self.check_change(&change));
+        let after = result.map_err(RequestRefusal::Failed).and_then(|()| self.check_change(&change));
         let users = match after {
             Ok(users) => users,
             Err(why) => {

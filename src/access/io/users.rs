@@ -99,7 +99,7 @@ fn parse(text: &str) -> Result<Users, (usize, String)> {
     let mut users = Vec::new();
     for row in table.user {
         let row = row.into_inner();
-        user::check_name(row.name.get_ref()).map_err(|why| (row.name.span().start, why))?;
+        user::check_name(row.name.get_ref()).map_err(|why| (row.name.span().start, why.to_string()))?;
         let checked = password::check_hash(row.password.get_ref());
         checked.map_err(|expected| (row.password.span().start, format!("not a hash, {expected}")))?;
         let last_login = row.last_login.map(|time| {
@@ -115,7 +115,7 @@ fn parse(text: &str) -> Result<Users, (usize, String)> {
             last_login: last_login.transpose()?,
         });
     }
-    Users::new(users).map_err(|(place, why)| (places[place], why))
+    Users::new(users).map_err(|(place, why)| (places[place], why.to_string()))
 }
 
 fn text(users: &Users) -> String {

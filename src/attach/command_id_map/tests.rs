@@ -89,10 +89,10 @@ fn a_pending_command_is_uncertain_until_the_station_is_back() {
 fn an_undelivered_command_is_listed_with_its_reason() {
     let mut id_map = CommandIdMap::new(1, 3);
     let id = send(&mut id_map, 1);
-    id_map.on_undelivered(id, "station too busy".into());
-    id_map.on_undelivered(id, "station too busy".into());
-    id_map.refuse(request(3, 2).id, GONE);
-    let undelivered = [(id, "station too busy".into()), (request(3, 2).id, GONE.into())];
+    id_map.on_undelivered(id, RequestRefusal::StationBusy);
+    id_map.on_undelivered(id, RequestRefusal::StationBusy);
+    id_map.refuse(request(3, 2).id, RequestRefusal::StationGone);
+    let undelivered = [(id, RequestRefusal::StationBusy), (request(3, 2).id, RequestRefusal::StationGone)];
     assert_eq!(id_map.undelivered(), undelivered);
     assert_eq!(seen(&mut id_map, &[]), [], "the plant has not seen them");
     for number in 3..200 {

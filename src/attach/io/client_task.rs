@@ -16,14 +16,14 @@ use crate::{
     access::{Completion, SessionStatus},
     attach::{
         assembly::Assembly,
-        command_id_map::{CommandIdMap, GONE},
+        command_id_map::CommandIdMap,
         protocol::{
             self, ClientMessage, HandshakeReply, REQUEST_BYTES_MAX, SERVER_MESSAGE_BYTES_MAX, ServerMessage,
             TerminalOrigin,
         },
     },
     history::{Answer, HistoryError, io::QueryRequest},
-    plant::{PlantDef, Snapshot, command::CommandId},
+    plant::{PlantDef, Snapshot, command::CommandId, request_refusal::RequestRefusal},
     station::Request,
 };
 
@@ -39,15 +39,15 @@ const IN: usize = 4;
 /// A query or request that waits for its answer.
 enum Waiting {
     Ask(oneshot::Sender<Result<Answer, HistoryError>>),
-    SessionRequest(oneshot::Sender<Result<Completion, String>>),
+    SessionRequest(oneshot::Sender<Result<Completion, RequestRefusal>>),
 }
 
 impl Waiting {
     /// Replies that there will be no answer.
-    fn refuse(self, why: &str) {
+    fn refuse(self, why: RequestRefusal) {
         match self {
-            Waiting::Ask(reply) => drop(reply.send(Err(HistoryError::Engine(why.to_owned())))),
-            Waiting::SessionRequest(reply) => drop(reply.send(Err(why.to_owned()))),
+            Waiting::Ask(reply) => drop(reply.send(Err(HistoryError::Engine(why.to_string())))),
+            Waiting::SessionRequest(reply) => drop(reply.send(Err(why))),
         }
     }
 }
@@ -98,7 +98,7 @@ impl ClientTask {
             tracing::warn!(why, "the station is disconnected");
             self.update_status(|status| status.gone = Some(why.into()));
             for (_, waiting) in self.waiting.drain() {
-                waiting.refuse(GONE);
+                waiting.refuse(RequestRefusal::StationGone);
             }
             self.id_map.on_disconnected();
             self.publish_snapshot();
@@ -169,13 +169,13 @@ impl ClientTask {
                     let _ = reply.send(answer);
                 }
             }
-            ServerMessage::Undelivered { id, why } => self.on_undelivered(id, why.into()),
+            ServerMessage::Undelivered { id, why } => self.on_undelivered(id, why),
         }
         Ok(())
     }
 
     /// A command that was sent did not reach the plant.
-    fn on_undelivered(&mut self, id: CommandId, why: Arc<str>) {
+    fn on_undelivered(&mut self, id: CommandId, why: RequestRefusal) {
         self.id_map.on_undelivered(id, why);
         self.update_status(|_| {});
     }
@@ -203,7 +203,7 @@ impl ClientTask {
                 let command = self.id_map.send(command, by, at);
                 let id = command.id;
                 if let Err(why) = enqueue(&ClientMessage::Command(Box::new(command), credentials), out) {
-                    self.on_undelivered(id, why.into());
+                    self.on_undelivered(id, why);
                 }
             }
             Request::Ask(QueryRequest { query, reply }) => {
@@ -226,7 +226,7 @@ impl ClientTask {
     fn await_answer(&mut self, ticket: u64, waiting: Waiting, asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) {
         match enqueue(asked, out) {
             Ok(()) => drop(self.waiting.insert(ticket, waiting)),
-            Err(why) => waiting.refuse(&why),
+            Err(why) => waiting.refuse(why),
         }
     }
 
@@ -281,11 +281,11 @@ impl ClientTask {
     fn refuse(&mut self, request: Request) {
         match request {
             Request::Command(command, _) => {
-                self.id_map.refuse(command.id, GONE);
+                self.id_map.refuse(command.id, RequestRefusal::StationGone);
                 self.update_status(|_| {});
             }
-            Request::Ask(query) => Waiting::Ask(query.reply).refuse(GONE),
-            Request::SessionRequest(_, reply) => Waiting::SessionRequest(reply).refuse(GONE),
+            Request::Ask(query) => Waiting::Ask(query.reply).refuse(RequestRefusal::StationGone),
+            Request::SessionRequest(_, reply) => Waiting::SessionRequest(reply).refuse(RequestRefusal::StationGone),
             Request::RecordRefusal { .. } => {}
         }
     }
@@ -303,11 +303,12 @@ fn is_equal(one: &PlantDef, other: &PlantDef) -> bool {
     protocol::encode(one, SERVER_MESSAGE_BYTES_MAX) == protocol::encode(other, SERVER_MESSAGE_BYTES_MAX)
 }
 
-fn enqueue(asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) -> Result<(), String> {
-    let bytes = protocol::encode(asked, REQUEST_BYTES_MAX).map_err(|error| error.to_string())?;
+fn enqueue(asked: &ClientMessage, out: &mpsc::Sender<Vec<u8>>) -> Result<(), RequestRefusal> {
+    let failed = |error: protocol::ProtocolError| RequestRefusal::Failed(error.to_string());
+    let bytes = protocol::encode(asked, REQUEST_BYTES_MAX).map_err(failed)?;
     out.try_send(bytes).map_err(|error| match error {
-        mpsc::error::TrySendError::Full(_) => "station too busy".to_owned(),
-        mpsc::error::TrySendError::Closed(_) => GONE.to_owned(),
+        mpsc::error::TrySendError::Full(_) => RequestRefusal::StationBusy,
+        mpsc::error::TrySendError::Closed(_) => RequestRefusal::StationGone,
     })
 }
 

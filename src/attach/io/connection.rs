@@ -27,6 +27,7 @@ use crate::{
         PlantDef, Snapshot,
         command::{Command, Outcome},
         line_report::LineReport,
+        request_refusal::RequestRefusal,
     },
     station::{Request, Session},
 };
@@ -127,11 +128,14 @@ impl Inbound {
     async fn send_command(&self, command: Command, credentials: Option<Credentials>) {
         let id = command.id;
         let sent = if id.terminal == self.session.terminal {
-            check::command(&self.def, &command.kind)
+            check::command(&self.def, &command.kind).map_err(RequestRefusal::Failed)
         } else {
-            Err(format!("a command of terminal {}, this is terminal {}", id.terminal, self.session.terminal))
+            Err(RequestRefusal::Failed(format!(
+                "a command of terminal {}, this is terminal {}",
+                id.terminal, self.session.terminal
+            )))
         };
-        let sent = sent.and_then(|()| self.session.send(Request::Command(command, credentials)).map_err(str::to_owned));
+        let sent = sent.and_then(|()| self.session.send(Request::Command(command, credentials)));
         if let Err(why) = sent {
             // The terminal may have gone.
             let _ = self.replies.send((ServerMessage::Undelivered { id, why }, Vec::new())).await;
@@ -149,7 +153,7 @@ impl Inbound {
         let query = self.queries.spawn(async move {
             // A query waits here for those before it, so that what comes behind it, a command perhaps, does not.
             let Ok(turn) = asked.acquire_owned().await else { return };
-            let sent = sent.and_then(|()| session.ask(query).map_err(str::to_owned));
+            let sent = sent.and_then(|()| session.ask(query).map_err(|why| why.to_string()));
             // The station closes a terminal when all handles of its session are dropped.
             drop(session);
             let answer = match sent {
@@ -174,12 +178,12 @@ impl Inbound {
     async fn send_request(&self, ticket: u64, request: SessionRequest) {
         let Ok(place) = self.in_flight.clone().acquire_owned().await else { return };
         let (reply, answer) = oneshot::channel();
-        let sent = self.session.send(Request::SessionRequest(request, reply)).map_err(str::to_owned);
+        let sent = self.session.send(Request::SessionRequest(request, reply));
         let replies = self.replies.clone();
         tokio::spawn(async move {
             let answer = match sent {
                 Ok(()) => tokio::select! {
-                    answer = answer => answer.unwrap_or_else(|_| Err("the station has stopped".to_owned())),
+                    answer = answer => answer.unwrap_or_else(|_| Err(RequestRefusal::StationStopped)),
                     // A job that the terminal has left is cancelled.
                     () = replies.closed() => return,
                 },

@@ -104,8 +104,8 @@ fn requests_and_news_survive_the_way() {
         ServerMessage::SessionStatus(Box::default()),
         ServerMessage::Answer { ticket: 1, answer: Ok(Answer::Journal(Vec::new())) },
         ServerMessage::Answer { ticket: 1, answer: Err(HistoryError::EmptyPeriod) },
-        ServerMessage::RequestDone { ticket: 2, answer: Err("no".into()) },
-        ServerMessage::Undelivered { id: CommandId { terminal: 1, number: 2 }, why: "busy".into() },
+        ServerMessage::RequestDone { ticket: 2, answer: Err(RequestRefusal::WrongPassword { wait: 8 }) },
+        ServerMessage::Undelivered { id: CommandId { terminal: 1, number: 2 }, why: RequestRefusal::StationBusy },
     ];
     for sent in sent {
         let received: ServerMessage =

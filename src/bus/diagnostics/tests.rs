@@ -5,6 +5,7 @@ use crate::plant::{
     command::{NotConfirmed, Outcome, Refusal},
     def::Framing,
     event::ExceptionCode,
+    line_trouble::LineTrouble,
 };
 use crate::{
     bus::names,
@@ -256,7 +257,7 @@ fn writes_of_several_and_of_bits_have_their_functions() {
 }
 
 /// Runs a signal test on a port given as a function from what is asked to how its signals stand then.
-fn with_signals(test: SignalTest, port: impl Fn(&Ask) -> Result<u32, String>) -> DiagnosticRun {
+fn with_signals(test: SignalTest, port: impl Fn(&Ask) -> Result<u32, LineTrouble>) -> DiagnosticRun {
     let id = CommandId { terminal: 1, number: 1 };
     let mut job = Job::new(id, "anna".into(), Diagnostic::Signal(test), Timestamp::UNIX_EPOCH);
     assert!(job.is_exclusive(), "nothing is polled meanwhile");
@@ -289,8 +290,8 @@ fn a_signal_is_held_put_back_and_what_followed_is_said() {
 #[test]
 fn a_port_without_signals_ends_the_test_with_the_reason() {
     let test = SignalTest { signal: OutputSignal::Dtr, on: true, seconds: 60 };
-    let run = with_signals(test, |_| Err("this port has none".to_owned()));
-    assert_eq!((run.done, run.state), (1, DiagnosticState::Failed("this port has none".to_owned())));
+    let run = with_signals(test, |_| Err(LineTrouble::NoSignals));
+    assert_eq!((run.done, run.state), (1, DiagnosticState::Failed(LineTrouble::NoSignals)));
     assert_eq!(run.findings, []);
 }
 

@@ -12,7 +12,7 @@ use tokio::{
     net::{UdpSocket, lookup_host},
 };
 
-use crate::plant::def::Framing;
+use crate::plant::{def::Framing, line_trouble::LineTrouble};
 
 /// Bytes of an MBAP header before what its length counts.
 const MBAP_HEAD: usize = 6;
@@ -25,8 +25,8 @@ pub struct Datagrams {
 }
 
 impl Datagrams {
-    /// A socket for a host; the error is in words for an operator. Whether anyone is there shows with the first request.
-    pub async fn open(host: &str, port: u16, framing: Framing) -> Result<Datagrams, String> {
+    /// A socket for a host. Whether anyone is there shows with the first request.
+    pub async fn open(host: &str, port: u16, framing: Framing) -> Result<Datagrams, LineTrouble> {
         let socket = async {
             let address = lookup_host((host, port)).await?.next().ok_or(io::ErrorKind::NotFound)?;
             let any: IpAddr =
@@ -35,7 +35,7 @@ impl Datagrams {
             socket.connect(address).await?;
             Ok::<UdpSocket, io::Error>(socket)
         };
-        let socket = socket.await.map_err(|error| format!("{host}:{port}: {error}"))?;
+        let socket = socket.await.map_err(|error| LineTrouble::System(format!("{host}:{port}: {error}")))?;
         Ok(Datagrams { socket, framing })
     }
 

@@ -5,7 +5,7 @@ use tokio::io::AsyncReadExt;
 use super::{clock::Clock, tap::Tap};
 use crate::{
     bus::listen::{Ended, Heard, HeardFrame, Listener},
-    plant::{line::LineDef, traffic::Frame},
+    plant::{line::LineDef, line_trouble::LineTrouble, traffic::Frame},
 };
 
 /// A tap, and what has been heard there.
@@ -23,15 +23,15 @@ impl Hearing {
     }
 
     /// What comes next, in UTC; perhaps nothing yet. The error says why nothing more will come. May be dropped before.
-    pub async fn next(&mut self) -> Result<Vec<Heard>, String> {
+    pub async fn next(&mut self) -> Result<Vec<Heard>, LineTrouble> {
         let (clock, silent) = (self.clock, self.listener.silent_at());
         let heard = tokio::select! {
             // What has come is heard before a silence is.
             biased;
             read = self.tap.bytes.read(&mut self.buffer) => match read {
                 Ok(count @ 1..) => self.listener.hear(clock.now(), &self.buffer[..count]),
-                Ok(0) => return Err("the port was closed by the other side".to_owned()),
-                Err(error) => return Err(format!("the port is gone: {error}")),
+                Ok(0) => return Err(LineTrouble::PortClosed),
+                Err(error) => return Err(LineTrouble::PortLost(error.to_string())),
             },
             () = clock.sleep_until(silent.unwrap_or_default()), if silent.is_some() => self.listener.rest(clock.now()),
         };

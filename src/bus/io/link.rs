@@ -30,6 +30,7 @@ use crate::{
     plant::{
         def::{Framing, LineDef, Protocol},
         event::{Fault, FaultKind, LineCounters},
+        line_trouble::LineTrouble,
         number::to_u32,
         traffic::{Exchange, Frame, FrameFault, FrameResult},
     },
@@ -40,8 +41,8 @@ use crate::{
 pub enum LinkError {
     /// The device or the line corrupted this request; the port is fine.
     Fault(Fault),
-    /// The port or connection is gone, in the words of the system.
-    Gone(String),
+    /// The port or connection is gone.
+    Gone(LineTrouble),
 }
 
 impl From<Fault> for LinkError {

@@ -25,6 +25,7 @@ use crate::{
         command::BusRequest,
         def::{DeviceDef, LineDef, LineId},
         event::{Event, Fault, LineCounters, LineState, WriteResult},
+        line_trouble::LineTrouble,
         time::elapsed,
         traffic::Frame,
     },
@@ -69,7 +70,7 @@ pub async fn run(
 /// Why a port is left.
 enum Exit {
     Closed,
-    Failed(String),
+    Failed(LineTrouble),
     Shutdown,
 }
 
@@ -134,7 +135,7 @@ impl Task<'_> {
                     self.wait(None).await?;
                 }
                 Exit::Failed(why) => {
-                    tracing::warn!(line = self.settings().name, why, "not connected");
+                    tracing::warn!(line = self.settings().name, %why, "not connected");
                     let retry_at = self.clock.now() + backoff.fail();
                     self.publish_state(LineState::Waiting { why, retry_at }).await?;
                     self.publish_report().await?;

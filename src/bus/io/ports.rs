@@ -6,6 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use crate::plant::line_trouble::{LineTrouble, PortHolder, PortOwner};
+
 /// Serial ports, by the names that stay the same when an adapter is plugged in elsewhere, where there are such.
 pub fn list() -> Vec<String> {
     let stable = names_in(Path::new("/dev/serial/by-id"), |_| true);
@@ -40,44 +42,39 @@ fn names_in(folder: &Path, wanted: impl Fn(&str) -> bool) -> Vec<String> {
     names
 }
 
-/// Why a port could not be opened, in words that say what to do.
-pub fn why_not(path: &str, error: &tokio_serial::Error) -> String {
+/// Why a port could not be opened.
+pub fn why_not(path: &str, error: &tokio_serial::Error) -> LineTrouble {
     use tokio_serial::ErrorKind;
     let words = error.to_string();
+    let no_such = || LineTrouble::NoSuchPort { path: path.to_owned(), known: list() };
     match error.kind {
-        ErrorKind::Io(io::ErrorKind::NotFound) => format!("{path}: no such port ({})", known_words()),
-        ErrorKind::Io(io::ErrorKind::PermissionDenied) => format!("{path}: no permission{}", group_words(path)),
+        ErrorKind::Io(io::ErrorKind::NotFound) => no_such(),
+        ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
+            LineTrouble::NoPermission { path: path.to_owned(), owner: owner(path) }
+        }
         _ if ["busy", "exclusive lock"].iter().any(|word| words.to_lowercase().contains(word)) => {
-            format!("{path}: in use by {}", holder(path).unwrap_or_else(|| "another program".into()))
+            LineTrouble::InUse { path: path.to_owned(), holder: holder(path) }
         }
         // Older kernels and pseudo-terminals say the same of a path that is no port at all.
-        ErrorKind::NoDevice if !Path::new(path).exists() => format!("{path}: no such port ({})", known_words()),
+        ErrorKind::NoDevice if !Path::new(path).exists() => no_such(),
         ErrorKind::Unknown | ErrorKind::Io(io::ErrorKind::Other) if words.contains("Not a typewriter") => {
-            format!("{path}: not a serial port")
+            LineTrouble::NotSerial(path.to_owned())
         }
         ErrorKind::NoDevice | ErrorKind::InvalidInput | ErrorKind::Unknown | ErrorKind::Io(_) => {
-            format!("{path}: {words}")
+            LineTrouble::System(format!("{path}: {words}"))
         }
-    }
-}
-
-fn known_words() -> String {
-    match list().as_slice() {
-        [] => "this machine has no serial port".into(),
-        ports => format!("there are: {}", ports.join(", ")),
     }
 }
 
 /// Which group a user must be in.
-fn group_words(path: &str) -> String {
-    let Ok(gid) = fs::metadata(path).map(|port| port.gid()) else { return String::new() };
+fn owner(path: &str) -> PortOwner {
+    let Ok(gid) = fs::metadata(path).map(|port| port.gid()) else { return PortOwner::Unknown };
     let groups = fs::read_to_string("/etc/group").unwrap_or_default();
     let is_this = |line: &&str| line.split(':').nth(2) == Some(&gid.to_string());
     match groups.lines().find(is_this).and_then(|line| line.split(':').next()) {
-        // No task joins this one.
-        Some("root") => ": it belongs to root; ask the administrator for access (a udev rule)".to_owned(),
-        Some(name) => format!(": it belongs to the group {name} (usermod -aG {name} USER, then log in again)"),
-        None => format!(": it belongs to the group {gid}"),
+        Some("root") => PortOwner::Root,
+        Some(name) => PortOwner::Group(name.to_owned()),
+        None => PortOwner::Gid(gid),
     }
 }
 
@@ -131,16 +128,17 @@ fn holders(path: &str) -> Vec<Holder> {
 }
 
 /// The programs that have a port open: `minicom -D /dev/ttyUSB0 (process 1234)`.
-pub(super) fn holder(path: &str) -> Option<String> {
-    user(path).or_else(|| words_of(holders(path).iter()))
+pub(super) fn holder(path: &str) -> PortHolder {
+    let other_end = || words_of(holders(path).iter()).map(PortHolder::Programs);
+    user(path).or_else(other_end).unwrap_or(PortHolder::Unknown)
 }
 
 /// The same without what only serves a pseudo-terminal.
-pub(super) fn user(path: &str) -> Option<String> {
+pub(super) fn user(path: &str) -> Option<PortHolder> {
     let own = std::process::id();
     match holders(path).iter().any(|holder| holder.process == own) {
-        true => Some("this program, on another line".into()),
-        false => also_open(path),
+        true => Some(PortHolder::OtherLine),
+        false => also_open(path).map(PortHolder::Programs),
     }
 }
 
@@ -164,15 +162,14 @@ mod tests {
     fn the_holder_of_a_port_is_named() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let path = file.path().display().to_string();
-        assert_eq!(holder(&path).as_deref(), Some("this program, on another line"));
-        assert_eq!(holder("/dev/no-such-port"), None);
+        assert_eq!(holder(&path), PortHolder::OtherLine);
+        assert_eq!(holder("/dev/no-such-port"), PortHolder::Unknown);
     }
 
     #[test]
     fn the_group_that_may_use_a_port_is_named() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let words = group_words(&file.path().display().to_string());
-        assert!(words.contains("it belongs to"), "{words}");
-        assert_eq!(group_words("/dev/no-such-port"), "");
+        assert_ne!(owner(&file.path().display().to_string()), PortOwner::Unknown);
+        assert_eq!(owner("/dev/no-such-port"), PortOwner::Unknown);
     }
 }

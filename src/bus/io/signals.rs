@@ -8,7 +8,7 @@ use super::{
     transport::serial_stream,
     uart::{self, PortWatch},
 };
-use crate::plant::{event::UartCounters, line::Serial, port_signals::PortSignals};
+use crate::plant::{event::UartCounters, line::Serial, line_trouble::LineTrouble, port_signals::PortSignals};
 
 /// A port whose signals are set and read.
 pub struct SignalPort {
@@ -28,8 +28,8 @@ pub enum Signal {
 }
 
 impl SignalPort {
-    /// Opens the port; the system raises RTS and DTR with that. The error is in words for an operator.
-    pub fn open(path: &str, serial: Serial) -> Result<SignalPort, String> {
+    /// Opens the port; the system raises RTS and DTR with that.
+    pub fn open(path: &str, serial: Serial) -> Result<SignalPort, LineTrouble> {
         let port = serial_stream(path, serial)?;
         let watch = PortWatch::new(&port);
         Ok(SignalPort { port, watch })

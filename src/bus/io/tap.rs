@@ -16,6 +16,7 @@ use super::{
 use crate::plant::{
     event::UartCounters,
     line::{Parity, Protocol, Serial, Transport},
+    line_trouble::LineTrouble,
     port_signals::OutputSignal,
 };
 
@@ -27,14 +28,12 @@ pub struct Tap {
 }
 
 impl Tap {
-    /// Opens a serial port for reading only, or a connection to what forwards the bytes of both sides; the error is in words
-    /// for an operator. `rts`: the signal stays as the system sets it when a port is opened.
-    pub async fn open(transport: &Transport, rts: bool) -> Result<Tap, String> {
+    /// Opens a serial port for reading only, or a connection to what forwards the bytes of both sides.
+    /// `rts`: the signal stays as the system sets it when a port is opened.
+    pub async fn open(transport: &Transport, rts: bool) -> Result<Tap, LineTrouble> {
         match transport {
             Transport::Serial { port, serial, .. } => open_serial(port, *serial, rts),
-            Transport::Network { protocol: Protocol::Udp, .. } => {
-                Err("datagrams of others do not come here: expected a serial port or a mirror over TCP".into())
-            }
+            Transport::Network { protocol: Protocol::Udp, .. } => Err(LineTrouble::DatagramsOfOthers),
             Transport::Network { host, port, .. } => {
                 Ok(Tap { bytes: Box::new(connect(host, *port).await?), watch: None })
             }
@@ -52,22 +51,17 @@ impl Tap {
     }
 }
 
-fn open_serial(path: &str, serial: Serial, rts: bool) -> Result<Tap, String> {
-    let in_use = |holder: Option<String>| {
-        let holder = holder.unwrap_or_else(|| "another program".to_owned());
-        format!(
-            "{path}: in use by {holder}: two programs at one port take each other's bytes; to listen needs a port of its own"
-        )
-    };
+fn open_serial(path: &str, serial: Serial, rts: bool) -> Result<Tap, LineTrouble> {
+    let shared = |holder| LineTrouble::Shared { path: path.to_owned(), holder };
     if let Some(user) = ports::user(path) {
-        return Err(in_use(Some(user)));
+        return Err(shared(user));
     }
     let failed = |error: io::Error| ports::why_not(path, &error.into());
     let flags = (OFlags::NONBLOCK | OFlags::NOCTTY).bits().cast_signed();
     let port = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
-    flock(&port, FlockOperation::NonBlockingLockExclusive).map_err(|_| in_use(ports::holder(path)))?;
+    flock(&port, FlockOperation::NonBlockingLockExclusive).map_err(|_| shared(ports::holder(path)))?;
     if !rustix::termios::isatty(&port) {
-        return Err(format!("{path}: not a serial port"));
+        return Err(LineTrouble::NotSerial(path.to_owned()));
     }
     // Opening it has raised RTS, by which some adapters switch their driver on: it would hold the line.
     if !rts {
@@ -129,7 +123,7 @@ mod tests {
         tap.bytes.read_exact(&mut heard).await.expect("they come");
         assert_eq!(heard, [0x0A, 0x0D, 0x11, 0x13, 0x00, 0xFF], "nothing is translated");
         assert_eq!(tap.uart(), None);
-        let second = Tap::open(&transport, false).await.err().unwrap_or_default();
+        let second = Tap::open(&transport, false).await.err().expect("it does not open").to_string();
         assert!(second.contains("in use by this program"), "{second}");
         assert!(tokio_serial::new(&path, 9_600).open_native_async().is_err());
     }
@@ -151,12 +145,16 @@ mod tests {
         let file = folder.path().join("file");
         std::fs::write(&file, "text").expect("it can be written");
         for (path, part) in [("/dev/no-such-port", "no such port ("), (&file.to_string_lossy(), "not a serial port")] {
-            let failed = Tap::open(&Transport::rtu(path, Serial::USUAL), false).await.err().unwrap_or_default();
+            let failed = Tap::open(&Transport::rtu(path, Serial::USUAL), false)
+                .await
+                .err()
+                .expect("it does not open")
+                .to_string();
             assert!(failed.contains(part), "{path}: {failed}");
         }
         let (protocol, framing) = (crate::plant::line::Protocol::Udp, crate::plant::line::Framing::Mbap);
         let datagrams = Transport::Network { protocol, host: "127.0.0.1".into(), port: 502, framing };
-        let failed = Tap::open(&datagrams, false).await.err().unwrap_or_default();
+        let failed = Tap::open(&datagrams, false).await.err().expect("it does not open").to_string();
         assert!(failed.contains("expected a serial port or a mirror over TCP"), "{failed}");
     }
 }

@@ -25,6 +25,7 @@ use crate::{
         def::{Framing, LineDef, Transport},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState},
         event::Fault,
+        line_trouble::LineTrouble,
     },
 };
 
@@ -319,7 +320,7 @@ impl Bench {
             match result {
                 Ok(result) => job.on_result(result),
                 Err(LinkError::Gone(why)) => job.stop(DiagnosticState::Failed(why)),
-                Err(LinkError::Fault(fault)) => job.stop(DiagnosticState::Failed(fault.to_string())),
+                Err(LinkError::Fault(fault)) => job.stop(DiagnosticState::Failed(LineTrouble::Fault(fault))),
             }
             if let Some(span) = self.hearing.deaf_for().filter(|span| deaf_for.replace(*span).is_none()) {
                 job.note_deaf(span);
@@ -334,7 +335,7 @@ impl Bench {
     }
 
     /// The connection for a step: the one that is open, if it has the settings.
-    async fn connect(&mut self, step: &Step) -> Result<Connection, String> {
+    async fn connect(&mut self, step: &Step) -> Result<Connection, LineTrouble> {
         let wanted = settings_for(&self.line, step);
         if let Some((_, connection)) = self.open.take().filter(|(settings, _)| *settings == wanted) {
             return Ok(connection);

@@ -15,7 +15,10 @@ use super::{
     ports,
     uart::{self, PortWatch},
 };
-use crate::plant::def::{Parity, Protocol, Rs485, Serial, Transport};
+use crate::plant::{
+    def::{Parity, Protocol, Rs485, Serial, Transport},
+    line_trouble::LineTrouble,
+};
 
 /// A TCP connection must stand within this time.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
@@ -44,8 +47,8 @@ pub enum Connector {
 }
 
 impl Connector {
-    /// Opens the port or connection; the error is in words for an operator.
-    pub async fn open(&mut self) -> Result<Opened, String> {
+    /// Opens the port or connection.
+    pub async fn open(&mut self) -> Result<Opened, LineTrouble> {
         match self {
             Connector::Real(transport) => open(transport).await,
             Connector::Memory(streams) => match streams.try_recv() {
@@ -56,7 +59,7 @@ impl Connector {
     }
 
     /// Opens it once with other settings.
-    pub async fn open_as(&mut self, transport: &Transport) -> Result<Opened, String> {
+    pub async fn open_as(&mut self, transport: &Transport) -> Result<Opened, LineTrouble> {
         match self {
             Connector::Real(_) => open(transport).await,
             Connector::Memory(_) => self.open().await,
@@ -71,7 +74,7 @@ impl Connector {
     }
 }
 
-async fn open(transport: &Transport) -> Result<Opened, String> {
+async fn open(transport: &Transport) -> Result<Opened, LineTrouble> {
     match transport {
         Transport::Serial { port, serial, rs485, .. } => open_serial(port, *serial, *rs485),
         Transport::Network { protocol: Protocol::Tcp, host, port, .. } => open_tcp(host, *port).await,
@@ -82,27 +85,26 @@ async fn open(transport: &Transport) -> Result<Opened, String> {
     }
 }
 
-fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, String> {
+fn open_serial(path: &str, serial: Serial, rs485: Rs485) -> Result<Opened, LineTrouble> {
     let stream = serial_stream(path, serial)?;
     if matches!(serial.parity, Parity::Mark | Parity::Space) {
-        uart::set_fixed_parity(&stream).map_err(|error| {
-            let parity = serial.parity.word();
-            format!("{path}: its driver has no parity {parity} ({error})")
+        uart::set_fixed_parity(&stream).map_err(|error| LineTrouble::NoParity {
+            path: path.to_owned(),
+            parity: serial.parity.word().to_owned(),
+            error: error.to_string(),
         })?;
     }
     // A driver remembers what an earlier opening has switched on; one that never could needs no call.
     let switched = uart::set_rs485(&stream, rs485);
     if rs485 != Rs485::Off {
-        switched.map_err(|error| {
-            format!("{path}: its driver does not switch the direction of RS-485 ({error}); use rs485 = \"off\"")
-        })?;
+        switched.map_err(|error| LineTrouble::NoRs485 { path: path.to_owned(), error: error.to_string() })?;
     }
     let watch = PortWatch::new(&stream);
     Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), watch })
 }
 
 /// A serial port, taken exclusively: a second master on the line is refused by the system.
-pub(super) fn serial_stream(path: &str, serial: Serial) -> Result<SerialStream, String> {
+pub(super) fn serial_stream(path: &str, serial: Serial) -> Result<SerialStream, LineTrouble> {
     use tokio_serial::{DataBits, FlowControl, StopBits};
     let builder = tokio_serial::new(path, serial.baud)
         .data_bits(if serial.data_bits == 7 { DataBits::Seven } else { DataBits::Eight })
@@ -116,21 +118,22 @@ pub(super) fn serial_stream(path: &str, serial: Serial) -> Result<SerialStream, 
     builder.open_native_async().map_err(|error| ports::why_not(path, &error))
 }
 
-async fn open_tcp(host: &str, port: u16) -> Result<Opened, String> {
+async fn open_tcp(host: &str, port: u16) -> Result<Opened, LineTrouble> {
     let stream = connect(host, port).await?;
     Ok(Opened { stream: Box::new(stream), pause: Pause::exact(), watch: None })
 }
 
-/// A TCP connection; the error is in words for an operator.
-pub(super) async fn connect(host: &str, port: u16) -> Result<TcpStream, String> {
+/// A TCP connection.
+pub(super) async fn connect(host: &str, port: u16) -> Result<TcpStream, LineTrouble> {
+    let place = || format!("{host}:{port}");
     let connect = TcpStream::connect((host, port));
     let stream = match tokio::time::timeout(CONNECT_TIMEOUT, connect).await {
-        Err(_) => return Err(format!("{host}:{port}: no connection within {} s", CONNECT_TIMEOUT.as_secs())),
-        Ok(Err(error)) => return Err(format!("{host}:{port}{}", tcp_words(&error))),
+        Err(_) => return Err(LineTrouble::NoConnection { place: place(), seconds: CONNECT_TIMEOUT.as_secs() }),
+        Ok(Err(error)) => return Err(not_connected(place(), &error)),
         Ok(Ok(stream)) => stream,
     };
     // Small frames must not wait for each other.
-    stream.set_nodelay(true).map_err(|error| format!("{host}:{port}: {error}"))?;
+    stream.set_nodelay(true).map_err(|error| not_connected(place(), &error))?;
     if let Err(error) = notice_silence(&stream) {
         tracing::debug!(%error, "no keepalive on {host}:{port}");
     }
@@ -149,11 +152,11 @@ fn notice_silence(stream: &TcpStream) -> Result<(), rustix::io::Errno> {
     sockopt::set_socket_linger(stream, Some(Duration::ZERO))
 }
 
-fn tcp_words(error: &io::Error) -> String {
+fn not_connected(place: String, error: &io::Error) -> LineTrouble {
     match error.kind() {
-        io::ErrorKind::ConnectionRefused => ": refused (is the device on, is the TCP port right?)".into(),
-        io::ErrorKind::HostUnreachable | io::ErrorKind::NetworkUnreachable => ": no route to this address".into(),
-        _ => format!(": {error}"),
+        io::ErrorKind::ConnectionRefused => LineTrouble::Refused(place),
+        io::ErrorKind::HostUnreachable | io::ErrorKind::NetworkUnreachable => LineTrouble::NoRoute(place),
+        _ => LineTrouble::System(format!("{place}: {error}")),
     }
 }
 
@@ -165,12 +168,12 @@ mod tests {
     #[tokio::test]
     async fn errors_say_what_to_do() {
         let missing = Transport::rtu("/dev/no-such-port", Serial::USUAL);
-        let words = Connector::Real(missing).open().await.err().unwrap();
+        let words = Connector::Real(missing).open().await.err().unwrap().to_string();
         assert!(words.starts_with("/dev/no-such-port: no such port ("), "{words}");
         // A port that was just free and is closed again refuses.
         let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let closed = Transport::tcp("127.0.0.1", port);
-        let words = Connector::Real(closed).open().await.err().unwrap();
+        let words = Connector::Real(closed).open().await.err().unwrap().to_string();
         assert!(words.contains("refused"), "{words}");
     }
 }

@@ -20,6 +20,7 @@ use crate::{
     plant::{
         def::{Framing, LineDef},
         event::LineCounters,
+        line_trouble::LineTrouble,
         number::to_u32,
         traffic::{FRAMES_MAX, Frame, FrameFault, FrameResult},
     },
@@ -176,11 +177,11 @@ impl Wire {
         // What the system takes at once, as a rule all of it, costs no timer.
         self.left_at = Instant::now() + self.char_time * to_u32(bytes.len());
         let taken = self.port.write(bytes).now_or_never().unwrap_or(Ok(0));
-        let taken = taken.map_err(|error| LinkError::Gone(error.to_string()))?;
+        let taken = taken.map_err(gone)?;
         if let Some(rest @ [_, ..]) = bytes.get(taken..) {
             match tokio::time::timeout(self.timeout + self.char_time * 512, self.port.write_all(rest)).await {
-                Ok(written) => written.map_err(|error| LinkError::Gone(error.to_string()))?,
-                Err(_) => return Err(LinkError::Gone("the port accepts no bytes".into())),
+                Ok(written) => written.map_err(gone)?,
+                Err(_) => return Err(LinkError::Gone(LineTrouble::NoBytesAccepted)),
             }
         }
         let sent_at = Instant::now();
@@ -363,11 +364,16 @@ impl Wire {
     }
 }
 
+/// A port that fails, in the words of the system.
+fn gone(error: std::io::Error) -> LinkError {
+    LinkError::Gone(LineTrouble::System(error.to_string()))
+}
+
 /// No bytes mean the end of the stream.
 fn received(read: std::io::Result<usize>) -> Result<usize, LinkError> {
     match read {
-        Ok(0) => Err(LinkError::Gone("closed by the other side".into())),
+        Ok(0) => Err(LinkError::Gone(LineTrouble::Closed)),
         Ok(count) => Ok(count),
-        Err(error) => Err(LinkError::Gone(error.to_string())),
+        Err(error) => Err(gone(error)),
     }
 }

@@ -47,7 +47,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
             true => {
                 let session = client::attach(Some(&def.name), &args.plant.login).await?;
                 let request = SessionRequest::Backup { folder: to.display().to_string() };
-                let durability = wait_for(session.request(request)).await.map_err(CliError::Failed)?;
+                let durability = wait_for(session.request(request)).await?;
                 client::warn_not_recorded("backed up", durability);
                 // The station may write where its terminal may not read.
                 Ok(read_manifest(&to).ok().flatten())

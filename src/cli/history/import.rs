@@ -74,7 +74,7 @@ async fn through_station(args: &Args, def: &Arc<PlantDef>, file: &Path) -> Resul
     let name = placed.name();
     let done = wait_for(session.request(SessionRequest::Import { file: name.clone() })).await;
     drop(placed);
-    client::warn_not_recorded("imported", done.map_err(CliError::Failed)?);
+    client::warn_not_recorded("imported", done?);
     let before = overview.map(|overview| overview.imports.len());
     match self::overview(&session).await.map(|overview| overview.imports).zip(before) {
         Some((imports, before)) => match imports[before..].iter().rfind(|import| import.file == name) {

@@ -53,7 +53,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let line = args.port.line()?;
     let def = args.profile.is_some().then(|| followed(&args)).transpose()?;
     in_runtime(async {
-        let tap = Tap::open(&line.transport, args.rts).await.map_err(CliError::Failed)?;
+        let tap = Tap::open(&line.transport, args.rts).await?;
         let capture = args.pcap.as_deref().map(CaptureFile::create).transpose()?;
         say(&format!("listening on {}, nothing is sent; Ctrl-C ends", line.transport));
         let clock = Clock::real();
@@ -111,7 +111,7 @@ impl Session<'_> {
             };
             match heard {
                 Ok(heard) => heard.iter().for_each(|heard| self.on_heard(heard)),
-                Err(why) => break Err(CliError::Failed(why)),
+                Err(why) => break Err(why.into()),
             }
             if !is_read() && self.capture.is_none() {
                 break Ok(());

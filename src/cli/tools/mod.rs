@@ -240,7 +240,7 @@ pub fn run(
     }))?;
     print(&run);
     match &run.state {
-        DiagnosticState::Failed(why) => Err(CliError::Failed(why.clone())),
+        DiagnosticState::Failed(why) => Err(why.clone().into()),
         DiagnosticState::Running | DiagnosticState::Done | DiagnosticState::Cancelled => Ok(run),
     }
 }

@@ -43,7 +43,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         return Err(CliError::Usage("a TCP connection has no such signals: a serial port is needed".to_owned()));
     };
     in_runtime(async {
-        let mut port = SignalPort::open(port, *serial).map_err(CliError::Failed)?;
+        let mut port = SignalPort::open(port, *serial)?;
         if port.read().is_none() {
             let why = "this port has no RTS, DTR, CTS, DSR, DCD and RI: a pseudo-terminal, or a driver without them";
             if args.rts.is_some() || args.dtr.is_some() || args.send_break {

@@ -208,7 +208,11 @@ fn an_id_that_did_not_reach_the_plant_can_be_used_again() {
         role: crate::plant::role::Role::Technician,
         must_change: false,
     });
-    let session = SessionStatus { who, undelivered: vec![(id, "station too busy".into())], ..Default::default() };
+    let session = SessionStatus {
+        who,
+        undelivered: vec![(id, crate::plant::request_refusal::RequestRefusal::StationBusy)],
+        ..Default::default()
+    };
     let answers = requests.on_session(&session, TERMINAL, now(1));
     assert_eq!(answer(&answers[0])["reason"], "station too busy");
     assert_eq!(requests.status().error, None);

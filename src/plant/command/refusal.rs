@@ -8,20 +8,20 @@ use crate::{
         event::{ExceptionCode, Fault},
         exact::Exact,
         parameter_set::Problem,
+        request_refusal::RequestRefusal,
     },
     t,
-    text::said,
 };
 
 /// Why a command was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum Refusal {
     /// The role does not permit it, or no user is logged in.
-    #[error("{}", said(.0))]
-    NotPermitted(String),
+    #[error("{0}")]
+    NotPermitted(RequestRefusal),
     /// The tag requires a password or a second user, which is missing or wrong.
-    #[error("{}", said(.0))]
-    NotReauthenticated(String),
+    #[error("{0}")]
+    NotReauthenticated(RequestRefusal),
     /// The value changed after it was shown; this is the present one.
     #[error("{}", t!("it was changed to {what} after it was shown", what = .0))]
     ChangedTo(String),
@@ -91,8 +91,11 @@ pub enum Refusal {
     #[error("{}", t!("stopped before anything was written"))]
     Stopped,
     /// The settings could not be written into the plant file, or a parameter set into its folder.
-    #[error("{}", t!("not saved: {what}", what = said(.0)))]
+    #[error("{}", t!("not saved: {what}", what = .0))]
     NotSaved(String),
+    /// A parameter set without a value.
+    #[error("{}", t!("not saved: no setting of the device could be read"))]
+    NothingToSave,
     /// No line has this name and place.
     #[error("{}", t!("no such line"))]
     NotALine,

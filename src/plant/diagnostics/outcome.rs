@@ -39,7 +39,7 @@ impl DiagnosticRun {
             DiagnosticState::Done if self.has_passed() => (t!("passed"), self.result(true)),
             DiagnosticState::Done => (t!("failed"), self.result(false)),
             DiagnosticState::Cancelled => (t!("cancelled"), None),
-            DiagnosticState::Failed(why) => (t!("failed"), Some(why.clone())),
+            DiagnosticState::Failed(why) => (t!("failed"), Some(why.to_string())),
         };
         let requests = match self.requests {
             1 => t!("1 request").to_owned(),

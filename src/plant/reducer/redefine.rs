@@ -18,6 +18,7 @@ use crate::plant::{
     counter::CounterWatch,
     def::{DeviceDef, LineDef, LineId, ProcedureId, TagId},
     line::Transport,
+    line_trouble::LineTrouble,
     number::to_u16,
     procedure::{ProcedureEnd, ProcedureRun},
     record::{AlarmRecord, Record},
@@ -78,7 +79,7 @@ impl Plant {
         self.advance_restores(at, &mut effects);
         let rest = self.commands.end_pending(|kind| !goes_on(kind), why, &self.image, at);
         effects.records.extend(rest.into_iter().map(Record::Action));
-        let untested = self.end_tests(|line| !change.keeps_line(line), "the plant file was reloaded");
+        let untested = self.end_tests(|line| !change.keeps_line(line), &LineTrouble::Reloaded);
         effects.records.extend(untested);
         if self.procedure_at_work().is_some_and(|place| !before.keeps_procedure(def, ProcedureId(to_u16(place)))) {
             self.stop_procedures(&mut effects);

@@ -54,8 +54,7 @@ impl Plant {
                     return Some(Outcome::Refused(Refusal::NotSaved(why)));
                 }
                 if set.values.is_empty() {
-                    let why = "no setting of the device could be read".to_owned();
-                    return Some(Outcome::Refused(Refusal::NotSaved(why)));
+                    return Some(Outcome::Refused(Refusal::NothingToSave));
                 }
                 effects.sets =
                     Some(SetWork::Write { command: status.command.id, set: Box::new(set), replace: *replace });

@@ -11,6 +11,7 @@ use crate::{
         def::{LineDef, LineId},
         diagnostics::{DiagnosticRun, DiagnosticState},
         line_check::valid,
+        line_trouble::LineTrouble,
         record::{ActionRecord, Record},
     },
     t,
@@ -82,11 +83,11 @@ impl Plant {
     }
 
     /// Ends the tests of lines that report nothing more.
-    pub(super) fn end_tests(&mut self, is_meant: impl Fn(LineId) -> bool, why: &str) -> Vec<Record> {
+    pub(super) fn end_tests(&mut self, is_meant: impl Fn(LineId) -> bool, why: &LineTrouble) -> Vec<Record> {
         let lines = &self.lines;
         let outcome = |line: LineId, id: CommandId| {
             let run = lines[line.index()].test.as_deref().filter(|run| run.id == id);
-            let ended = run.map(|run| DiagnosticRun { state: DiagnosticState::Failed(why.to_owned()), ..run.clone() });
+            let ended = run.map(|run| DiagnosticRun { state: DiagnosticState::Failed(why.clone()), ..run.clone() });
             ended.map_or_else(|| format!("{}: {why}", t!("failed")), |run| run.outcome_text())
         };
         let ended = self.commands.end_tests(is_meant, outcome, &self.image, self.at);
@@ -246,7 +247,7 @@ mod tests {
     fn a_test_has_an_outcome_of_its_own_once_it_ends() {
         let times = (Duration::from_millis(3), Duration::from_millis(4));
         let back = |back| vec![Finding::Conclusion(Conclusion::Loopback { back, sent: 3, times })];
-        let why = DiagnosticState::Failed("the line was closed".into());
+        let why = DiagnosticState::Failed(LineTrouble::LineClosed);
         for (state, requests, errors, findings, expect) in [
             (DiagnosticState::Done, 4, 0, back(3), "passed: 4 requests, no errors; 3 of 3 came back, 3.0 to 4.0 ms"),
             (DiagnosticState::Done, 4, 1, back(2), "failed: 4 requests, 1 error; 2 of 3 came back, 3.0 to 4.0 ms"),

@@ -276,7 +276,7 @@ fn a_closed_line_raises_no_alarm_an_unplugged_one_does() {
     plant.on_event(Event::Line { at: at(1), line: L1, state: LineState::Disconnected });
     assert_eq!(plant.snapshot().sample(PV).quality, Quality::Bad(Cause::NotConnected));
     assert!(plant.snapshot().alarms.is_empty());
-    let why = "No such file or directory".to_owned();
+    let why = "No such file or directory".into();
     plant.on_event(Event::Line { at: at(2), line: L1, state: LineState::Waiting { why, retry_at: at(3) } });
     assert_eq!(plant.snapshot().alarms.iter().map(|alarm| alarm.id).collect::<Vec<_>>(), [SILENT]);
     assert!(matches!(plant.snapshot().devices[PLC.index()].state, DeviceState::Down { .. }));

@@ -178,7 +178,7 @@ fn begin(
 /// What is wrong with the file of users: it is damaged, or it is missing although the audit log knows of users.
 fn users_fault(access: &AccessControl, log: &Opened) -> Option<FaultState> {
     if let Some(why) = access.is_closed() {
-        return Some(FaultState::Active(why.clone()));
+        return Some(FaultState::Active(why.to_string().into()));
     }
     let no_users = Users::default().digest();
     let had_users = log.users_file.as_ref().is_some_and(|recorded| **recorded != *no_users);

@@ -160,7 +160,7 @@ impl RequestTask {
         let passed_on = self.save().await.map_err(MqttRefusal::NotRecorded).and_then(|()| {
             let command = request.command(&self.session.snapshots.borrow(), self.session.terminal, self.now())?;
             let sent = self.session.send(Request::Command(command, None));
-            sent.map_err(|why| MqttRefusal::NotDelivered(why.to_owned()))
+            sent.map_err(|why| MqttRefusal::NotDelivered(why.to_string()))
         });
         let Err(why) = passed_on else { return };
         let refusal = self.requests.on_not_passed_on(number, why, self.now());

@@ -67,7 +67,7 @@ async fn a_restored_users_file_is_taken_while_the_station_runs() {
     let mut station = start_guarded(options(&history)).unwrap();
     let login = || SessionRequest::Login { user: "eve".into(), password: password.into() };
     let session = station.session("whoever");
-    assert!(session.request(login()).await.is_err_and(|why| why.starts_with("login is disabled: ")));
+    assert!(session.request(login()).await.is_err_and(|why| matches!(why, RequestRefusal::LoginDisabled(_))));
     std::fs::write(&path, &good).unwrap();
     let with = |users| Reloaded { users: Some((None, users)), ..reloaded(fixture::plant()) };
     let restored = users::read(&path).unwrap();

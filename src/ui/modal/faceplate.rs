@@ -1,7 +1,7 @@
 //! What there is to know about an item of the mimic: its tags with value, quality, age, range, alarms and device.
 
 use crate::t;
-use crate::text::{said, translate};
+use crate::text::translate;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -294,6 +294,6 @@ pub fn line_state_text(cx: &ViewContext, line: crate::plant::def::LineId) -> Str
         },
         LineState::Disconnected => t!("disconnected by an operator").to_owned(),
         LineState::Testing => t!("in use by a test").to_owned(),
-        LineState::Waiting { why, .. } => t!("not connected: {why}", why = said(why)),
+        LineState::Waiting { why, .. } => t!("not connected: {why}", why),
     }
 }

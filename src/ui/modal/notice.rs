@@ -1,6 +1,6 @@
 //! Words to be read: why something cannot be done now.
 
-use crate::{t, text::said};
+use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -46,7 +46,7 @@ impl Notice {
             (LineState::Disconnected, _) => t!("Line {line} was disconnected by an operator.", line),
             (LineState::Testing, _) => t!("Line {line} is in use by a test (tab Bus).", line),
             (LineState::NoTraffic, _) => t!("No traffic is heard on line {line}.", line),
-            (LineState::Waiting { why, .. }, _) => t!("Line {line} is not connected: {why}.", line, why = said(why)),
+            (LineState::Waiting { why, .. }, _) => t!("Line {line} is not connected: {why}.", line, why),
             (LineState::Connecting, _) => t!("Line {line} is connecting.", line),
             (LineState::Connected, DeviceState::Down { since }) => {
                 t!("No data received since {clock}.", clock = clock(since, &cx.def().time_zone))

@@ -18,7 +18,7 @@ use crate::{
         SessionRequest,
         session_request::{Secret, UserRow},
     },
-    plant::{number::to_u16, role::Role},
+    plant::{number::to_u16, request_refusal::RequestRefusal, role::Role},
     text::translate,
     ui::{
         UiAction, ViewContext,
@@ -62,7 +62,7 @@ pub struct UserForm {
     /// The number of that request; 0 before it has one.
     number: u32,
     /// Why the last Enter led to nothing, and at which tick that was said.
-    problem: Option<(String, u32)>,
+    problem: Option<(RequestRefusal, u32)>,
     /// The window that waits below, with all that was typed in it.
     below: Option<Box<Modal>>,
 }
@@ -138,7 +138,7 @@ impl UserForm {
                     (self.waiting, self.problem) = (true, None);
                     return Some(request);
                 }
-                Err(problem) => self.problem = Some((problem, cx.phase)),
+                Err(problem) => self.problem = Some((RequestRefusal::Failed(problem), cx.phase)),
             },
             // How long one must wait stays to be read.
             KeyOutcome::Taken if self.wait(cx) == 0 => self.problem = None,
@@ -148,7 +148,7 @@ impl UserForm {
     }
 
     /// The station's answer; `true` if the form has done its work.
-    pub fn answered(&mut self, cx: &ViewContext, answer: Result<(), String>) -> bool {
+    pub fn answered(&mut self, cx: &ViewContext, answer: Result<(), RequestRefusal>) -> bool {
         (self.waiting, self.number) = (false, 0);
         match answer {
             Ok(()) => return true,
@@ -284,20 +284,4 @@ impl UserForm {
 /// A role to choose.
 fn role_field(role: Role) -> Field {
     Field::one_of(t!("role"), &Role::ALL, role, |role| translate(role.word()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::text::seconds;
-
-    #[test]
-    fn a_wait_is_read_out_of_the_words_of_the_station() {
-        let check = |words: &str, expect: Option<u32>| assert_eq!(seconds(words).map(|(_, n)| n), expect, "{words}");
-        check("wrong name or password; wait 8 s", Some(8));
-        check("try again in 300 s.", Some(300));
-        check("at least 15 characters", None);
-        check("in 5 min", None);
-        check("wait 5 seconds", None);
-        check("wait for anna", None);
-    }
 }

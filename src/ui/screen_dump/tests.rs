@@ -97,9 +97,9 @@ fn a_screen_that_is_not_recorded_is_not_saved() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     screen(&mut model, 80, 24);
     let (id, _) = request(&type_keys(&mut model, "P")).expect("a request");
-    let effects = update(&mut model, Msg::RequestDone(id, Err("the station has gone".to_owned())));
+    let effects = update(&mut model, Msg::RequestDone(id, Err(RequestRefusal::StationGone)));
     assert_eq!((saved(&effects), request(&effects)), (None, None));
-    assert!(screen(&mut model, 80, 24).contains("The screen was not saved: the station has gone"));
+    assert!(screen(&mut model, 80, 24).contains("The screen was not saved: station has gone"));
 }
 
 #[test]

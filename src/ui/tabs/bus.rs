@@ -25,7 +25,10 @@ pub use window::Window;
 use super::{line_switch, registers::Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{event::LineState, line_minute::LineMinute, line_report::LineReport, snapshot::LineStatus},
+    plant::{
+        event::LineState, line_minute::LineMinute, line_report::LineReport, request_refusal::RequestRefusal,
+        snapshot::LineStatus,
+    },
     ui::{
         layout::Size,
         widgets::line_trend::{self, line_trend},
@@ -177,7 +180,7 @@ impl TabView for Bus {
         Vec::new()
     }
 
-    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
+    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
         self.frames.on_request_done(answer)
     }
 

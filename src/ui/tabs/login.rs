@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::ui::tabs::prelude::*;
 use crate::{
     access::{SessionRequest, SessionStatus, session_request::Secret},
+    plant::request_refusal::RequestRefusal,
     ui::modal::user_form::{Purpose, UserForm},
 };
 
@@ -53,7 +54,7 @@ impl TabView for Login {
         }
     }
 
-    fn on_request_done(&mut self, cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
+    fn on_request_done(&mut self, cx: &ViewContext, answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
         match &mut self.form {
             Some(form) if form.is_waiting() => {
                 if answer.is_err() {
@@ -68,7 +69,7 @@ impl TabView for Login {
                     self.fit(cx.session);
                 }
             }
-            Some(_) | None => self.outcome = answer.err().map(Err),
+            Some(_) | None => self.outcome = answer.err().map(|why| Err(why.to_string())),
         }
         Vec::new()
     }

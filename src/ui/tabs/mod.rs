@@ -39,7 +39,7 @@ use super::{
 use crate::{
     access::{SessionRequest, audit_log::sha256},
     history::{Answer, HistoryError},
-    plant::{PlantDef, number::to_u32, snapshot::Snapshot},
+    plant::{PlantDef, number::to_u32, request_refusal::RequestRefusal, snapshot::Snapshot},
 };
 
 /// A file that is written once the station has put on record that it is.
@@ -143,7 +143,7 @@ pub trait TabView: Keyed {
     }
 
     /// The station answered the last request of the tab.
-    fn on_request_done(&mut self, _cx: &ViewContext, _answer: Result<(), String>) -> Vec<UiAction> {
+    fn on_request_done(&mut self, _cx: &ViewContext, _answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
         Vec::new()
     }
 

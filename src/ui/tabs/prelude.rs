@@ -29,7 +29,7 @@ pub(super) use crate::{
         time::elapsed,
     },
     t,
-    text::{said, translate},
+    text::translate,
     ui::{
         UiAction, ViewContext,
         keys::{self, Below, Hint, Keys, Offer, char, code},

@@ -23,7 +23,10 @@ use super::Outgoing;
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
-    plant::def::{CsvDialect, Pen},
+    plant::{
+        def::{CsvDialect, Pen},
+        request_refusal::RequestRefusal,
+    },
     report::{self, Period, ReportFormat, ShiftReport},
     ui::{tabs::trends::span::View, widgets::chart},
 };
@@ -165,12 +168,12 @@ impl TabView for Reports {
         self.ask(cx)
     }
 
-    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
+    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
         let Some(outgoing) = self.outgoing.take() else { return Vec::new() };
         match answer {
             Ok(()) => vec![outgoing.write()],
             Err(why) => {
-                self.export = Export::Failed(why);
+                self.export = Export::Failed(why.to_string());
                 Vec::new()
             }
         }

@@ -45,6 +45,7 @@ use crate::{
     plant::{
         def::{Pen, TrendGroup},
         record::AlarmRecord,
+        request_refusal::RequestRefusal,
     },
     ui::{
         graphics::Picture,
@@ -216,7 +217,7 @@ impl TabView for Trends {
         view::draw(self, cx, frame, area);
     }
 
-    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), String>) -> Vec<UiAction> {
+    fn on_request_done(&mut self, _cx: &ViewContext, answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
         self.recorded(answer)
     }
 

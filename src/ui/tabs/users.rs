@@ -220,7 +220,7 @@ fn sessions(cx: &ViewContext, canvas: &mut Canvas) {
             terminal = format!("{:>4}", row.terminal),
             pad = pad(&fit(user, 15), 16),
             clock = clock(row.since, &cx.def().time_zone),
-            from = said(&row.from),
+            from = if &*row.from == "this process" { t!("this process") } else { &row.from },
             locked
         );
         canvas.text(0, to_u16(y) + 1, &fit(&text, width), theme.normal());

@@ -19,6 +19,7 @@ use crate::{
         def::{AlarmId, Priority},
         event::{Fault, LineState},
         record::{ActionRecord, AlarmEvent, AlarmRecord},
+        request_refusal::RequestRefusal,
         sample::{Cause, Sample},
         snapshot::DeviceState,
     },
@@ -324,7 +325,7 @@ fn a_command_that_was_never_sent_is_reported() {
     let mut model = model(&Fixture::normal(), Theme::FULL);
     let effects = type_keys(&mut model, "s60⏎");
     let Some(Effect::Command(Command { id, .. }, _)) = effects.first() else { panic!("{effects:?}") };
-    update(&mut model, Msg::Undelivered(*id, "station too busy"));
+    update(&mut model, Msg::Undelivered(*id, RequestRefusal::StationBusy));
     assert!(screen(&mut model, 80, 24).contains("NOT SENT: station too busy"));
 }
 
@@ -334,10 +335,10 @@ fn a_command_that_the_plant_did_not_take_is_reported() {
     let effects = type_keys(&mut model, "s60⏎");
     let Some(Effect::Command(Command { id, .. }, _)) = effects.first() else { panic!("{effects:?}") };
     let mut session = SessionStatus::clone(&model.session);
-    session.undelivered = vec![(CommandId { number: id.number + 1, ..*id }, "too many commands".into())];
+    session.undelivered = vec![(CommandId { number: id.number + 1, ..*id }, RequestRefusal::TooManyRequests)];
     update(&mut model, Msg::SessionStatus(session.clone().into()));
     assert!(screen(&mut model, 80, 24).contains("sent …"));
-    session.undelivered.push((*id, "station too busy".into()));
+    session.undelivered.push((*id, RequestRefusal::StationBusy));
     update(&mut model, Msg::SessionStatus(session.into()));
     assert!(screen(&mut model, 80, 24).contains("NOT SENT: station too busy"));
 }

@@ -230,7 +230,7 @@ fn no_alarms_is_not_said_where_they_are_not_shown() {
     check(LineState::Connected, "no alarms");
     check(LineState::Disconnected, "alarms not evaluated: L1 disconnected");
     check(LineState::Connecting, "alarms not evaluated: L1 not connected");
-    let waiting = LineState::Waiting { why: "No such file".to_owned(), retry_at: fixture::now() };
+    let waiting = LineState::Waiting { why: "No such file".into(), retry_at: fixture::now() };
     check(waiting, "alarms not evaluated: L1 not connected");
     let mut model = model(&Fixture::normal(), Theme::FULL);
     update(&mut model, Msg::Tick { silent: Duration::from_secs(7) });

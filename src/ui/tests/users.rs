@@ -19,6 +19,7 @@ use crate::{
     plant::{
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
         record::{ActionRecord, ChainHash},
+        request_refusal::RequestRefusal,
         role::{Reauthentication, Role},
         sample::Quality,
     },
@@ -69,9 +70,9 @@ fn sent_request(effects: &[Effect]) -> Option<&SessionRequest> {
     })
 }
 
-fn answer(model: &mut Model, answer: Result<(), &str>) {
+fn answer(model: &mut Model, answer: Result<(), RequestRefusal>) {
     let id = QueryId { tab: Some(Tab::Login), number: model.session_lock.last_request };
-    update(model, Msg::RequestDone(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
+    update(model, Msg::RequestDone(id, answer.map(|()| Durability::Recorded)));
 }
 
 fn shows(model: &mut Model, words: &str) {
@@ -122,7 +123,7 @@ fn a_password_is_never_shown_and_a_wrong_one_has_a_wait() {
     shows(&mut model, "waiting for the station");
     assert_eq!(type_keys(&mut model, "⏎⏎"), [], "while the answer is awaited");
     assert!(!screen(&mut model, 80, 24).contains("horse") && !format!("{model:?}").contains("horse"));
-    answer(&mut model, Err("wrong name or password; wait 8 s"));
+    answer(&mut model, Err(RequestRefusal::WrongPassword { wait: 8 }));
     shows(&mut model, "wait 8 s");
     for _ in 0..6 {
         update(&mut model, Msg::Tick { silent: Duration::ZERO });
@@ -152,8 +153,8 @@ fn work_waits_while_the_terminal_is_locked() {
     assert_eq!(sent_kind(&type_keys(&mut model, "⏎⎋3a")), None);
     insta::assert_snapshot!("locked_80x24", screen(&mut model, 80, 24));
     assert_eq!(sent_request(&type_keys(&mut model, "horse⏎")), Some(&SessionRequest::Unlock("horse".into())));
-    answer(&mut model, Err("wrong password; wait 2 s"));
-    shows(&mut model, "wrong password; wait 2 s");
+    answer(&mut model, Err(RequestRefusal::WrongPassword { wait: 2 }));
+    shows(&mut model, "wrong name or password; wait 2 s");
     change_session(&mut model, |session| session.locked = false);
     assert_eq!(model.tabs.shown, Tab::Mimic);
     shows(&mut model, "new 65");
@@ -298,8 +299,8 @@ fn the_users_and_what_can_be_done_with_them() {
         let effects = type_keys(&mut model, keys);
         assert_eq!(sent_request(&effects), Some(&expect), "{keys}");
         let id = QueryId { tab: Some(Tab::Users), number: model.session_lock.last_request };
-        update(&mut model, Msg::RequestDone(id, Err("at least one Supervisor must remain".to_owned())));
-        shows(&mut model, "at least one Supervisor must remain");
+        update(&mut model, Msg::RequestDone(id, Err(RequestRefusal::LastSupervisor)));
+        shows(&mut model, "at least one enabled supervisor");
         update(&mut model, Msg::RequestDone(id, Ok(Durability::Recorded)));
     };
     let user = "boris".to_owned();

@@ -66,7 +66,7 @@ async fn a_command_of_another_terminal_or_unknown_tag_is_rejected() {
                 break why;
             }
         };
-        assert!(why.contains(expected), "{why}");
+        assert!(why.to_string().contains(expected), "{why}");
     }
     assert_eq!(*stand.asked.borrow(), 0);
 }

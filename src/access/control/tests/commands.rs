@@ -41,7 +41,7 @@ fn a_command_over_the_rate_limit_is_reported_to_its_terminal() {
     let reply = bench.undelivered(1);
     assert_eq!((reached, reply.len()), (19, 41));
     assert_eq!(reply[0], (20, "log in first".to_owned()));
-    assert_eq!(reply[40], (60, TOO_MANY.to_owned()));
+    assert_eq!(reply[40], (60, RequestRefusal::TooManyRequests.to_string()));
     for _ in 0..1_000 {
         bench.send_command(1, RUN, None);
     }
@@ -75,18 +75,21 @@ fn a_tag_with_second_user_is_written_only_with_one() {
     let credentials = |user: Option<&str>, password: &str| {
         Some(Credentials { user: user.map(str::to_owned), password: password.into() })
     };
-    let wrong = "wrong name or password; wait 1 s";
+    let wrong = RequestRefusal::WrongPassword { wait: 1 };
     let refused = [
-        (None, "this tag requires a second user"),
-        (credentials(None, TECH), "this tag requires a second user"),
-        (credentials(Some("Tech"), TECH), "the second user must be another user"),
-        (credentials(Some("view"), VIEW), "view cannot approve this: it is for a technician"),
-        (credentials(Some("boss"), "guess"), wrong),
-        (credentials(Some("nobody"), BOSS), "wrong name or password; wait 1 s"),
+        (None, RequestRefusal::SecondUser),
+        (credentials(None, TECH), RequestRefusal::SecondUser),
+        (credentials(Some("Tech"), TECH), RequestRefusal::SecondUserIsFirst),
+        (
+            credentials(Some("view"), VIEW),
+            RequestRefusal::ApproverRole { name: "view".into(), needed: Role::Technician },
+        ),
+        (credentials(Some("boss"), "guess"), wrong.clone()),
+        (credentials(Some("nobody"), BOSS), wrong),
     ];
     for (credentials, why) in refused {
         let (_, refused) = bench.send_command(1, SV, credentials).unwrap();
-        assert_eq!(refused, Some(Refusal::NotReauthenticated(why.into())));
+        assert_eq!(refused, Some(Refusal::NotReauthenticated(why)));
         bench.later(2);
     }
     let (command, refused) = bench.send_command(1, SV, credentials(Some("BOSS"), BOSS)).unwrap();
@@ -102,8 +105,8 @@ fn a_trusted_account_is_refused_where_a_password_is_needed() {
     bench.access.def = Arc::new(def);
     bench.open(1, "10.0.0.1");
     let (_, refused) = bench.send_command(1, RUN, Some(Credentials { user: None, password: TECH.into() })).unwrap();
-    let why = "this tag requires a password, and your account has none";
-    assert_eq!(refused, Some(Refusal::NotReauthenticated(why.into())));
+    let why = RequestRefusal::AccountWithoutPassword;
+    assert_eq!(refused, Some(Refusal::NotReauthenticated(why)));
 }
 
 #[test]
@@ -116,7 +119,8 @@ fn the_station_refuses_a_setting_that_needs_a_supervisor() {
         bench.open(1, "10.0.0.1");
         bench.login(1, user, password).unwrap();
         let why = bench.send_command(1, RUN, None).unwrap().1;
-        let not_permitted = Refusal::NotPermitted("this is for a supervisor, you are technician".into());
+        let not_permitted =
+            Refusal::NotPermitted(RequestRefusal::Role { needed: Role::Supervisor, role: Role::Technician });
         assert_eq!(why, refused.then_some(not_permitted), "{user}");
         bench.access.close(1, bench.now);
     }

@@ -1,7 +1,7 @@
 //! Wrong passwords: who is delayed and locked out, and who never is.
 
 use super::*;
-use crate::access::control::jobs::{BUSY, JOBS_MAX, JOBS_OF_USER_MAX, WRONG};
+use crate::access::control::jobs::{JOBS_MAX, JOBS_OF_USER_MAX};
 
 impl Bench {
     /// A terminal of this user of the operating system.
@@ -12,7 +12,7 @@ impl Bench {
     }
 
     /// The answer to a login, if there is one yet.
-    fn answer(&mut self, terminal: u32, ticket: u64, user: &str, password: &str) -> Option<Result<(), String>> {
+    fn answer(&mut self, terminal: u32, ticket: u64, user: &str, password: &str) -> Option<Result<(), RequestRefusal>> {
         let request = SessionRequest::Login { user: user.into(), password: password.into() };
         let effects = self.access.on_request(terminal, ticket, request, self.now);
         let effects = self.work(effects);
@@ -20,7 +20,7 @@ impl Bench {
     }
 }
 
-fn answer_in(effects: &[Effect], ticket: u64) -> Option<Result<(), String>> {
+fn answer_in(effects: &[Effect], ticket: u64) -> Option<Result<(), RequestRefusal>> {
     effects.iter().find_map(|effect| match effect {
         Effect::Reply(to, answer) if *to == ticket => Some(answer.clone()),
         _ => None,
@@ -88,7 +88,7 @@ fn too_many_logins_at_once_are_refused_as_busy() {
         }
     }
     assert_eq!(reply.len(), 80 - JOBS_OF_USER_MAX);
-    assert!(reply.iter().all(|answer| *answer == Err(BUSY.to_owned())), "{reply:?}");
+    assert!(reply.iter().all(|answer| *answer == Err(RequestRefusal::BusyWithLogins)), "{reply:?}");
     assert!(bench.access.jobs.len() + bench.access.waiting.len() <= JOBS_MAX);
     // The others are not touched.
     bench.open_as(30, "panel");
@@ -102,7 +102,7 @@ fn one_system_user_who_guesses_at_all_names_is_stopped() {
     let mut checked = 0;
     for name in 0..200 {
         let reply = bench.login(1, &format!("name{name}"), "guess").unwrap_err();
-        checked += usize::from(reply.starts_with(WRONG));
+        checked += usize::from(reply.starts_with("wrong name or password"));
         bench.later(1);
     }
     assert_eq!(checked, 40);

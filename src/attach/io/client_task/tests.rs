@@ -57,22 +57,22 @@ async fn an_undelivered_command_is_in_the_session_status() {
         let id = CommandId { terminal: 3, number };
         Request::Command(Command::new(1, id, CommandKind::TakeOver), None)
     };
-    let check = |expect: &[(u32, &str)]| {
+    let check = |expect: &[(u32, &RequestRefusal)]| {
         let seen = status.borrow().undelivered.clone();
-        let seen: Vec<_> = seen.iter().map(|(id, why)| (id.terminal, id.number, &**why)).collect();
+        let seen: Vec<_> = seen.iter().map(|(id, why)| (id.terminal, id.number, why)).collect();
         let expect: Vec<_> = expect.iter().map(|(number, why)| (3, *number, *why)).collect();
         assert_eq!(seen, expect);
         assert_eq!(snapshots.borrow().commands, [], "the plant has not seen it");
     };
     (1..=3).for_each(|number| task.send(command(number), &out));
-    let (at_station, why) = (|number| CommandId { terminal: 5, number }, "too many commands");
-    task.on_message(ServerMessage::Undelivered { id: at_station(1), why: why.to_owned() }).unwrap();
-    check(&[(1, why)]);
-    let undelivered = vec![(at_station(2), Arc::from("too late"))];
+    let (at_station, why) = (|number| CommandId { terminal: 5, number }, RequestRefusal::TooManyRequests);
+    task.on_message(ServerMessage::Undelivered { id: at_station(1), why: why.clone() }).unwrap();
+    check(&[(1, &why)]);
+    let undelivered = vec![(at_station(2), RequestRefusal::OtherRun)];
     let session = SessionStatus { undelivered, ..SessionStatus::default() };
     task.on_message(ServerMessage::SessionStatus(Box::new(session))).unwrap();
-    check(&[(1, why), (2, "too late")]);
+    check(&[(1, &why), (2, &RequestRefusal::OtherRun)]);
     task.on_message(ServerMessage::SessionStatus(Box::default())).unwrap();
     task.refuse(command(4));
-    check(&[(1, why), (2, "too late"), (4, GONE)]);
+    check(&[(1, &why), (2, &RequestRefusal::OtherRun), (4, &RequestRefusal::StationGone)]);
 }

@@ -18,7 +18,7 @@ use under_way::{Owner, SHORT_WAIT, Transaction};
 use super::{FrameFault, FrameResult, Link, LinkError};
 use crate::{
     bus::frame,
-    plant::{def::Framing, event::Fault, traffic::Exchange},
+    plant::{def::Framing, event::Fault, line_trouble::LineTrouble, traffic::Exchange},
 };
 
 /// This many bytes that are no frame are shown.
@@ -86,7 +86,7 @@ impl Link {
         }
         let bytes = std::mem::take(&mut self.transactions.outbox);
         if std::mem::replace(&mut self.transactions.sending, true) {
-            return Err(LinkError::Gone("a request was incomplete, the stream is out of sync".into()));
+            return Err(LinkError::Gone(LineTrouble::RequestIncomplete));
         }
         let sent_at = self.wire.put(&bytes).await?;
         self.transactions.sending = false;
@@ -192,7 +192,7 @@ impl Link {
         if !expired.is_empty() && self.transactions.is_cut_short() {
             self.wire.record(false, self.transactions.inbox[..].into(), FrameResult::Wrong(FrameFault::CutShort));
             // The rest may come later and would stand before the next header.
-            return Err(LinkError::Gone("a response was incomplete, the stream is out of sync".into()));
+            return Err(LinkError::Gone(LineTrouble::ResponseIncomplete));
         }
         for request in expired {
             let fault = request.fault;
@@ -212,9 +212,9 @@ impl Link {
         let (mut bytes, now) = (std::mem::take(&mut self.transactions.inbox), Instant::now());
         let (frames, end) = self.transactions.cut(&bytes, self.in_datagrams, now);
         if frame::is_out_of_sync(&bytes[end..]) {
-            let words = no_frame(&bytes[end..]);
+            let why = no_frame(&bytes[end..]);
             self.wire.record(false, bytes.into(), FrameResult::Wrong(FrameFault::NoHeader));
-            return if self.in_datagrams { Ok(()) } else { Err(LinkError::Gone(words)) };
+            return if self.in_datagrams { Ok(()) } else { Err(LinkError::Gone(why)) };
         }
         for (transaction, range) in frames {
             let frame = &bytes[range];
@@ -281,11 +281,11 @@ impl Link {
 }
 
 /// What came that is no frame, as text where it is text.
-fn no_frame(bytes: &[u8]) -> String {
+fn no_frame(bytes: &[u8]) -> LineTrouble {
     let shown = &bytes[..bytes.len().min(SHOWN_MAX)];
     let is_text = shown.iter().all(|byte| byte.is_ascii_graphic() || byte.is_ascii_whitespace());
     let words = if is_text { format!("text `{}`", String::from_utf8_lossy(shown).trim()) } else { frame::hex(shown) };
-    format!("bytes came that are no Modbus TCP frame: {words}")
+    LineTrouble::NoFrame(words)
 }
 
 #[cfg(test)]

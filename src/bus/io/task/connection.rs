@@ -7,7 +7,7 @@ use crate::{
         io::{link::Link, transport::Opened},
         schedule::{Patience, Schedule},
     },
-    plant::event::LineState,
+    plant::{event::LineState, line_trouble::LineTrouble},
 };
 
 impl Task<'_> {
@@ -57,14 +57,14 @@ impl Task<'_> {
                     self.unless_redefined(tested, &mut schedule).await?;
                 }
                 LinkExit::Closed => {
-                    self.end_diagnostic("the line was closed").await?;
+                    self.end_diagnostic(LineTrouble::LineClosed).await?;
                     self.publish_state(LineState::Disconnected).await?;
                     self.publish_report(None).await?;
                     self.wait(None, &mut schedule).await?;
                 }
                 LinkExit::PortFailed(why) | LinkExit::Gone(why) => {
-                    self.end_diagnostic(&why).await?;
-                    tracing::warn!(line = self.settings.name, why, "not connected");
+                    self.end_diagnostic(why.clone()).await?;
+                    tracing::warn!(line = self.settings.name, %why, "not connected");
                     let retry_at = self.clock.now() + backoff.fail();
                     self.publish_state(LineState::Waiting { why, retry_at }).await?;
                     self.publish_report(None).await?;
@@ -78,9 +78,9 @@ impl Task<'_> {
     async fn ended(&mut self, schedule: &mut Schedule, answers: u64, exit: LinkExit) -> Result<LinkExit, LinkExit> {
         let exit = match exit {
             LinkExit::Gone(why) if self.settings.transport.has_connection() => {
-                tracing::debug!(line = self.settings.name, why, answers, "the connection has ended");
+                tracing::debug!(line = self.settings.name, %why, answers, "the connection has ended");
                 if self.on_hangup(schedule, answers).await? {
-                    self.end_diagnostic(&why).await?;
+                    self.end_diagnostic(why.clone()).await?;
                     LinkExit::UsedUp
                 } else {
                     LinkExit::PortFailed(why)

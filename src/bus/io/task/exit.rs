@@ -1,16 +1,16 @@
 //! Why the task of a line leaves its port.
 
 use super::Interrupt;
-use crate::bus::io::link::LinkError;
+use crate::{bus::io::link::LinkError, plant::line_trouble::LineTrouble};
 
 /// Why a port is left.
 pub(super) enum LinkExit {
     /// An operator closed the line.
     Closed,
     /// The port or connection failed.
-    PortFailed(String),
-    /// It was closed, or sent what is no Modbus, in the words of the system.
-    Gone(String),
+    PortFailed(LineTrouble),
+    /// It was closed, or sent what is no Modbus.
+    Gone(LineTrouble),
     /// The other side allows no more on one connection: the next is opened for what is due next.
     UsedUp,
     /// It is opened again at once, with other settings.
@@ -37,7 +37,7 @@ impl From<LinkError> for LinkExit {
     fn from(error: LinkError) -> LinkExit {
         match error {
             LinkError::Gone(why) => LinkExit::Gone(why),
-            LinkError::Fault(fault) => LinkExit::PortFailed(fault.to_string()),
+            LinkError::Fault(fault) => LinkExit::PortFailed(LineTrouble::Fault(fault)),
         }
     }
 }

@@ -16,6 +16,7 @@ use crate::{
     plant::{
         def::Framing,
         event::{Event, Fault, FaultKind},
+        line_trouble::LineTrouble,
         time::elapsed,
         traffic::Exchange,
     },
@@ -102,7 +103,7 @@ impl Task<'_> {
             return Ok(());
         }
         self.unheard += u32::from(link.answers() == 0);
-        Err(LinkExit::PortFailed(format!("no answer to {} requests over this connection", link.unanswered)))
+        Err(LinkExit::PortFailed(LineTrouble::Unanswered(link.unanswered)))
     }
 
     pub(super) fn keep_gap(link: &Link, schedule: &mut Schedule, block: &Block, ended: Timestamp) {

@@ -11,6 +11,7 @@ use crate::{
     plant::{
         event::{Fault, WriteResult},
         exact::Exact,
+        line_trouble::LineTrouble,
         tag::TagDef,
     },
 };
@@ -23,7 +24,7 @@ impl Task<'_> {
         link: &mut Link,
         tag: &TagDef,
         raw: Exact,
-    ) -> Result<Result<Pdu, WriteResult>, String> {
+    ) -> Result<Result<Pdu, WriteResult>, LineTrouble> {
         let def = self.def.clone();
         let block = plan::single(def.device(tag.device), tag);
         let held = match self.read_unless_stopped(link, &block, None).await {

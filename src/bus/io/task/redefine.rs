@@ -11,7 +11,7 @@ use crate::{
         plan::{self, Block},
         schedule::Schedule,
     },
-    plant::{def::DeviceDef, redefinition::Renamed},
+    plant::{def::DeviceDef, line_trouble::LineTrouble, redefinition::Renamed},
 };
 
 impl Task<'_> {
@@ -37,7 +37,7 @@ impl Task<'_> {
             link.wait_for_answer().await?;
             self.receive_replies(link, schedule).await?;
         }
-        self.end_diagnostic("the plant file was reloaded").await?;
+        self.end_diagnostic(LineTrouble::Reloaded).await?;
         let Some(Redefine { paused, next }) = self.requests.take_redefine() else { return Ok(()) };
         // A reload that was given up meanwhile says so below.
         let _ = paused.send(());

@@ -20,6 +20,7 @@ use crate::{
         def::{DeviceDef, Framing},
         diagnostics::{Diagnostic, DiagnosticState},
         event::{Event, Fault, WriteResult},
+        line_trouble::LineTrouble,
         time::elapsed,
     },
 };
@@ -122,7 +123,7 @@ impl Task<'_> {
                 None => match self.connector.open_as(&wanted.transport).await {
                     Ok(opened) => Link::new(opened, &wanted, self.clock, self.memory.clone()),
                     Err(why) => {
-                        self.end_diagnostic(&why).await?;
+                        self.end_diagnostic(why).await?;
                         break;
                     }
                 },
@@ -134,7 +135,7 @@ impl Task<'_> {
             match (result, &mut self.job) {
                 (Ok(result), Some(job)) => job.on_result(result),
                 (Err(LinkError::Gone(why)), _) => {
-                    self.end_diagnostic(&why).await?;
+                    self.end_diagnostic(why).await?;
                     break;
                 }
                 (Ok(_), None) | (Err(LinkError::Fault(_)), _) => {}
@@ -158,7 +159,7 @@ impl Task<'_> {
                 Ok(true)
             }
             BusRequest::Write(WriteJob { urgent: true, .. }) => {
-                self.end_diagnostic("cancelled by an urgent stop").await?;
+                self.end_diagnostic(LineTrouble::UrgentStop).await?;
                 self.requests.requeue_first(request);
                 Ok(false)
             }
@@ -183,9 +184,9 @@ impl Task<'_> {
     }
 
     /// The line cannot go on with the running diagnostic.
-    pub(super) async fn end_diagnostic(&mut self, why: &str) -> Result<(), LinkExit> {
+    pub(super) async fn end_diagnostic(&mut self, why: LineTrouble) -> Result<(), LinkExit> {
         if let Some(job) = &mut self.job {
-            job.stop(DiagnosticState::Failed(why.to_owned()));
+            job.stop(DiagnosticState::Failed(why));
         }
         self.publish_diagnostic().await
     }

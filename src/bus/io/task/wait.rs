@@ -8,6 +8,7 @@ use crate::{
     plant::{
         command::BusRequest,
         event::{Fault, LineState, WriteResult},
+        line_trouble::LineTrouble,
     },
 };
 
@@ -64,7 +65,7 @@ impl Task<'_> {
                         self.publish_state(LineState::Disconnected).await?;
                         continue;
                     }
-                    self.end_diagnostic("the line is not connected").await?;
+                    self.end_diagnostic(LineTrouble::NotConnected).await?;
                 }
             }
         }

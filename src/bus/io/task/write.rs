@@ -14,6 +14,7 @@ use crate::{
         def::{ActionDef, DeviceDef},
         event::{Event, Fault, WriteResult},
         exact::Exact,
+        line_trouble::LineTrouble,
         scale,
         tag::{Table, TagDef},
     },
@@ -24,7 +25,7 @@ enum WriteEnd {
     /// It ended, well or not.
     Ended(WriteResult),
     /// The port closed; the result to report, and why it closed.
-    PortClosed(WriteResult, String),
+    PortClosed(WriteResult, LineTrouble),
 }
 
 /// What became of the unlock register that a write needs.
@@ -167,7 +168,7 @@ impl Task<'_> {
         tag: &TagDef,
         raw: Exact,
         urgent: bool,
-    ) -> Result<WriteResult, String> {
+    ) -> Result<WriteResult, LineTrouble> {
         let def = self.def.clone();
         let device = def.device(tag.device);
         // A stop is sent in any case: a silent device may still receive it.
@@ -206,7 +207,7 @@ impl Task<'_> {
         link: &mut Link,
         tag: &TagDef,
         raw: Exact,
-    ) -> Result<Result<Pdu, WriteResult>, String> {
+    ) -> Result<Result<Pdu, WriteResult>, LineTrouble> {
         if tag.read_modify_write {
             return self.modified(link, tag, raw).await;
         }
@@ -253,7 +254,7 @@ impl Task<'_> {
 
     /// An exception names no address: only from a unit without outstanding replies is it certainly the response to this
     /// write. `Err`: the port closed.
-    async fn has_no_outstanding_reply(&mut self, link: &mut Link, device: &DeviceDef) -> Result<bool, String> {
+    async fn has_no_outstanding_reply(&mut self, link: &mut Link, device: &DeviceDef) -> Result<bool, LineTrouble> {
         if is_clear(link, device) {
             return Ok(true);
         }

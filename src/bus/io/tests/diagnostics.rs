@@ -13,6 +13,7 @@ use crate::plant::{
     def::{Serial, TagId},
     diagnostics::{Diagnostic, DiagnosticState, Finding, Scan},
     event::{Event, LineState, WriteResult},
+    line_trouble::LineTrouble,
     port_signals::{OutputSignal, SignalTest},
 };
 
@@ -55,7 +56,7 @@ async fn a_signal_test_without_signals_fails_and_polls_go_on() {
             _ => None,
         })
         .await;
-    assert!(why.starts_with("this port has no RTS and DTR"), "{why}");
+    assert_eq!(why, LineTrouble::NoSignals);
     line.read(&def).await;
 }
 
@@ -86,8 +87,8 @@ async fn nonsense_is_sent_and_nonsense_is_reported() {
         match mode {
             // The poll before it was answered by nonsense too: the stream is out of sync, and the test with it.
             Mode::Tcp => {
-                let words = "bytes came that are no Modbus TCP frame: 55 01 02 03 AA 00 09";
-                assert_eq!(run.state, DiagnosticState::Failed(words.into()))
+                let bytes = "55 01 02 03 AA 00 09".to_owned();
+                assert_eq!(run.state, DiagnosticState::Failed(LineTrouble::NoFrame(bytes)))
             }
             _ => assert!(run.findings.iter().any(is_byte), "{mode:?}: {run:?}"),
         }
@@ -134,7 +135,7 @@ async fn a_stop_cuts_a_scan_short_and_goes_out_at_once() {
         let (after, result, state) = stop_during_scan(serials).await;
         assert_eq!(result, WriteResult::ReadBack(10.0.into()), "{words}");
         assert!(after < 200 * MS, "{words}: after {after:?}");
-        assert_eq!(state, DiagnosticState::Failed("cancelled by an urgent stop".into()), "{words}");
+        assert_eq!(state, DiagnosticState::Failed(LineTrouble::UrgentStop), "{words}");
     }
 }
 

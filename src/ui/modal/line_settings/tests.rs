@@ -123,7 +123,7 @@ fn settings_can_be_taken_back_and_saved() {
 #[test]
 fn what_is_asked_can_be_read_on_the_smallest_screen() {
     let mut fixture = tried_out();
-    let why = "/dev/ttyUSB7: no such port; here are /dev/ttyUSB0, /dev/ttyS0, /dev/ttyS1, /dev/ttyS2".to_owned();
+    let why = "/dev/ttyUSB7: no such port; here are /dev/ttyUSB0, /dev/ttyS0, /dev/ttyS1, /dev/ttyS2".into();
     fixture.line.state = LineState::Waiting { why, retry_at: crate::ui::fixture::now() };
     for (width, height) in [(60, 16), (80, 24)] {
         let mut model = open(&fixture);
@@ -141,7 +141,7 @@ fn what_is_asked_can_be_read_on_the_smallest_screen() {
 #[test]
 fn the_form_as_it_is_seen() {
     let mut gone = tried_out();
-    let why = "/dev/ttyUSB7: no such port; here are /dev/ttyUSB0, /dev/ttyS0".to_owned();
+    let why = "/dev/ttyUSB7: no such port; here are /dev/ttyUSB0, /dev/ttyS0".into();
     gone.line.state = LineState::Waiting { why, retry_at: crate::ui::fixture::now() };
     for (name, fixture, keys) in [
         ("at_first", Fixture::normal(), ""),

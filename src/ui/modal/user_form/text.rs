@@ -92,38 +92,21 @@ impl UserForm {
     }
 
     /// Seconds that one must still wait, as the station has said.
-    pub(super) fn wait(&self, cx: &ViewContext) -> u32 {
-        let notes = self.problem.as_ref().and_then(|(words, at)| Some((seconds(words)?.1, *at)));
-        notes.map_or(0, |(wait, at)| wait.saturating_sub(cx.phase.wrapping_sub(at) / 2))
+    pub(super) fn wait(&self, cx: &ViewContext) -> u64 {
+        let left = |(refusal, at): &(RequestRefusal, u32)| {
+            refusal.wait().saturating_sub(u64::from(cx.phase.wrapping_sub(*at) / 2))
+        };
+        self.problem.as_ref().map_or(0, left)
     }
 
     pub(super) fn problem_text(&self, cx: &ViewContext) -> Option<String> {
         if self.waiting {
             return Some(t!("waiting for the station …").to_owned());
         }
-        let (words, _) = self.problem.as_ref()?;
-        Some(match (seconds(words), self.wait(cx)) {
-            (None, _) => words.clone(),
-            (Some(_), 0) => t!("{next}; try again now", next = words.split(';').next().unwrap_or_default()),
-            (Some((place, _)), left) => {
-                let rest = words[place..].find(" s").map_or("", |end| &words[place + end + 2..]);
-                let start = words[..place].trim_end_matches([' ', ';', ',']);
-                t!("{start}; wait {left} s{rest}", start, left, rest)
-            }
-        })
+        let (refusal, _) = self.problem.as_ref()?;
+        let left = self.wait(cx);
+        let now = refusal.with_wait(left);
+        let is_over = left == 0 && refusal.wait() > 0;
+        Some(if is_over { t!("{next}; try again now", next = now) } else { now.to_string() })
     }
-}
-
-/// Where the station's words tell a wait in seconds (`wait 8 s`, `in 8 s`), and how many.
-pub(super) fn seconds(words: &str) -> Option<(usize, u32)> {
-    [t!("wait "), t!("in ")].iter().find_map(|lead| {
-        words.match_indices(lead).find_map(|(place, _)| {
-            let rest = &words[place + lead.len()..];
-            let digits = rest.len() - rest.trim_start_matches(|c: char| c.is_ascii_digit()).len();
-            let after = &rest[digits..];
-            let unit = after.strip_prefix(" s")?;
-            let ends = !unit.starts_with(|c: char| c.is_alphanumeric());
-            (ends && digits > 0).then(|| rest[..digits].parse().ok()).flatten().map(|n| (place, n))
-        })
-    })
 }

@@ -11,6 +11,7 @@ use crate::{
     bus::{capture, dissect, filter::Filter, frame::hex},
     plant::{
         def::Framing,
+        request_refusal::RequestRefusal,
         traffic::{Frame, Frames},
     },
     text::file,
@@ -137,10 +138,10 @@ impl Ring {
     }
 
     /// The station has put a file on record, which is then written, and the next one is asked for; or it refuses.
-    pub fn on_request_done(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
+    pub fn on_request_done(&mut self, answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
         if let Err(why) = answer {
             self.outgoing.clear();
-            self.saved.push(Err(why));
+            self.saved.push(Err(why.to_string()));
             return Vec::new();
         }
         let written = self.outgoing.pop_front().map(Outgoing::write);

@@ -75,12 +75,7 @@ pub fn state_text(cx: &ViewContext, at: &LineView) -> String {
         LineState::Waiting { why, retry_at } => {
             let lost =
                 at.status.lost_since.map_or(String::new(), |lost| format!(" {}", running(elapsed(lost, cx.now))));
-            t!(
-                "DOWN{lost}, next try in {between}s: {why}",
-                lost,
-                between = elapsed(cx.now, *retry_at).as_secs(),
-                why = said(why)
-            )
+            t!("DOWN{lost}, next try in {between}s: {why}", lost, between = elapsed(cx.now, *retry_at).as_secs(), why)
         }
         LineState::Disconnected => t!("DISCONNECTED by an operator{since}", since),
         LineState::Testing => t!("TEST{since}, polling stopped", since),

@@ -130,7 +130,7 @@ fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
     };
     let mut rows = vec![vec![(t!("{at} {what} by {by}   ", at, what, by = run.by), theme.normal()), (state, style)]];
     if let DiagnosticState::Failed(why) = &run.state {
-        rows.extend(wrap(&said(why), room).into_iter().map(|line| plain(line, theme.trouble())));
+        rows.extend(wrap(&why.to_string(), room).into_iter().map(|line| plain(line, theme.trouble())));
     }
     if run.state == DiagnosticState::Running && 1 < run.total {
         let share = f64::from(run.done) / f64::from(run.total);

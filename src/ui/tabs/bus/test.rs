@@ -203,7 +203,7 @@ pub fn closed(at: &LineView) -> Option<String> {
     match &at.status.state {
         LineState::Connected | LineState::Testing | LineState::NoTraffic => None,
         LineState::Connecting => Some(t!("line {name} is connecting: nothing can be sent yet", name)),
-        LineState::Waiting { why, .. } => Some(t!("line {name} is not connected: {why}", name, why = said(why))),
+        LineState::Waiting { why, .. } => Some(t!("line {name} is not connected: {why}", name, why)),
         LineState::Disconnected => Some(t!("line {name} is disconnected: connect it first (page Line, D)", name)),
     }
 }

@@ -322,7 +322,7 @@ fn what_was_read_before_the_line_was_lost_is_marked_as_old() {
         (rows[0].clone(), rows[rows.len() - 1].clone())
     };
     assert!(!row(&mut bench).0.contains("02BC?"), "good while it is read");
-    bench.snapshot(2, LineState::Waiting { why: "refused".to_owned(), retry_at: now() });
+    bench.snapshot(2, LineState::Waiting { why: "refused".into(), retry_at: now() });
     let (grid, watched) = row(&mut bench);
     assert!(grid.contains("02BC?") && watched.contains("700?"), "{grid}\n{watched}");
     bench.snapshot(60, LineState::Connected);

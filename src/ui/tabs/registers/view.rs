@@ -95,7 +95,7 @@ pub fn state(tab: &Registers, cx: &ViewContext) -> (String, bool) {
     let line = cx.snapshot.lines.get(tab.line.index());
     let waiting = match line.map(|line| &line.state) {
         Some(LineState::Connected | LineState::NoTraffic) => None,
-        Some(LineState::Waiting { why, .. }) => Some(t!("not connected: {why}", why = said(why))),
+        Some(LineState::Waiting { why, .. }) => Some(t!("not connected: {why}", why)),
         Some(LineState::Testing) => Some(t!("the line is under test").to_owned()),
         Some(LineState::Connecting | LineState::Disconnected) | None => Some(t!("not connected").to_owned()),
     };

@@ -35,7 +35,7 @@ struct Stand {
     saved: Vec<(PathBuf, Vec<u8>)>,
     commands: Vec<Command>,
     /// What the station says to an export.
-    reply: Result<Durability, String>,
+    reply: Result<Durability, RequestRefusal>,
 }
 
 impl Stand {
@@ -326,10 +326,10 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     assert!(bytes.starts_with(b"\xef\xbb\xbf"), "the other dialect is for spreadsheets");
     stand.send(Msg::Saved(Some(Tab::Reports), Err("disk full".to_owned())));
     assert!(stand.screen().contains("not written: disk full"));
-    stand.reply = Err("needs Technician; tom is Viewer".to_owned());
+    stand.reply = Err(RequestRefusal::Role { needed: Role::Technician, role: Role::Viewer });
     stand.press("e");
     assert!(stand.saved.is_empty(), "what the station does not have on record is not written");
-    assert!(stand.screen().contains("not written: needs Technician"));
+    assert!(stand.screen().contains("not written: this is for a technician"));
 }
 
 #[test]

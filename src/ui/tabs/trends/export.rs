@@ -5,6 +5,7 @@ use std::{collections::VecDeque, path::PathBuf, sync::Arc};
 
 use super::{picture::picture, *};
 use crate::{
+    plant::request_refusal::RequestRefusal,
     report::{
         export::{Column, export_csv},
         step_series::HeldValue,
@@ -128,12 +129,12 @@ impl Trends {
     }
 
     /// The station has put the first file on record, or why not.
-    pub(super) fn recorded(&mut self, answer: Result<(), String>) -> Vec<UiAction> {
+    pub(super) fn recorded(&mut self, answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
         match answer {
             Ok(()) => self.export.files.front().cloned().map(Outgoing::write).into_iter().collect(),
             Err(why) => {
                 self.export.files.clear();
-                self.export.said = Some(Err(why));
+                self.export.said = Some(Err(why.to_string()));
                 Vec::new()
             }
         }

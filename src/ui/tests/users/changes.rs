@@ -21,9 +21,9 @@ fn refused_credentials_are_asked_again_in_their_window() {
     };
     update(
         &mut model,
-        outcome_of(first, Outcome::Refused(Refusal::NotReauthenticated("wrong password; wait 2 s".to_owned()))),
+        outcome_of(first, Outcome::Refused(Refusal::NotReauthenticated(RequestRefusal::WrongPassword { wait: 2 }))),
     );
-    shows(&mut model, "wrong password; wait 2 s");
+    shows(&mut model, "wrong name or password; wait 2 s");
     let effects = type_keys(&mut model, "r1q 3a⏎");
     assert_eq!((model.tabs.shown, effects.len()), (Tab::Mimic, 1), "no letter of it was a key: {effects:?}");
     assert!(!screen(&mut model, 80, 24).contains("r1q"));

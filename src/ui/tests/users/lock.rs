@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn a_waiting_form_takes_its_answer_under_the_lock() {
     for (answer, left) in
-        [(Ok(()), None), (Err("at least one Supervisor must remain"), Some("at least one Supervisor"))]
+        [(Ok(()), None), (Err(RequestRefusal::LastSupervisor), Some("at least one enabled supervisor"))]
     {
         let mut model = with(&Fixture::normal(), supervisor());
         let effects = type_keys(&mut model, "7↓r ⏎");
@@ -14,7 +14,7 @@ fn a_waiting_form_takes_its_answer_under_the_lock() {
         };
         ctrl(&mut model, 'k');
         change_session(&mut model, |session| session.locked = true);
-        update(&mut model, Msg::RequestDone(id, answer.map(|()| Durability::Recorded).map_err(str::to_owned)));
+        update(&mut model, Msg::RequestDone(id, answer.map(|()| Durability::Recorded)));
         change_session(&mut model, |session| session.locked = false);
         match left {
             Some(words) => shows(&mut model, words),
@@ -30,7 +30,7 @@ fn a_lock_keeps_a_reauthentication_that_awaits_its_answer() {
     let Some(Effect::Command(command, _)) = effects.last() else { panic!("no command: {effects:?}") };
     let id = command.id;
     change_session(&mut model, |session| session.locked = true);
-    update(&mut model, Msg::Undelivered(id, "station too busy"));
+    update(&mut model, Msg::Undelivered(id, RequestRefusal::StationBusy));
     change_session(&mut model, |session| session.locked = false);
     shows(&mut model, "station too busy");
 }

@@ -146,7 +146,7 @@ fn a_map_that_fails_shows_its_ranges_and_the_whole_reason() {
     let refused = SweptOutcome::Refused(ExceptionCode::ILLEGAL_ADDRESS);
     let findings = vec![range(0, 1001, refused), range(1002, 1031, SweptOutcome::Answers)];
     let sweep = Sweep { unit: 1, table: crate::plant::tag::Table::Holding, first: 0, last: 0xFFFF, every: 8 };
-    let failed = DiagnosticState::Failed("the port was closed by the other side, and is opened again".to_owned());
+    let failed = DiagnosticState::Failed("the port was closed by the other side, and is opened again".into());
     fixture.line.test = Some(run(Diagnostic::Sweep(sweep), failed, 1_032, 65_536, findings));
     for (width, height) in [(80, 24), (120, 40)] {
         insta::assert_snapshot!(

@@ -67,7 +67,7 @@ fn the_chart_is_written_as_svg_and_then_as_png() {
     assert!(svg.contains("TIC-1.PV") && svg.contains("HH 90.0") && svg.contains("<polyline"));
     let (id, file) = requested(&effects(&mut stand, Msg::Saved(Some(Tab::Trends), Ok(path)))).expect("then the PNG");
     assert!(file.ends_with(".png"), "{file}");
-    effects(&mut stand, Msg::RequestDone(id, Err("audit log full".to_owned())));
+    effects(&mut stand, Msg::RequestDone(id, Err(RequestRefusal::Failed("audit log full".to_owned()))));
     assert!(stand.screen().contains("not exported: audit log full"));
 }
 
