@@ -85,6 +85,6 @@ impl Session {
     pub async fn complete(&self, request: SessionRequest) -> Result<Completion, RequestRefusal> {
         let (reply, answer) = oneshot::channel();
         self.send(Request::SessionRequest(request, reply))?;
-        answer.await.unwrap_or_else(|_| Err(RequestRefusal::StationStopped))
+        answer.await.unwrap_or(Err(RequestRefusal::StationStopped))
     }
 }

@@ -183,7 +183,7 @@ impl Inbound {
         tokio::spawn(async move {
             let answer = match sent {
                 Ok(()) => tokio::select! {
-                    answer = answer => answer.unwrap_or_else(|_| Err(RequestRefusal::StationStopped)),
+                    answer = answer => answer.unwrap_or(Err(RequestRefusal::StationStopped)),
                     // A job that the terminal has left is cancelled.
                     () = replies.closed() => return,
                 },

@@ -33,6 +33,6 @@ impl Link {
     fn signals(&self) -> Result<Result<PortSignals, LineTrouble>, LinkError> {
         // It had some: an adapter that was unplugged has none any more.
         let now = self.watch.as_ref().and_then(PortWatch::signals);
-        now.map(Ok).ok_or_else(|| LinkError::Gone(LineTrouble::PortGone))
+        now.map(Ok).ok_or(LinkError::Gone(LineTrouble::PortGone))
     }
 }
