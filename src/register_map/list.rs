@@ -1,29 +1,33 @@
 //! A register list from a manual becomes names: CSV, Markdown, or columns as they are copied from a PDF, recognised by their
 //! heading or, without one, by their form. What is not sure is not taken, and said by line.
 
+mod base;
 pub mod cells;
 mod columns;
 mod form;
+mod formula;
 pub mod headings;
 mod questions;
+mod reader;
 mod row;
 pub mod words;
 
 use std::collections::BTreeMap;
 
+pub use self::{
+    base::{Unclear, base_of},
+    columns::{Column, Said},
+    questions::Question,
+};
 use self::{
     cells::Cells,
     columns::{Columns, first_of, is_address, is_heading},
     row::{Assumed, Row, Taken},
 };
-pub use self::{
-    columns::{Column, Said},
-    questions::Question,
-};
 use super::{Format, named::Named};
 use crate::{
     plant::{
-        address::{AddressBase, AddressContext, of_modicon},
+        address::AddressBase,
         tag::{Access, ByteOrder, Table},
     },
     t,
@@ -97,15 +101,6 @@ pub struct List {
     pub assumed: BTreeMap<String, usize>,
     /// What is not kept of rows that are taken: how often, and in which line first.
     pub notes: BTreeMap<String, (usize, usize)>,
-}
-
-/// The first address of a list that can be read in two ways.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Unclear {
-    /// As written.
-    pub written: String,
-    /// How its digits may count, and the address that they then are.
-    pub readings: [(AddressBase, (Table, u16)); 2],
 }
 
 impl List {
@@ -262,10 +257,17 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
     let written = rows.iter().filter(|row| row.base.is_none());
     let written: Vec<(&str, Option<Table>)> =
         written.filter_map(|row| Some((first_of(row.address.as_ref()?), row.table.or(stated)))).collect();
-    let (base, unclear) = base_of(&written, context);
+    let alias = base::alias_of(&rows, context);
+    let (base, unclear) = match context.base {
+        None if alias.is_some() => (AddressBase::Modicon, None),
+        None if base::is_sent(&rows) => (AddressBase::Zero, None),
+        _ => base_of(&written, context),
+    };
     list.unclear = unclear;
     let order = context.order.unwrap_or(if is_nibe(&list.columns) { ByteOrder::Cdab } else { ByteOrder::Abcd });
-    let assumed = Assumed { table: context.table, is_stated: context.is_table_stated, base, order };
+    let table = alias.filter(|_| !context.is_table_stated).map_or(context.table, |(table, _)| table);
+    let alias = alias.map(|(_, first)| first);
+    let assumed = Assumed { table, is_stated: context.is_table_stated, base, order, alias };
     for row in rows {
         let taken = row.named(assumed).map(|taken| with_sure_writes(taken, context));
         let count = list.named.len();
@@ -323,6 +325,7 @@ fn below_headings(all: &[Cells], is_separated: bool, context: &ListContext, list
         list.is_sure |= columns.is_sure;
         let named = columns.headings.iter().cloned().zip(columns.means.iter().copied());
         list.add_columns(named.collect(), columns.open.clone());
+        let before = rows.len();
         for row in below {
             // A line of a PDF with other columns than the heading is taken by its form.
             rows.push(if is_separated || row.cells.len() == heading.len() {
@@ -331,6 +334,7 @@ fn below_headings(all: &[Cells], is_separated: bool, context: &ListContext, list
                 Row::by_form(row.line, &row.cells)
             });
         }
+        base::contradicting(&mut rows[before..]);
     }
     rows
 }
@@ -348,42 +352,6 @@ fn by_form(all: &[Cells], is_separated: bool) -> Result<Vec<Row>, String> {
         return Err(t!("only {found} of its {count} lines have an address", found, count));
     }
     Ok(rows)
-}
-
-/// How the plain numbers of a list count: as its reader has said, else as its own numbers prove; else it is unclear. Each is
-/// given as written, with the table that its row states.
-pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (AddressBase, Option<Unclear>) {
-    if let Some(base) = context.base {
-        return (base, None);
-    }
-    let is_plain = |text: &str| text.len() == 5 && text.bytes().all(|byte| byte.is_ascii_digit());
-    let is_of_other =
-        |text: &str, of: Option<Table>| of_modicon(text).is_some_and(|(table, _)| of.is_some_and(|of| of != table));
-    // 16299 is no Modicon number of a holding register. One of no table at all, such as 50001, proves nothing of others.
-    let is_sent = written.iter().any(|(text, of)| is_plain(text) && is_of_other(text, *of));
-    // Six digits are too many for what is sent.
-    let is_modicon = written.iter().any(|(text, _)| text.len() == 6 && of_modicon(text).is_some());
-    match (is_sent, is_modicon) {
-        (true, false) => return (AddressBase::Zero, None),
-        (false, true) => return (AddressBase::Modicon, None),
-        (true, true) | (false, false) => {}
-    }
-    let two = |bases: [AddressBase; 2], (text, of): &(&str, Option<Table>)| {
-        let read = |base| {
-            let place =
-                AddressContext { table: of.unwrap_or(context.table), is_stated: of.is_some(), base }.parse(text);
-            Some((base, place?))
-        };
-        let readings = [read(bases[0])?, read(bases[1])?];
-        (readings[0].1 != readings[1].1).then(|| Unclear { written: (*text).to_owned(), readings })
-    };
-    let unclear = written.iter().find_map(|one| two([AddressBase::Modicon, AddressBase::Zero], one));
-    // `0001` of an area is often its first register, unless there is one before it.
-    let is_padded = |text: &str| text.len() == 4 && text.starts_with('0') && text.bytes().all(|b| b.is_ascii_digit());
-    let has_first = written.iter().any(|(text, _)| is_padded(text) && text.parse() == Ok(0));
-    let mut padded = written.iter().filter(|(text, _)| is_padded(text) && !has_first);
-    let padded = padded.find_map(|one| two([AddressBase::One, AddressBase::Zero], one));
-    (AddressBase::Modicon, unclear.or(padded))
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ fn is_binary(text: &str) -> bool {
     first().any(|sign| sign == '\0') || first().count() < 20 * strange
 }
 
-/// UTF-8, UTF-16 by its mark or its zeros, else Latin-1; `Err` where it is no text.
+/// UTF-8, UTF-16 by its mark or its zeros, else Latin-1 as Windows has it; `Err` where it is no text.
 pub fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
     let text = match bytes {
         [0xEF, 0xBB, 0xBF, rest @ ..] => utf8(rest),
@@ -36,12 +36,20 @@ fn not_text() -> String {
     t!("it is no text").to_owned()
 }
 
+/// The signs of Windows from 0x80 on, where Latin-1 has none; five of the bytes are not used.
+const OF_WINDOWS: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8D}Ž\u{8F}\u{90}‘’“”•–—˜™š›œ\u{9D}žŸ";
+
 /// Each byte of Latin-1 is the character of its number.
 fn utf8(bytes: &[u8]) -> Cow<'_, str> {
     match std::str::from_utf8(bytes) {
         Ok(text) => Cow::Borrowed(text),
-        Err(_) => Cow::Owned(bytes.iter().map(|byte| char::from(*byte)).collect()),
+        Err(_) => Cow::Owned(bytes.iter().map(|byte| of_windows(*byte)).collect()),
     }
+}
+
+fn of_windows(byte: u8) -> char {
+    let place = byte.checked_sub(0x80).map(usize::from);
+    place.and_then(|place| OF_WINDOWS.chars().nth(place)).unwrap_or(char::from(byte))
 }
 
 fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, str>, String> {
@@ -69,6 +77,7 @@ mod tests {
         ] {
             assert_eq!(decode(&bytes).as_deref(), Ok("5;°C\n"), "{bytes:?}");
         }
+        assert_eq!(decode(b"\x80 \x93a\x94 \x89 \xE4").as_deref(), Ok("€ “a” ‰ ä"), "as Windows has it");
         for bytes in [&b"\x89PNG\r\n\x1a\n\x00\x00"[..], b"\x7fELF\x02\x01", b"\xFF\xFE\x00\xD8\x00\x00"] {
             assert!(decode(bytes).is_err(), "{bytes:?}");
         }

@@ -132,6 +132,16 @@ fn of_variant(item: &Node, variant: Option<usize>) -> Result<Node, String> {
         _ => false,
     };
     let mut chosen = entries.clone();
+    // Where it is not said which, nothing is written: see `with_limits`.
+    let of_limit = |(key, node): &(String, Node)| match (variant, &node.value) {
+        (Some(n), Value::List(items)) if matches!(key.as_str(), "min" | "max") => {
+            (key.clone(), items.get(n).unwrap_or(node).clone())
+        }
+        _ => (key.clone(), node.clone()),
+    };
+    for (_, node) in chosen.iter_mut().filter(|(key, node)| key == "configurable" && !node.entries().is_empty()) {
+        node.value = Value::Map(node.entries().iter().map(of_limit).collect());
+    }
     for (key, node) in chosen.iter_mut().filter(|(key, node)| is_many(key, node)) {
         let count = node.items().len();
         let n = variant.ok_or_else(|| {
@@ -187,7 +197,8 @@ fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Resul
     }
     let named = part(item, named, rule)?;
     let named = match item.get("lookup") {
-        Some(lookup) if !lookup.items().is_empty() => labelled(lookup, named)?,
+        // Of a number with a sign it is no name.
+        Some(lookup) if !lookup.items().is_empty() && rule % 2 == 1 => labelled(item, lookup, named)?,
         _ => scaled(item, named, rule)?,
     };
     Ok(with_limits(item, named))
@@ -295,8 +306,14 @@ fn rounded(number: f64) -> f64 {
 }
 
 /// `- key: [2, 0x0200], value: "…"`, `- bit: 3, value: "…"`; several bits are one number.
-fn labelled(lookup: &Node, named: Named) -> Result<Named, String> {
-    let low = named.field.filter(|(_, width)| 1 < *width).map_or(0, |(low, _)| low);
+fn labelled(item: &Node, lookup: &Node, named: Named) -> Result<Named, String> {
+    // They are those of the number with its mask, the field begins at 0: one beyond the mask never occurs.
+    let low = shift(item, &named);
+    let width = named.field.map_or(named.kind.bits(), |(_, width)| width);
+    let within = |number: i128| {
+        let moved = number >> low;
+        (moved << low == number && 0 <= moved && moved >> width == 0).then_some(moved)
+    };
     let are_bits = lookup.items().iter().all(|entry| entry.all("bit").len() < 2);
     let mut labels = Vec::new();
     let mut bits: Vec<(u8, String)> = Vec::new();
@@ -307,17 +324,17 @@ fn labelled(lookup: &Node, named: Named) -> Result<Named, String> {
             let bit = node.whole().and_then(|bit| u8::try_from(bit).ok()).filter(|bit| *bit < named.kind.bits());
             let bit = bit.ok_or_else(|| wrong("bit", node))?;
             number |= 1 << bit;
-            if are_bits && !bits.iter().any(|(known, _)| *known == bit) {
+            let bit = bit.checked_sub(low).filter(|bit| *bit < width);
+            if let Some(bit) = bit.filter(|bit| are_bits && !bits.iter().any(|(known, _)| known == bit)) {
                 bits.push((bit, label.clone()));
             }
         }
         if !are_bits && number != 0 {
-            labels.push((number, label.clone()));
+            labels.extend(within(number).map(|number| (number, label.clone())));
         }
         for node in entry.all("key").iter().filter(|node| node.text() != Some("default")) {
             let key = node.whole().ok_or_else(|| wrong("key", node))?;
-            // The key is the number with its mask, the field begins at 0.
-            labels.push((i128::from(key) >> low, label.clone()));
+            labels.extend(within(key.into()).map(|number| (number, label.clone())));
         }
     }
     // A word with names of bits has the text for none of them as a number.
@@ -337,6 +354,10 @@ fn access(item: &Node, table: Table) -> Access {
 /// The limits of what is set are those of the value.
 fn with_limits(item: &Node, named: Named) -> Named {
     let limits = item.get("configurable").filter(|_| named.access == Access::ReadWrite);
+    let is_open = |key: &str| limits.and_then(|limits| limits.get(key)).is_some_and(|node| node.text().is_none());
+    if is_open("min") || is_open("max") {
+        return Named { access: Access::Read, ..named };
+    }
     let limit = |key: &str| limits.and_then(|limits| limits.get(key)).and_then(Node::number);
     Named { min: limit("min"), max: limit("max"), ..named }
 }

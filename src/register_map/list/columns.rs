@@ -13,7 +13,7 @@ use super::{
     },
 };
 use crate::plant::{
-    address::{AddressBase, AddressContext},
+    address::{AddressBase, AddressContext, wire},
     tag::Table,
 };
 
@@ -33,6 +33,8 @@ pub struct Columns {
     areas: BTreeSet<usize>,
     /// It is a list of a known program: nothing is guessed.
     pub is_sure: bool,
+    /// It is a list of ioBroker.
+    pub is_iobroker: bool,
 }
 
 /// Is it an address in any reading?
@@ -43,12 +45,33 @@ pub fn is_address(cell: &str) -> bool {
 
 /// Of `41003-41004` the first.
 pub fn first_of(cell: &str) -> &str {
-    let parts: Vec<&str> = cell.split(['-', '–', '…']).map(str::trim).collect();
-    match parts.as_slice() {
-        // Of two numbers; a date is no address.
-        [first, last] if last.starts_with(|sign: char| sign.is_ascii_digit()) => first,
+    match ends_of(cell) {
+        Some((first, last)) if number_as(first, last).is_none_or(|(first, last)| first <= last) => first,
         _ => cell.trim(),
     }
+}
+
+/// How many registers a span takes: 2 of `41003-41004` and of `41003-04`.
+pub fn span_of(cell: &str) -> Option<u16> {
+    let (first, last) = ends_of(cell)?;
+    let (first, last) = number_as(first, last)?;
+    u16::try_from(last.checked_sub(first)? + 1).ok()
+}
+
+/// First and last of a span: two numbers. A date is no address.
+fn ends_of(cell: &str) -> Option<(&str, &str)> {
+    let (first, last) = cell.split_once(['-', '–', '…'])?;
+    let last = last.trim();
+    (!last.contains(['-', '–', '…']) && last.starts_with(|sign: char| sign.is_ascii_digit()))
+        .then_some((first.trim(), last))
+}
+
+/// Both as numbers; the last may have its last digits only.
+fn number_as(first: &str, last: &str) -> Option<(u32, u32)> {
+    let number = |text: &str| wire(text).map(u32::from).or_else(|| text.parse().ok());
+    let front = first.get(..first.len().saturating_sub(last.len())).unwrap_or_default();
+    let is_short = last.bytes().chain(first.bytes()).all(|byte| byte.is_ascii_digit());
+    Some((number(first)?, if is_short { number(&format!("{front}{last}"))? } else { number(last)? }))
 }
 
 /// Hexadecimal digits without a mark.
@@ -73,7 +96,8 @@ impl Columns {
         let is_of_areas =
             |n: &usize| means[*n] == Some(Column::Address) && cells[*n].iter().any(|cell| is_in_area(cell));
         let areas = (0..means.len()).filter(is_of_areas).collect();
-        let mut columns = Columns { headings, means, open: Vec::new(), areas, is_sure: is_own || is_iobroker };
+        let mut columns =
+            Columns { headings, means, open: Vec::new(), areas, is_sure: is_own || is_iobroker, is_iobroker };
         if !columns.is_sure {
             columns.open = questions::of(&mut columns.means, &columns.headings, &cells, |n| said[n].is_some());
         }

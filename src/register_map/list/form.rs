@@ -1,7 +1,7 @@
 //! A row without a heading: its cells are known by their form alone.
 
 use super::{
-    columns::{first_of, is_address},
+    columns::{first_of, is_address, span_of},
     row::Row,
     words::{is_marked, kind_of, number_of, order_of, table_of},
 };
@@ -22,6 +22,7 @@ impl Row {
         };
         let sure = cells.iter().find(is_sure);
         row.address = sure.or_else(|| cells.first().filter(|cell| is_address(cell))).cloned();
+        row.length = row.address.as_deref().and_then(span_of);
         // A number that stands alone may be a factor, a length or part of a name; one with decimals or a mark is a factor.
         let mut numbers: Vec<&str> = Vec::new();
         let mut words: Vec<&str> = Vec::new();

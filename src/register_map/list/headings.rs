@@ -101,29 +101,29 @@ pub const OWN: [(Column, &str); 21] = [
 
 #[rustfmt::skip]
 const ADDRESS: &[&str] = &["address", "addr", "addr.", "register", "reg", "reg.", "modicon", "pdu", "wire", "hex", "dec",
-    "adresse", "adr", "adr.", "registeradresse", "registernummer", "modbusadresse", "startadresse", "modbusregister", "startregister"];
+    "adresse", "adr", "adr.", "registeradresse", "registernummer", "modbusadresse", "startadresse", "modbusregister", "startregister", "dirección", "indirizzo", "endereço", "adres", "adress", "registre", "registro", "rejestr", "адрес", "регистр", "地址", "寄存器地址", "寄存器", "ที่อยู่", "แอดเดรส"];
 /// Words of headings, in small letters. Of several columns that a heading can be, the first that fits what is in it counts.
 #[rustfmt::skip]
 const HEADINGS: [(Column, &[&str]); 17] = [
-    (Column::Divisor, &["divisor", "divide", "divider", "division", "div", "teiler"]),
+    (Column::Divisor, &["divisor", "divide", "divider", "division", "div", "teiler", "diviseur", "divisore", "deler", "dzielnik", "делитель", "除数", "ตัวหาร"]),
     (Column::Exponent, &["sf", "exponent", "zehnerpotenz"]),
     (Column::Scale, &["scale", "scaling", "factor", "multiplier", "multiply", "gain", "resolution", "coefficient", "sf", "ratio", "conversion", "scalefactor",
-        "faktor", "skalierung", "skalierungsfaktor", "umrechnung", "umrechnungsfaktor", "multiplikator", "auflösung", "skala"]),
+        "faktor", "skalierung", "skalierungsfaktor", "umrechnung", "umrechnungsfaktor", "multiplikator", "auflösung", "skala", "échelle", "facteur", "résolution", "escala", "fattore", "fator", "schaal", "mnożnik", "skalfaktor", "множитель", "коэффициент", "масштаб", "系数", "倍率", "ตัวคูณ"]),
     (Column::Order, &["order", "endian", "endianness", "swap", "byteorder", "wordorder", "reihenfolge", "bytereihenfolge", "wortreihenfolge"]),
     (Column::Device, &["deviceid", "slave", "slaveid", "station", "unit", "geräteadresse"]),
-    (Column::Unit, &["unit", "units", "uom", "dimension", "einheit", "einheiten", "maßeinheit"]),
+    (Column::Unit, &["unit", "units", "uom", "dimension", "einheit", "einheiten", "maßeinheit", "unité", "unidad", "unità", "unidade", "eenheid", "jednostka", "enhet", "единица", "единицы", "单位", "หน่วย"]),
     (Column::Signed, &["signed", "sign", "vorzeichen"]),
-    (Column::Type, &["type", "format", "datatype", "dataformat", "encoding", "size", "signed", "sign", "typ", "datentyp", "datenformat", "variablentyp"]),
+    (Column::Type, &["type", "format", "datatype", "dataformat", "encoding", "size", "signed", "sign", "typ", "datentyp", "datenformat", "variablentyp", "tipo", "formato", "formaat", "тип", "类型", "数据类型", "ชนิด", "ชนิดข้อมูล"]),
     (Column::Width, &["bit", "bits", "size", "length", "width", "länge", "größe", "bitbreite"]),
     (Column::Field, &["bit", "bits", "bitnr", "bitnummer", "bitposition"]),
-    (Column::Table, &["table", "function", "area", "fc", "type", "tabelle", "funktionscode", "funktion", "bereich", "registertyp", "registertype", "typ"]),
-    (Column::Length, &["len", "length", "size", "count", "quantity", "qty", "words", "registers", "bytes", "länge", "anzahl", "wörter", "größe", "registeranzahl", "datenlänge"]),
+    (Column::Table, &["table", "function", "area", "fc", "type", "tabelle", "funktionscode", "funktion", "bereich", "registertyp", "registertype", "typ", "tipo", "función", "fonction", "funzione", "функция", "功能码", "ฟังก์ชัน"]),
+    (Column::Length, &["len", "length", "size", "count", "quantity", "qty", "words", "registers", "bytes", "länge", "anzahl", "wörter", "größe", "registeranzahl", "datenlänge", "longueur", "registres", "mots", "longitud", "registros", "lunghezza", "registri", "lengte", "długość", "длина", "长度", "数量", "ความยาว", "จำนวน"]),
     (Column::Formula, &["formula", "expression", "formel"]),
-    (Column::Offset, &["offset", "versatz"]),
-    (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "zugriff", "zugriffsart"]),
+    (Column::Offset, &["offset", "versatz", "décalage", "смещение", "偏移"]),
+    (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "zugriff", "zugriffsart", "accès", "acceso", "accesso", "toegang", "dostęp", "доступ", "访问"]),
     (Column::Address, ADDRESS),
     (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function",
-        "bezeichnung", "beschreibung", "benennung", "bedeutung", "datenpunkt", "messwert", "messgröße", "titel", "parametername", "funktion", "kommentar"]),
+        "bezeichnung", "beschreibung", "benennung", "bedeutung", "datenpunkt", "messwert", "messgröße", "titel", "parametername", "funktion", "kommentar", "désignation", "nom", "libellé", "nombre", "descripción", "nome", "descrizione", "descrição", "naam", "omschrijving", "nazwa", "opis", "namn", "benämning", "beskrivning", "название", "наименование", "описание", "параметр", "名称", "描述", "参数", "ชื่อ", "คำอธิบาย"]),
 ];
 /// A heading with one of these alone is no column of addresses: tables of codes have them too.
 const WEAK: [&str; 2] = ["hex", "dec"];
@@ -146,7 +146,9 @@ impl Heading {
     /// Its words in small letters.
     pub fn new(heading: &str) -> Heading {
         let heading = heading.to_lowercase().replace("r/w", "rw");
-        let words = heading.split(|c: char| !c.is_alphanumeric() && c != '.').filter(|word| !word.is_empty());
+        // The marks of Thai are part of a word.
+        let is_of_word = |c: char| c.is_alphanumeric() || c == '.' || ('\u{0E31}'..='\u{0E4E}').contains(&c);
+        let words = heading.split(|c: char| !is_of_word(c)).filter(|word| !word.is_empty());
         Heading(words.map(str::to_owned).collect())
     }
 

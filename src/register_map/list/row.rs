@@ -1,17 +1,16 @@
 //! The cells of a row by what they hold, and what becomes of them.
 
 use super::{
-    cells::{Cells, of_text},
-    columns::{Column, Columns, first_of, is_address},
-    words::{
-        BadNumber, access_of, area, bad_of, bit_field_of, labels_of, length_of, number_of, order_of, poll_of,
-        power_of_ten, table_of, type_of, unit_with_factor, width_of, yes_or_no,
-    },
+    cells::Cells,
+    columns::{Column, Columns, first_of, is_address, span_of},
+    formula::Formula,
+    reader::{More, Reader, with_unit},
+    words::{area, length_of, number_of, order_of, table_of, type_of, unit_with_factor, width_of, yes_or_no},
 };
 use crate::{
     plant::{
-        address::{AddressBase, AddressContext, in_table, of_modicon},
-        tag::{Access, ByteOrder, DataType, Encoding, Poll, Table},
+        address::{AddressBase, AddressContext, of_modicon},
+        tag::{Access, ByteOrder, DataType, Encoding, Table},
     },
     profile::unit_of,
     register_map::named::{Named, decimals_of},
@@ -26,6 +25,10 @@ pub struct Row {
     pub line: usize,
     /// As written.
     pub address: Option<String>,
+    /// All of its addresses, as written.
+    pub addresses: Vec<String>,
+    /// It is a row of ioBroker that has a type, which coils and discrete inputs have not.
+    pub is_register: bool,
     /// How its address counts, as the row states it.
     pub base: Option<AddressBase>,
     pub(super) name: String,
@@ -33,11 +36,13 @@ pub struct Row {
     /// A column says the types of all rows.
     is_typed: bool,
     signed: Option<bool>,
-    length: Option<u16>,
+    pub(super) length: Option<u16>,
     /// Bits of a number whose type does not say it.
     width: Option<u16>,
     pub(super) scale: Option<f64>,
     offset: f64,
+    /// Where the power of ten of its formula stands.
+    power: Option<String>,
     pub(super) unit: String,
     /// As the row states it.
     pub table: Option<Table>,
@@ -51,24 +56,6 @@ pub struct Row {
     pub(super) wrong: Option<String>,
 }
 
-/// What few lists say.
-#[derive(Debug, Default)]
-struct More {
-    access: Option<Access>,
-    min: Option<f64>,
-    max: Option<f64>,
-    decimals: Option<u8>,
-    labels: Vec<(i128, String)>,
-    bits: Vec<(i128, String)>,
-    field: Option<(u8, u8)>,
-    bad: Vec<BadNumber>,
-    group: String,
-    label: String,
-    write_at: Option<(Table, u16)>,
-    write_with: Option<u8>,
-    poll: Option<Poll>,
-}
-
 /// What a list does not say itself.
 #[derive(Debug, Clone, Copy)]
 pub struct Assumed {
@@ -80,6 +67,8 @@ pub struct Assumed {
     pub base: AddressBase,
     /// Order of what takes several registers.
     pub order: ByteOrder,
+    /// The number of the first register of a list of ioBroker that counts from there, such as 40001.
+    pub alias: Option<u32>,
 }
 
 /// A row that is taken, with what was assumed of it.
@@ -95,112 +84,13 @@ pub struct Taken {
     pub is_write_lost: bool,
 }
 
-/// The cells below a heading, by what their columns mean.
-struct Reader<'a> {
-    columns: &'a Columns,
-    row: &'a Cells,
-    /// The first reason why the row cannot be taken.
-    wrong: Option<String>,
-}
-
-impl<'a> Reader<'a> {
-    fn cells(&self, column: Column) -> impl Iterator<Item = &'a str> {
-        let (places, row) = (self.columns.places(column).into_iter(), self.row);
-        let is_sure = self.columns.is_sure;
-        let cells = places
-            .filter_map(|place| row.cells.get(place))
-            .map(move |cell| if is_sure { of_text(cell) } else { cell.as_str() });
-        cells.filter(|cell| !matches!(*cell, "" | "-" | "–"))
-    }
-
-    fn text(&self, column: Column) -> Option<&'a str> {
-        self.cells(column).next()
-    }
-
-    /// What a cell holds; one that does not hold it makes the row wrong, as do two that differ.
-    fn read<T: PartialEq>(&mut self, column: Column, of: impl Fn(&str) -> Option<T>) -> Option<T> {
-        let mut found = None;
-        let cells: Vec<&str> = self.cells(column).collect();
-        for cell in cells {
-            match (of(cell), &found) {
-                (None, _) => self.refuse(unfit(column, cell)),
-                (Some(value), None) => found = Some((value, cell)),
-                (Some(value), Some((first, other))) if value != *first => {
-                    self.refuse(t!("`{other}` and `{cell}` differ: which counts?", other, cell));
-                }
-                (Some(_), Some(_)) => {}
-            }
-        }
-        found.map(|(value, _)| value)
-    }
-
-    fn refuse(&mut self, why: String) {
-        self.wrong.get_or_insert(why);
-    }
-
-    /// The type; of several columns that one in which it is known.
-    fn kind(&mut self) -> Option<String> {
-        let all: Vec<&str> = self.cells(Column::Type).collect();
-        let known = || all.iter().copied().filter(|cell| type_of(cell, None).is_ok());
-        if let Some(other) =
-            known().find(|cell| type_of(cell, None).ok() != known().next().and_then(|first| type_of(first, None).ok()))
-        {
-            let first = known().next().unwrap_or_default();
-            self.refuse(t!("`{other}` and `{cell}` differ: which counts?", other = first, cell = other));
-        }
-        known().next().or(all.first().copied()).map(str::to_owned)
-    }
-
-    /// The factor of all columns that have one.
-    fn factor(&mut self) -> Option<f64> {
-        let number = |cell: &str| number_of(cell).filter(|number| *number != 0.0);
-        let power = |cell: &str| cell.parse::<i8>().ok().map(f64::from);
-        let scale = self.read(Column::Scale, number);
-        let divisor = self.read(Column::Divisor, number).map(|by| 1.0 / by);
-        let exponent = self.read(Column::Exponent, power).map(power_of_ten);
-        let places = self.read(Column::Places, |cell| power(cell).filter(|places| 0.0 <= *places));
-        // As a person would write it: 0.1, not the nearest to it.
-        let places = places.map(|places| power_of_ten(-places));
-        [divisor, exponent, places, scale].into_iter().flatten().reduce(|all, one| all * one)
-    }
-
-    fn more(&mut self) -> More {
-        More {
-            access: self.read(Column::Access, access_of),
-            min: self.read(Column::Min, number_of),
-            max: self.read(Column::Max, number_of),
-            decimals: self.read(Column::Decimals, |cell| cell.parse().ok()),
-            labels: self.read(Column::Labels, labels_of).unwrap_or_default(),
-            bits: self.read(Column::Bits, labels_of).unwrap_or_default(),
-            field: self.read(Column::Field, bit_field_of),
-            bad: self.read(Column::Bad, bad_of).unwrap_or_default(),
-            group: self.text(Column::Group).unwrap_or_default().to_owned(),
-            label: self.text(Column::Label).unwrap_or_default().to_owned(),
-            write_at: self.read(Column::WriteAt, in_table),
-            write_with: self.read(Column::WriteWith, |cell| cell.parse().ok()),
-            poll: self.read(Column::Poll, poll_of),
-        }
-    }
-
-    /// Headings of what stands in no column that is used, and of a second name.
-    fn unused(&self) -> Vec<String> {
-        let names = self.columns.places(Column::Name);
-        let first = names
-            .iter()
-            .find(|place| self.row.cells.get(**place).is_some_and(|cell| !matches!(cell.as_str(), "" | "-" | "–")));
-        let is_unused = |n: usize| match self.columns.means[n] {
-            None => true,
-            Some(Column::Name) => first != Some(&n),
-            Some(_) => false,
-        };
-        let cells = self.row.cells.iter().take(self.columns.means.len()).enumerate();
-        let unused = cells.filter(|(n, cell)| is_unused(*n) && !matches!(cell.as_str(), "" | "-" | "–"));
-        unused.map(|(n, _)| self.columns.headings[n].clone()).collect()
-    }
+/// Why a row with two cells that say two things is none.
+pub fn differ(other: &str, cell: &str) -> String {
+    t!("`{other}` and `{cell}` differ: which counts?", other, cell)
 }
 
 /// Why a cell of a column makes its row none.
-fn unfit(column: Column, cell: &str) -> String {
+pub fn unfit(column: Column, cell: &str) -> String {
     if matches!(column, Column::Scale | Column::Divisor | Column::Exponent | Column::Places) {
         return t!("`{wrong}` is not a scale", wrong = cell);
     }
@@ -244,6 +134,7 @@ impl Row {
         });
         let written: Vec<(String, Option<AddressBase>)> = written.collect();
         let found = written.iter().find(|(cell, _)| is_address(cell)).or(written.first()).cloned();
+        read.addresses = written.into_iter().map(|(cell, _)| cell).collect();
         (read.address, read.base) = found.map_or((None, None), |(cell, base)| (Some(cell), base));
         read.base = read.base.filter(|base| {
             // A Modicon number counts from 1 as well, but not as this one.
@@ -255,15 +146,29 @@ impl Row {
         read.signed = reader.read(Column::Signed, yes_or_no);
         read.length = reader.read(Column::Length, |cell| length_of(cell, false));
         read.length = read.length.or_else(|| reader.read(Column::Bytes, |cell| length_of(cell, true)));
+        if columns.is_iobroker && read.is_typed {
+            // The program knows the lengths of all types but texts, and the type where none is stated.
+            read.is_register = true;
+            let kind = read.kind.get_or_insert_with(|| "uint16be".to_owned());
+            read.length = read.length.filter(|_| kind.starts_with("string"));
+        }
+        read.take_span(&mut reader);
         read.width = reader.read(Column::Width, width_of);
         read.table = reader.read(Column::Table, table_of).or_else(|| reader.read(Column::Area, area));
         read.device = reader.read(Column::Device, |cell| cell.parse().ok());
         read.order = reader.read(Column::Order, order_of);
-        if let Some(formula) = reader.text(Column::Formula) {
-            reader.refuse(t!("the formula `{formula}` is more than a factor and an offset", formula));
-        }
         read.scale = reader.factor();
         read.offset = reader.read(Column::Offset, number_of).unwrap_or_default();
+        if let Some(text) = reader.text(Column::Formula) {
+            // A factor besides may be part of it, or not.
+            let formula = Formula::of(text).filter(|_| matches!(read.scale, None | Some(1.0)) && read.offset == 0.0);
+            match formula {
+                Some(formula) => (read.scale, read.power) = (Some(formula.factor), formula.power_at),
+                None => {
+                    reader.refuse(t!("the formula `{formula}` is more than a factor and an offset", formula = text))
+                }
+            }
+        }
         read.more = reader.more();
         read.unused = reader.unused();
         read.read_unit(&mut reader);
@@ -271,9 +176,28 @@ impl Row {
         read
     }
 
+    /// The length that a span of addresses states.
+    fn take_span(&mut self, reader: &mut Reader<'_>) {
+        let Some((cell, span)) = self.address.as_ref().and_then(|cell| Some((cell, span_of(cell)?))) else { return };
+        match self.length.filter(|length| *length != span) {
+            Some(length) => {
+                let (other, cell) = (cell, length.to_string());
+                reader.refuse(differ(other, &cell));
+            }
+            None => self.length = Some(span),
+        }
+    }
+
     /// The unit, and a factor that stands in front of it.
     fn read_unit(&mut self, reader: &mut Reader<'_>) {
-        let Some(cell) = reader.text(Column::Unit) else { return };
+        let of_scale = reader.text(Column::Scale).and_then(|cell| Some((cell, with_unit(cell)?.1)));
+        let Some(cell) = reader.text(Column::Unit) else {
+            self.unit = of_scale.map(|(_, unit)| unit).unwrap_or_default();
+            return;
+        };
+        if let Some((other, _)) = of_scale.filter(|(_, unit)| *unit != unit_of(cell)) {
+            reader.refuse(differ(other, cell));
+        }
         if reader.columns.is_sure {
             self.unit = unit_of(cell);
             return;
@@ -289,11 +213,14 @@ impl Row {
     }
 
     /// Table and address, as assumed where the row does not say more.
-    fn place(&self, assumed: Assumed) -> Option<(Table, u16)> {
+    fn place(&self, written: &str, assumed: Assumed) -> Option<(Table, u16)> {
         let table = self.table.unwrap_or(assumed.table);
+        if let Some(first) = assumed.alias.filter(|_| self.is_register) {
+            return Some((table, u16::try_from(written.parse::<u32>().ok()?.checked_sub(first)?).ok()?));
+        }
         let is_stated = self.table.is_some() || assumed.is_stated;
         let base = self.base.unwrap_or(assumed.base);
-        AddressContext { table, is_stated, base }.parse(first_of(self.address.as_ref()?))
+        AddressContext { table, is_stated, base }.parse(first_of(written))
     }
 
     /// Its type and, where the word says it, the order.
@@ -332,11 +259,22 @@ impl Row {
         Ok((kind, order))
     }
 
+    /// A bit, as only the digits of its address say, has no type of more bits.
+    fn check_bit(&self, assumed: Assumed) -> Result<(), String> {
+        let is_by_digits = self.table.is_none() && !assumed.is_stated;
+        let Some(word) = self.kind.as_ref().filter(|_| is_by_digits) else { return Ok(()) };
+        match type_of(word, self.length) {
+            Ok((kind, _)) if kind != DataType::Bool => Err(t!("`{word}` does not have {bits} bits", word, bits = 1)),
+            Err(why) if self.is_register => Err(why),
+            Ok(_) | Err(_) => Ok(()),
+        }
+    }
+
     /// Takes it; else why not.
     pub fn named(&self, assumed: Assumed) -> Result<Taken, String> {
         let Some(written) = &self.address else { return Err(t!("no address").to_owned()) };
         let because = |why: String| format!("{written}: {why}");
-        let found = self.place(assumed);
+        let found = self.place(written, assumed);
         let (table, address) = found.ok_or_else(|| t!("`{written}` is not an address", written))?;
         if self.name.is_empty() {
             return Err(t!("{written}: no name", written));
@@ -344,18 +282,26 @@ impl Row {
         if let Some(wrong) = &self.wrong {
             return Err(because(wrong.clone()));
         }
+        if table.is_bits() {
+            self.check_bit(assumed).map_err(because)?;
+        }
         let (kind, order) = if table.is_bits() { (DataType::Bool, None) } else { self.kind().map_err(because)? };
+        let power = self.power.as_ref().map(|text| {
+            let place = self.place(text, assumed).filter(|(of, _)| *of == table);
+            place.ok_or_else(|| t!("`{written}` is not an address", written = text))
+        });
+        let power_at = power.transpose().map_err(because)?.map(|(_, address)| address);
         let stated = self.order.or(order);
         let is_in_order = table.is_bits() || kind.is_text() || kind.is_half() || kind.registers() == 1;
         let order = stated.unwrap_or(ByteOrder::Abcd);
         let scale = self.scale.unwrap_or(1.0);
         let decimals = decimals_of(scale, kind).max(decimals_of(self.offset, DataType::U16));
         let named = Named::new(table, address, kind, order, &self.name);
-        let named = Named { scale, offset: self.offset, decimals, unit: self.unit.clone(), ..named };
+        let named = Named { scale, offset: self.offset, decimals, unit: self.unit.clone(), power_at, ..named };
         let is_free = stated.is_none() && !kind.is_text() && !kind.is_half();
         let named = if is_free { named.ordered(assumed.order) } else { named };
         let first = first_of(written);
-        let is_plain = first.bytes().all(|byte| byte.is_ascii_digit());
+        let is_plain = first.bytes().all(|byte| byte.is_ascii_digit()) && assumed.alias.is_none();
         Ok(Taken {
             named: self.with_more(named).map_err(because)?,
             is_base_assumed: self.base.is_none() && is_plain && of_modicon(first).is_none(),

@@ -101,9 +101,14 @@ fn of_codes(text: &str) -> Option<Table> {
     found.iter().all(|other| *other == table).then_some(table)
 }
 
-/// The order of four letters.
+/// The order of four letters, or in words that mean one order; "little endian" can be two.
 pub fn order_of(text: &str) -> Option<ByteOrder> {
-    ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(text))
+    let word: String = text.to_lowercase().chars().filter(|sign| sign.is_alphanumeric()).collect();
+    match word.as_str() {
+        "bigendian" | "highwordfirst" | "mswfirst" => Some(ByteOrder::Abcd),
+        "lowwordfirst" | "lswfirst" | "wordswap" | "wordswapped" | "swappedwords" => Some(ByteOrder::Cdab),
+        _ => ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(text)),
+    }
 }
 
 /// The type that a manual means by a word.
@@ -145,9 +150,15 @@ pub fn kind_of(text: &str) -> Option<DataType> {
     })
 }
 
-/// A type with the suffix of its byte order, as the lists of ioBroker have it: `uint32be`, `floatsw`, `int16le`.
+/// A type with its byte order: `FLOAT (CDAB)`; `uint32be`, `floatsw`, `int16le` as the lists of ioBroker have it.
 fn suffixed(text: &str) -> Option<(DataType, ByteOrder)> {
     let word = text.trim().to_lowercase();
+    if let Some((kind, order)) = word.trim_end_matches(')').rsplit_once([' ', '(', '-', '_']) {
+        let order = ByteOrder::ALL.into_iter().find(|known| known.word().eq_ignore_ascii_case(order));
+        if let (Some(kind), Some(order)) = (kind_of(kind), order) {
+            return Some((kind, order));
+        }
+    }
     let (kind, suffix) = word.split_at_checked(word.len().checked_sub(2)?)?;
     let kind = kind_of(kind)?;
     let order = match (suffix, kind.registers()) {
@@ -155,6 +166,7 @@ fn suffixed(text: &str) -> Option<(DataType, ByteOrder)> {
         ("le", 1) => ByteOrder::Badc,
         ("le", _) => ByteOrder::Dcba,
         ("sw", 2..) => ByteOrder::Cdab,
+        ("sb", 2..) => ByteOrder::Badc,
         _ => return None,
     };
     Some((kind, order))

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// What of a file is taken, what is left out, and what is asked: each reason holds its words, in this order.
-fn check(text: &str, taken: &[&str], left_out: &[&str], asked: &[&str]) {
+pub fn check(text: &str, taken: &[&str], left_out: &[&str], asked: &[&str]) {
     let list = list_of(text);
     assert_eq!(list.refused, None, "{text}");
     let named: Vec<String> = list.named.iter().map(shown).collect();
@@ -37,6 +37,20 @@ fn headings_of_other_languages_are_known() {
         "Registeradresse;Bezeichnung;Datentyp;Einheit;Faktor\n5;Vorlauf;int16;°C;0,1\n6;Rücklauf;int16;°C;0,01\n";
     check(text, &["40006 Vorlauf int16 ABCD x0.1 °C", "40007 Rücklauf int16 ABCD x0.01 °C"], &[], &[]);
     check("Adresse;Name;Typ;Skalierung\n5;a;uint32;0.1\n", &["40006 a uint32 ABCD x0.1"], &[], &[]);
+    for heading in [
+        "Adresse;Désignation;Type;Échelle;Unité",
+        "Dirección;Nombre;Tipo;Escala;Unidad",
+        "Indirizzo;Nome;Tipo;Fattore;Unità",
+        "Endereço;Descrição;Tipo;Fator;Unidade",
+        "Adres;Naam;Type;Schaal;Eenheid",
+        "Adres;Nazwa;Typ;Mnożnik;Jednostka",
+        "Adress;Benämning;Datatyp;Skalfaktor;Enhet",
+        "Адрес;Название;Тип;Множитель;Единица",
+        "地址;名称;类型;系数;单位",
+        "ที่อยู่;ชื่อ;ชนิด;ตัวคูณ;หน่วย",
+    ] {
+        check(&format!("{heading}\n5;a;int16;0,1;°C\n"), &["40006 a int16 ABCD x0.1 °C"], &[], &[]);
+    }
 }
 
 #[test]
@@ -97,6 +111,9 @@ fn a_factor_in_front_of_a_unit_counts() {
     let taken = ["40006 a uint16 ABCD x0.1 kW", "40007 b uint16 ABCD x1 V", "40009 d uint16 ABCD x1 1/min"];
     check(text, &taken, &["7: `V/10`: does its unit have a factor?"], &[]);
     check("address;name;type;unit;scale\n5;a;uint16;0.1 kW;0.1\n", &[], &["it has another"], &[]);
+    let resolution = "address;name;type;resolution;unit\n5;a;int16;0.1 V;V\n6;b;int16;0.1°C;\n7;c;int16;0.1 V;mV\n";
+    let taken = ["40006 a int16 ABCD x0.1 V", "40007 b int16 ABCD x0.1 °C"];
+    check(resolution, &taken, &["7: `0.1 V` and `mV` differ"], &[]);
 }
 
 #[test]
@@ -263,4 +280,18 @@ fn what_is_assumed_is_said() {
     assert_eq!(warnings("address (1-based);name;type\n5;a;int16\n"), Vec::<String>::new());
     check("PDU address;name;type\n40001;a;int16\n", &["440002 a int16 ABCD x1"], &[], &[]);
     check("address;name;type\n5;a;int16\n6;b;\n", &["40006 a int16 ABCD x1"], &["6: no type"], &[]);
+}
+
+#[test]
+fn orders_in_words_are_known_where_they_can_mean_one_thing() {
+    let text = "address;name;type;word order\n0;a;int32;Low word first\n2;b;int32;big-endian\n4;c;int32;little endian\n6;d;int32;CDAB\n8;e;int32;word swapped\n10;f;int16;little endian\n";
+    let taken = ["40001 a int32 CDAB x1", "40003 b int32 ABCD x1", "40007 d int32 CDAB x1", "40009 e int32 CDAB x1"];
+    check(text, &taken, &["4: `little endian` is no byte order", "10: `little endian`"], &[]);
+    let typed = "address;name;type\n0;a;FLOAT (CDAB)\n2;b;FLOAT32-ABCD\n4;c;float inverse\n";
+    check(
+        typed,
+        &["40001 a float32 CDAB x1", "40003 b float32 ABCD x1"],
+        &["`float inverse` is not a known type"],
+        &[],
+    );
 }

@@ -3,7 +3,9 @@
 mod configurations;
 mod doubtful;
 mod exports;
+mod iobroker;
 mod meanings;
+mod misread;
 mod odd;
 mod older;
 mod profiles;

@@ -17,7 +17,8 @@ fn a_type_fits_its_number_of_registers_or_is_refused() {
     check("uint32sw", Some(2), Some((DataType::U32, Some(ByteOrder::Cdab))));
     check("floatle", Some(2), Some((DataType::F32, Some(ByteOrder::Dcba))));
     check("int16le", Some(1), Some((DataType::I16, Some(ByteOrder::Badc))));
-    check("uint32sb", Some(2), None);
+    check("uint32sb", Some(2), Some((DataType::U32, Some(ByteOrder::Badc))));
+    check("uint16sb", Some(1), None);
     check("s8", None, Some((DataType::I8, None)));
     check("uint8le", Some(1), Some((DataType::U8, Some(ByteOrder::Badc))));
     check("int8be", None, Some((DataType::I8, Some(ByteOrder::Abcd))));

@@ -1,0 +1,102 @@
+//! How the numbers of a list count: from 0, from 1, or as those of Modicon.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::{
+    ListContext,
+    columns::first_of,
+    row::{Row, differ},
+};
+use crate::plant::{
+    address::{AddressBase, AddressContext, of_modicon, wire},
+    tag::Table,
+};
+
+/// The first address of a list that can be read in two ways.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unclear {
+    /// As written.
+    pub written: String,
+    /// How its digits may count, and the address that they then are.
+    pub readings: [(AddressBase, (Table, u16)); 2],
+}
+
+/// The first number of a list of ioBroker whose numbers are too great for registers, as that program shows them: with 40001
+/// or 30001 added. `None` where its numbers are those of registers, or prove nothing.
+pub fn alias_of(rows: &[Row], context: &ListContext) -> Option<(Table, u32)> {
+    let numbers =
+        || rows.iter().filter(|row| row.is_register).filter_map(|row| row.address.as_ref()?.parse::<u32>().ok());
+    let is_aliased = numbers().any(|number| u32::from(u16::MAX) < number);
+    if !is_aliased || matches!(context.base, Some(AddressBase::Zero | AddressBase::One)) {
+        return None;
+    }
+    let least = numbers().min()?;
+    [(Table::Holding, 40_001), (Table::Input, 30_001)].into_iter().find(|(_, first)| *first <= least)
+}
+
+/// Is one of its numbers, if it counted as Modicon's do, that of a bit, although it is a register?
+pub fn is_sent(rows: &[Row]) -> bool {
+    let is_bit = |text: &String| text.len() == 5 && of_modicon(text).is_some_and(|(table, _)| table.is_bits());
+    rows.iter().any(|row| row.is_register && row.address.as_ref().is_some_and(is_bit))
+}
+
+/// How the plain numbers of a list count: as its reader has said, else as its own numbers prove; else it is unclear. Each is
+/// given as written, with the table that its row states.
+pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (AddressBase, Option<Unclear>) {
+    if let Some(base) = context.base {
+        return (base, None);
+    }
+    let is_plain = |text: &str| text.len() == 5 && text.bytes().all(|byte| byte.is_ascii_digit());
+    let is_of_other =
+        |text: &str, of: Option<Table>| of_modicon(text).is_some_and(|(table, _)| of.is_some_and(|of| of != table));
+    // 16299 is no Modicon number of a holding register. One of no table at all, such as 50001, proves nothing of others.
+    let is_sent = written.iter().any(|(text, of)| is_plain(text) && is_of_other(text, *of));
+    // Six digits are too many for what is sent.
+    let is_modicon = written.iter().any(|(text, _)| text.len() == 6 && of_modicon(text).is_some());
+    match (is_sent, is_modicon) {
+        (true, false) => return (AddressBase::Zero, None),
+        (false, true) => return (AddressBase::Modicon, None),
+        (true, true) | (false, false) => {}
+    }
+    let two = |bases: [AddressBase; 2], (text, of): &(&str, Option<Table>)| {
+        let read = |base| {
+            let place =
+                AddressContext { table: of.unwrap_or(context.table), is_stated: of.is_some(), base }.parse(text);
+            Some((base, place?))
+        };
+        let readings = [read(bases[0])?, read(bases[1])?];
+        (readings[0].1 != readings[1].1).then(|| Unclear { written: (*text).to_owned(), readings })
+    };
+    let unclear = written.iter().find_map(|one| two([AddressBase::Modicon, AddressBase::Zero], one));
+    // `0001` of an area is often its first register, unless there is one before it.
+    let is_padded = |text: &str| text.len() == 4 && text.starts_with('0') && text.bytes().all(|b| b.is_ascii_digit());
+    let has_first = written.iter().any(|(text, _)| is_padded(text) && text.parse() == Ok(0));
+    let mut padded = written.iter().filter(|(text, _)| is_padded(text) && !has_first);
+    let padded = padded.find_map(|one| two([AddressBase::One, AddressBase::Zero], one));
+    (AddressBase::Modicon, unclear.or(padded))
+}
+
+/// The rows below a heading whose addresses differ by another number than those of the others.
+pub fn contradicting(rows: &mut [Row]) {
+    let number = |text: &String| -> Option<[i64; 2]> {
+        let text = first_of(text);
+        let written = wire(text).map(i64::from).or_else(|| text.parse().ok())?;
+        Some([written, of_modicon(text).map_or(written, |(_, address)| address.into())])
+    };
+    let differences = |row: &Row| -> Vec<i64> {
+        let [first, second, ..] = row.addresses.as_slice() else { return Vec::new() };
+        let (Some(first), Some(second)) = (number(first), number(second)) else { return Vec::new() };
+        let all = first.into_iter().flat_map(|first| second.map(|second| second - first));
+        all.collect::<BTreeSet<_>>().into_iter().collect()
+    };
+    let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
+    rows.iter().flat_map(differences).for_each(|one| *counts.entry(one).or_default() += 1);
+    let usual = counts.iter().max_by_key(|(one, count)| (**count, std::cmp::Reverse(one.abs()))).map(|(one, _)| *one);
+    for row in rows {
+        let all = differences(row);
+        if usual.is_some_and(|usual| !all.is_empty() && !all.contains(&usual)) {
+            let (other, cell) = (&row.addresses[0], &row.addresses[1]);
+            row.wrong.get_or_insert(differ(other, cell));
+        }
+    }
+}
