@@ -42,11 +42,8 @@ pub fn greedy(group: &[TagDef], device: &DeviceDef, unreadable: &UnreadableRange
 /// Always so many registers (or sixteen times so many bits) from the first tag that is not read yet, or as many as the
 /// device allows; whatever lies between.
 pub fn fixed(group: &[TagDef], device: &DeviceDef, words: u32) -> Vec<Block> {
-    let max = if group[0].point.table.is_bits() {
-        (words * 16).min(u32::from(device.limits.read_bits_max))
-    } else {
-        words.min(u32::from(device.limits.read_registers_max))
-    };
+    let table = group[0].point.table;
+    let max = (words * if table.is_bits() { 16 } else { 1 }).min(device.limits.most(table).into());
     let within = |run: &[&TagDef]| {
         let start = single(device, run[0]).range().0;
         run.iter().all(|tag| single(device, tag).range().1 <= start + max)
@@ -111,12 +108,7 @@ fn joined(group: &[TagDef], run: &[&TagDef], device: &DeviceDef, unreadable: &Un
         |tag: &TagDef| (u32::from(tag.point.address), u32::from(tag.point.address) + u32::from(tag.point.len()));
     let blocks = || run.iter().map(|tag| single(device, tag).range());
     let (start, end) = (blocks().map(|range| range.0).min()?, blocks().map(|range| range.1).max()?);
-    let (bits, limits) = (first.table.is_bits(), device.limits);
-    let (max, gap_max) = if bits {
-        (u32::from(limits.read_bits_max), u32::from(limits.gap_registers_max) * 16)
-    } else {
-        (u32::from(limits.read_registers_max), u32::from(limits.gap_registers_max))
-    };
+    let (max, gap_max) = (u32::from(device.limits.most(first.table)), device.limits.gap(first.table));
     let wanted = (run.iter().map(|tag| range(tag).0).min()?, run.iter().map(|tag| range(tag).1).max()?);
     let (mut used, mut near) = (wanted.0, true);
     for (from, to) in group.iter().map(range).filter(|(from, to)| wanted.0 < *to && *from < wanted.1) {

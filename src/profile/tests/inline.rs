@@ -1,6 +1,7 @@
-//! A device whose register map stands in the plant file, and the signatures of profiles.
+//! A device whose register map stands in the plant file, signatures of profiles, and limits of tables.
 
 use super::*;
+use crate::plant::tag::Table;
 
 const OWN: &str = r#"title = "Bench"
 time_zone = "UTC"
@@ -117,4 +118,19 @@ fn a_plant_file_says_who_may_write_what_a_profile_has() {
     assert_eq!(role(""), Role::Supervisor);
     assert_eq!(role("roles = { Tuning = \"technician\" }"), Role::Technician);
     assert_eq!(role("[[device.tag]]\nname = \"T\"\nrole = \"technician\""), Role::Technician);
+}
+
+#[test]
+fn a_table_has_limits_of_its_own() {
+    let own = "alignment = 1\n[limits.input]\nread_max = 16\ngap_max = 0\nalignment = 2\n[limits.coil]\nalignment = 8";
+    let def = load(PLANT.as_bytes(), &METER.replace("alignment = 1", own), PLC).expect("it is right");
+    let limits = def.devices[0].limits;
+    let of = |table: Table| (limits.most(table), limits.gap(table), limits.step(table));
+    assert_eq!([of(Table::Input), of(Table::Holding)], [(16, 0, 2), (60, 8, 1)]);
+    assert_eq!([of(Table::Coil), of(Table::Discrete)], [(2_000, 128, 8), (2_000, 128, 1)]);
+    let wrong = |own: &str, expect: &[&str]| check("alignment = 1", &format!("alignment = 1\n{own}"), expect);
+    wrong("[limits.input]\nread_max = 126", &["read_max = 126 is not possible", "allows 1 to 125"]);
+    wrong("[limits.coil]\nalignment = 3", &["alignment = 3 is not known", "1, 2, 4, 8 or 16"]);
+    wrong("[limits.holding]\nalignment = 8", &["alignment = 8 is not known", "expected 1, 2 or 4"]);
+    wrong("[limits.inputs]\nread_max = 3", &["inputs"]);
 }
