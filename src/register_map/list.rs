@@ -10,6 +10,7 @@ pub mod headings;
 mod questions;
 mod reader;
 mod row;
+mod sections;
 pub mod words;
 
 use std::collections::BTreeMap;
@@ -18,6 +19,7 @@ pub use self::{
     base::{Unclear, base_of},
     columns::{Column, Said},
     questions::Question,
+    sections::titled,
 };
 use self::{
     cells::Cells,
@@ -243,7 +245,9 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
     if cells::ROWS_MAX <= all.len() {
         list.warn_cut();
     }
-    let rows = match all.iter().position(|row| is_heading(&row.cells)) {
+    let (all, sections) = sections::split(all, is_separated);
+    let all = &all[..];
+    let mut rows: Vec<Row> = match all.iter().position(|row| is_heading(&row.cells)) {
         Some(first) => {
             let above = all[..first].iter().map(|row| Row::without_cells(row.line));
             above.chain(below_headings(&all[first..], is_separated, context, &mut list)).collect()
@@ -253,6 +257,7 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
             Err(why) => return List::refused(why),
         },
     };
+    sections::assign(&mut rows, &sections, context.is_table_stated);
     let stated = Some(context.table).filter(|_| context.is_table_stated);
     let written = rows.iter().filter(|row| row.base.is_none());
     let written: Vec<(&str, Option<Table>)> =

@@ -133,7 +133,10 @@ fn of_workbook(bytes: &[u8], context: &ListContext) -> List {
     };
     let (mut all, mut refused, many) = (List::default(), None, 1 < sheets.len());
     for (name, rows) in sheets {
-        let list = list::of_cells(&cells::without_rules(rows), true, context);
+        // Its name may be that of a table.
+        let title = list::titled(&name);
+        let rows = title.into_iter().chain(cells::without_rules(rows)).collect::<Vec<_>>();
+        let list = list::of_cells(&rows, true, context);
         match list.refused {
             Some(why) if many => all.warnings.push(t!("sheet {name}: {why}", name, why)),
             Some(why) => refused = Some(why),

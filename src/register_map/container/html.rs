@@ -2,7 +2,7 @@
 
 use html5gum::{Token, Tokenizer};
 
-use crate::register_map::list::cells::Cells;
+use crate::register_map::list::{cells::Cells, titled};
 
 /// A cell that spans more than this is a mistake.
 const SPAN_MAX: usize = 64;
@@ -16,6 +16,9 @@ struct Tables {
     line: usize,
     row: Option<Cells>,
     cell: Option<(String, usize, usize)>,
+    /// The last heading above, or caption.
+    title: String,
+    is_in_title: bool,
     /// Cells of a row above that reach into this one: column, rows left, text.
     hanging: Vec<(usize, usize, String)>,
 }
@@ -40,7 +43,9 @@ pub fn tables(text: &str) -> Vec<Vec<Cells>> {
             }
             Token::EndTag(tag) => tables.close(&tag.name),
             Token::String(text) => {
-                if let Some((cell, ..)) = &mut tables.cell {
+                if tables.is_in_title {
+                    tables.title.push_str(&String::from_utf8_lossy(&text.value));
+                } else if let Some((cell, ..)) = &mut tables.cell {
                     cell.push_str(&String::from_utf8_lossy(&text.value));
                 }
             }
@@ -72,8 +77,12 @@ impl Tables {
         match name {
             b"table" => {
                 self.depth += 1;
-                self.tables.push(Vec::new());
+                self.tables.push(titled(&self.title).into_iter().collect());
                 self.hanging.clear();
+            }
+            b"h1" | b"h2" | b"h3" | b"h4" | b"h5" | b"h6" | b"caption" => {
+                self.title.clear();
+                self.is_in_title = true;
             }
             b"tr" => {
                 self.end_row();
@@ -96,6 +105,11 @@ impl Tables {
             }
             b"tr" => self.end_row(),
             b"td" | b"th" => self.end_cell(),
+            b"caption" => {
+                self.is_in_title = false;
+                self.tables.last_mut().into_iter().for_each(|rows| rows.extend(titled(&self.title)));
+            }
+            b"h1" | b"h2" | b"h3" | b"h4" | b"h5" | b"h6" => self.is_in_title = false,
             _ => self.cell.iter_mut().for_each(|(text, ..)| text.push(' ')),
         }
     }

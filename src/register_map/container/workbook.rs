@@ -2,7 +2,7 @@
 
 use std::io::{Cursor, Read};
 
-use calamine::{DataRef, Reader, Xlsx};
+use calamine::{DataRef, Dimensions, Reader, Xlsx};
 
 use crate::{register_map::list::cells::Cells, t};
 
@@ -26,7 +26,8 @@ pub fn sheets(bytes: &[u8]) -> Result<Vec<(String, Vec<Cells>)>, String> {
     let mut sheets = Vec::new();
     for name in book.sheet_names().into_iter().take(SHEETS_MAX) {
         // A sheet that is a chart has no cells.
-        if let Ok(rows) = rows(&mut book, &name) {
+        if let Ok(mut rows) = rows(&mut book, &name) {
+            spread(&mut rows, &book.merge_cells_by_sheet_name(&name).unwrap_or_default());
             sheets.push((name, rows));
         }
     }
@@ -80,12 +81,30 @@ fn rows(book: &mut Xlsx<Cursor<&[u8]>>, name: &str) -> Result<Vec<Cells>, calami
     Ok(rows)
 }
 
+/// A cell that is merged downwards holds for each of its rows.
+fn spread(rows: &mut [Cells], merged: &[Dimensions]) {
+    let at = |number: u32| usize::try_from(number).unwrap_or(0);
+    for one in merged.iter().filter(|one| one.start.0 < one.end.0 && one.start.1 < COLUMNS_MAX) {
+        let (first, last, column) = (at(one.start.0) + 1, at(one.end.0) + 1, at(one.start.1));
+        let from = rows.partition_point(|row| row.line < first);
+        let to = rows.partition_point(|row| row.line <= last);
+        let above = rows.get(from).filter(|row| row.line == first).and_then(|row| row.cells.get(column)).cloned();
+        let Some(text) = above.filter(|text| !text.is_empty()) else { continue };
+        for row in &mut rows[from + 1..to] {
+            let width = row.cells.len().max(column + 1);
+            row.cells.resize(width, String::new());
+            row.cells[column].clone_from(&text);
+        }
+    }
+}
+
 /// A number of a cell is a float that shows no more digits than it has.
 fn text(value: &DataRef<'_>) -> String {
     let text = match value {
         DataRef::Empty => String::new(),
         DataRef::Int(number) => number.to_string(),
-        DataRef::Float(number) => number.to_string(),
+        // With the fifteen digits that a spreadsheet has.
+        DataRef::Float(number) => format!("{number:.14e}").parse().unwrap_or(*number).to_string(),
         DataRef::Bool(flag) => flag.to_string(),
         DataRef::String(text) => text.clone(),
         DataRef::SharedString(text) => (*text).to_owned(),

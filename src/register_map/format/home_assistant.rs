@@ -58,6 +58,9 @@ const ARRAY_MAX: i64 = 1_000;
 pub fn read(tree: &Tree, context: &ListContext) -> List {
     let mut list = List::of_tree(tree);
     let hubs = tree.root.get("modbus").unwrap_or(&tree.root);
+    if let Value::Scalar(_) = hubs.value {
+        list.problems.push(t!("line {line}: `{section}` is in another file", line = hubs.line, section = "modbus"));
+    }
     // A file that is included has the sensors of one hub, without their key.
     let is_sensors = hubs.items().iter().all(|item| item.get("address").is_some());
     if is_sensors {

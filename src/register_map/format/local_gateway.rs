@@ -72,6 +72,9 @@ pub fn read(tree: &Tree, _: &ListContext) -> List {
             list.push_of(&ListContext::default(), None, item.line, named);
         }
     }
+    for (key, item) in tree.root.get("composite").map_or(&[][..], Node::entries) {
+        list.push_of(&ListContext::default(), None, item.line, Err(format!("{key}: {}", unsaid("composite"))));
+    }
     list
 }
 

@@ -3,6 +3,7 @@
 use super::{
     cells::{Cells, of_text},
     columns::{Column, Columns},
+    headings::Heading,
     row::{differ, unfit},
     words::{
         BadNumber, access_of, bad_of, bit_field_of, labels_of, number_of, poll_of, power_of_ten, type_of,
@@ -94,10 +95,10 @@ impl<'a> Reader<'a> {
     /// The factor of all columns that have one.
     pub fn factor(&mut self) -> Option<f64> {
         // 0 is none to ioBroker, which then takes 1.
-        let is_iobroker = self.columns.is_iobroker;
-        let number = move |cell: &str| match number_of(cell) {
-            Some(0.0) if is_iobroker => Some(1.0),
-            found => found.or(with_unit(cell).map(|(factor, _)| factor)).filter(|number| *number != 0.0),
+        let columns = self.columns;
+        let number = |cell: &str| match number_of(cell) {
+            Some(0.0) if columns.is_iobroker => Some(1.0),
+            found => found.or(with_unit(columns, cell).map(|(factor, _)| factor)).filter(|number| *number != 0.0),
         };
         let power = |cell: &str| cell.parse::<i8>().ok().map(f64::from);
         let scale = self.read(Column::Scale, number);
@@ -144,9 +145,11 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// `0.1 V` as a resolution: the factor, and the unit of the value.
-pub fn with_unit(cell: &str) -> Option<(f64, String)> {
-    // A number alone has none.
+/// `0.1 V` as a resolution: the factor, and the unit of the value. As a factor, 1 % may be 0.01 as well.
+pub fn with_unit(columns: &Columns, cell: &str) -> Option<(f64, String)> {
+    let place = *columns.places(Column::Scale).first()?;
+    let is_resolution = Heading::new(&columns.headings[place]).has(&["resolution", "auflösung", "résolution"]);
+    // A number alone has no unit.
     let is_number = cell.starts_with(|sign: char| sign.is_ascii_digit()) && number_of(cell).is_none();
-    unit_with_factor(cell).ok().filter(|(_, unit)| is_number && is_known_unit(unit))
+    unit_with_factor(cell).ok().filter(|(_, unit)| is_resolution && is_number && is_known_unit(unit))
 }

@@ -33,6 +33,8 @@ pub struct Row {
     pub base: Option<AddressBase>,
     pub(super) name: String,
     pub(super) kind: Option<String>,
+    /// A column says the tables of all rows.
+    pub is_tabled: bool,
     /// A column says the types of all rows.
     is_typed: bool,
     signed: Option<bool>,
@@ -154,6 +156,7 @@ impl Row {
         }
         read.take_span(&mut reader);
         read.width = reader.read(Column::Width, width_of);
+        read.is_tabled = columns.means.iter().flatten().any(|means| matches!(means, Column::Table | Column::Area));
         read.table = reader.read(Column::Table, table_of).or_else(|| reader.read(Column::Area, area));
         read.device = reader.read(Column::Device, |cell| cell.parse().ok());
         read.order = reader.read(Column::Order, order_of);
@@ -190,7 +193,8 @@ impl Row {
 
     /// The unit, and a factor that stands in front of it.
     fn read_unit(&mut self, reader: &mut Reader<'_>) {
-        let of_scale = reader.text(Column::Scale).and_then(|cell| Some((cell, with_unit(cell)?.1)));
+        let columns = reader.columns;
+        let of_scale = reader.text(Column::Scale).and_then(|cell| Some((cell, with_unit(columns, cell)?.1)));
         let Some(cell) = reader.text(Column::Unit) else {
             self.unit = of_scale.map(|(_, unit)| unit).unwrap_or_default();
             return;

@@ -288,3 +288,10 @@ fn a_model_of_sunspec_follows_its_sizes_and_factors() {
     let warnings = list_of(text).warnings;
     assert!(warnings[0].contains("40070") && warnings[1].contains("it is taken once"), "{warnings:?}");
 }
+
+#[test]
+fn what_stands_in_another_place_of_a_configuration_is_said() {
+    let text = "read_only_word:\n  a: { address: 1 }\ncomposite:\n  clock: { type: datetime, fields: { year: { address: 10 } } }\n";
+    assert_eq!(read(text).1, ["line 4: clock: `composite` cannot be said in a profile"]);
+    assert_eq!(list_of("modbus: !include modbus.yaml\n").problems, ["line 1: `modbus` is in another file"]);
+}

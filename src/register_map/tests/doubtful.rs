@@ -114,6 +114,7 @@ fn a_factor_in_front_of_a_unit_counts() {
     let resolution = "address;name;type;resolution;unit\n5;a;int16;0.1 V;V\n6;b;int16;0.1°C;\n7;c;int16;0.1 V;mV\n";
     let taken = ["40006 a int16 ABCD x0.1 V", "40007 b int16 ABCD x0.1 °C"];
     check(resolution, &taken, &["7: `0.1 V` and `mV` differ"], &[]);
+    check("address;name;type;factor\n5;a;int16;1%\n6;b;int16;0.1\n", &["40007 b int16 ABCD x0.1"], &["`1%`"], &[]);
 }
 
 #[test]

@@ -64,3 +64,43 @@ fn every_sheet_of_a_workbook_is_a_list() {
         alone.refused.is_some_and(|why| why.contains("no column of addresses") && why.contains("What can be read"))
     );
 }
+
+#[test]
+fn a_title_says_the_table_of_the_rows_below_it() {
+    let expect = ["30001 V float32 ABCD x1", "00011 A bool ABCD x1"].map(str::to_owned).to_vec();
+    for text in [
+        "# Meter\n\n## Input registers (FC 04)\n\n| Address | Name | Type |\n|---|---|---|\n| 0 | V | float32 |\n\n## Coils\n\n| Address | Name | Type |\n|---|---|---|\n| 10 | A | bool |\n",
+        "Input registers;;\nAddress;Name;Type\n0;V;float32\nCoils;;\nAddress;Name;Type\n10;A;bool\n",
+        "Address;Name;Type\nInput registers;;\n0;V;float32\nCoils;;\n10;A;bool\n",
+        "<h2>Input registers</h2><table><tr><th>Address</th><th>Name</th><th>Type</th></tr><tr><td>0</td><td>V</td><td>float32</td></tr></table><table><caption>Coils</caption><tr><th>Address</th><th>Name</th><th>Type</th></tr><tr><td>10</td><td>A</td><td>bool</td></tr></table>",
+    ] {
+        assert_eq!(read(text), (expect.clone(), Vec::new()), "{text}");
+    }
+    let other = "Input registers;;\nAddress;Name;Type\n300001;V;float32\nMore;;\n400011;A;int16\n";
+    assert_eq!(read(other).0, ["30001 V float32 ABCD x1", "40011 A int16 ABCD x1"], "a number says more");
+    let rows: &[[&str; 4]] = &[["Address", "Name", "Type", ""], ["5", "A", "int16", ""]];
+    let bytes = workbook(&[("Input registers", rows), ("Holding", rows), ("Coils", rows)]);
+    let list = crate::register_map::read(&bytes, &ListContext::default());
+    let named: Vec<String> = list.named.iter().map(shown).collect();
+    assert_eq!(named, ["30006 A int16 ABCD x1", "40006 A int16 ABCD x1", "00006 A bool ABCD x1"]);
+}
+
+#[test]
+fn a_gap_in_the_column_of_tables_is_no_holding_register() {
+    let text = "FC;Address;Name;Type\n4;0;A;int16\n;1;B;int16\n3;10;C;int16\n";
+    let (named, problems) = read(text);
+    assert_eq!(named, ["30001 A int16 ABCD x1", "40011 C int16 ABCD x1"]);
+    assert_eq!(problems, ["line 3: 1: `` is no table"]);
+    let mut book = Workbook::new();
+    let sheet = book.add_worksheet();
+    let format = rust_xlsxwriter::Format::new();
+    for (y, row) in (0..).zip([["FC", "Address", "Name"], ["", "0", "A"], ["", "1", "B"], ["3", "10", "C"]]) {
+        for (x, cell) in (0..).zip(row).filter(|(_, cell)| !cell.is_empty()) {
+            sheet.write(y, x, cell).expect("it fits");
+        }
+    }
+    sheet.merge_range(1, 0, 2, 0, "4", &format).expect("it fits");
+    let list = crate::register_map::read(&book.save_to_buffer().expect("a buffer"), &ListContext::default());
+    let named: Vec<String> = list.named.iter().map(shown).collect();
+    assert_eq!(named, ["30001 A uint16 ABCD x1", "30002 B uint16 ABCD x1", "40011 C uint16 ABCD x1"]);
+}

@@ -1,0 +1,73 @@
+//! Lines between the rows that name the table of those below: `## Input registers`, `Coils;;;`, the name of a sheet.
+
+use super::{
+    cells::Cells,
+    columns::{first_of, is_address},
+    row::{Row, unfit},
+    words::table_of,
+};
+use crate::{
+    plant::{address::of_modicon, tag::Table},
+    register_map::list::Column,
+};
+
+/// More words than this are a sentence.
+const WORDS_MAX: usize = 6;
+
+/// The table that a line names for what stands below it.
+pub fn table_below(cells: &[String]) -> Option<Table> {
+    let mut filled = cells.iter().map(String::as_str).filter(|cell| !cell.is_empty());
+    let first = filled.next()?;
+    let is_title = |text: &str| {
+        let words = || text.split_whitespace();
+        // A code alone is a cell of a row.
+        text.chars().filter(|sign| sign.is_alphabetic()).count() >= 4
+            && words().count() <= WORDS_MAX
+            && words().all(|word| word != "not" && word != "no")
+    };
+    let plain = first.trim_matches(|sign: char| !sign.is_alphanumeric());
+    // One that spans several columns stands in each.
+    if is_title(plain) && filled.all(|cell| cell == first) { table_of(plain) } else { None }
+}
+
+/// A title above rows, such as the name of their sheet, as a line of its own where it names a table.
+pub fn titled(title: &str) -> Option<Cells> {
+    let cells = vec![title.to_owned()];
+    table_below(&cells).map(|_| Cells { line: 0, cells, is_unclosed: false })
+}
+
+/// The rows without such lines, and of each its number with the table.
+pub fn split(all: &[Cells], is_separated: bool) -> (Vec<Cells>, Vec<(usize, Table)>) {
+    let mut sections = Vec::new();
+    let (mut rows, mut is_below) = (Vec::new(), false);
+    for row in all {
+        let joined = [row.cells.join(" ")];
+        // The words of a line of a PDF are a cell each.
+        let cells = if is_separated { &row.cells } else { &joined[..] };
+        let table = table_below(cells).filter(|_| !row.cells.iter().any(|cell| is_address(cell)));
+        match table {
+            Some(table) => sections.push((row.line, table)),
+            None => rows.push(row.clone()),
+        }
+        is_below |= table.is_none();
+    }
+    // A list of nothing but such lines is none, which its refusal says of all of them.
+    if is_below { (rows, sections) } else { (all.to_vec(), Vec::new()) }
+}
+
+/// Gives the rows the tables of their sections. One without a table where others of its list have a cell for it has none:
+/// merged cells leave such gaps.
+pub fn assign(rows: &mut [Row], sections: &[(usize, Table)], is_stated: bool) {
+    let is_some_stated = rows.iter().any(|row| row.is_tabled && row.table.is_some());
+    for row in rows.iter_mut().filter(|row| row.table.is_none()) {
+        let Some(written) = row.address.as_deref().map(first_of) else { continue };
+        let modicon = of_modicon(written).map(|(table, _)| table);
+        let above = sections.iter().rev().find(|(line, _)| *line <= row.line).map(|(_, table)| *table);
+        // A number of another table says more than a line far above.
+        row.table = above.filter(|above| modicon.is_none_or(|table| table == *above));
+        let is_clear = row.table.is_some() || modicon.is_some() || is_stated || written.contains(':');
+        if is_some_stated && row.is_tabled && !is_clear {
+            row.wrong.get_or_insert(unfit(Column::Table, ""));
+        }
+    }
+}
