@@ -25,7 +25,9 @@ pub fn table_below(cells: &[String]) -> Option<Table> {
             && words().count() <= WORDS_MAX
             && words().all(|word| word != "not" && word != "no")
     };
-    let plain = first.trim_matches(|sign: char| !sign.is_alphanumeric());
+    // The number of a chapter is no function code.
+    let plain = first.trim_start_matches(|sign: char| !sign.is_alphabetic());
+    let plain = plain.trim_end_matches(|sign: char| !sign.is_alphanumeric());
     // One that spans several columns stands in each.
     if is_title(plain) && filled.all(|cell| cell == first) { table_of(plain) } else { None }
 }

@@ -78,6 +78,10 @@ fn a_title_says_the_table_of_the_rows_below_it() {
     }
     let other = "Input registers;;\nAddress;Name;Type\n300001;V;float32\nMore;;\n400011;A;int16\n";
     assert_eq!(read(other).0, ["30001 V float32 ABCD x1", "40011 A int16 ABCD x1"], "a number says more");
+    let chapters =
+        "Address;Name;Type\n4. Diagnostics;;\n5;A;int16\n2 Alarms;;\n6;B;int16\n3.1 Input registers;;\n7;C;int16\n";
+    let expect = ["40006 A int16 ABCD x1", "40007 B int16 ABCD x1", "30008 C int16 ABCD x1"];
+    assert_eq!(read(chapters).0, expect, "the number of a chapter is no function code");
     let rows: &[[&str; 4]] = &[["Address", "Name", "Type", ""], ["5", "A", "int16", ""]];
     let bytes = workbook(&[("Input registers", rows), ("Holding", rows), ("Coils", rows)]);
     let list = crate::register_map::read(&bytes, &ListContext::default());
