@@ -1,6 +1,6 @@
 //! A text becomes rows of cells: at one separator for the whole text where its heading has one, else line by line.
 
-use super::{headings::is_heading, sections::table_below};
+use super::{headings::is_heading, sections::title_of};
 
 /// Most rows of a list.
 pub const ROWS_MAX: usize = 10_000;
@@ -69,8 +69,8 @@ pub fn without_rules(all: Vec<Cells>) -> Vec<Cells> {
     // `#address;name` heads the rows, unless another row does.
     let is_only = !all.iter().any(|row| !is_marked(row) && is_heading(&row.cells));
     let is_comment = |row: &Cells| is_marked(row) && !is_numbered && !(is_only && is_heading(&row.cells));
-    // `## Input registers` is no comment.
-    let is_left_out = |row: &Cells| is_rule(&row.cells) || is_comment(row) && table_below(&row.cells).is_none();
+    // `## Input registers` is no comment, and the heading of the next part is none.
+    let is_left_out = |row: &Cells| is_rule(&row.cells) || is_comment(row) && title_of(&row.cells).is_none();
     all.into_iter().filter(|row| !is_left_out(row)).take(ROWS_MAX).collect()
 }
 

@@ -1,4 +1,5 @@
-//! Lines between the rows that name the table of those below: `## Input registers`, `Coils;;;`, the name of a sheet.
+//! Lines between the rows that name the table of those below: `## Input registers`, `Coils;;;`, the name of a sheet. A heading
+//! of Markdown that names none ends such a part, unless it is below it.
 
 use super::{
     cells::Cells,
@@ -15,7 +16,7 @@ use crate::{
 const WORDS_MAX: usize = 6;
 
 /// The table that a line names for what stands below it.
-pub fn table_below(cells: &[String]) -> Option<Table> {
+fn table_below(cells: &[String]) -> Option<Table> {
     let mut filled = cells.iter().map(String::as_str).filter(|cell| !cell.is_empty());
     let first = filled.next()?;
     let is_title = |text: &str| {
@@ -32,26 +33,39 @@ pub fn table_below(cells: &[String]) -> Option<Table> {
     if is_title(plain) && filled.all(|cell| cell == first) { table_of(plain) } else { None }
 }
 
+/// A line between rows: how many `#` stand before it, and the table that it names. One `#` alone may as well be a comment.
+pub fn title_of(cells: &[String]) -> Option<(usize, Option<Table>)> {
+    let first = cells.first()?;
+    let level = first.chars().take_while(|sign| *sign == '#').count();
+    let is_heading = || 2 <= level && first.contains(char::is_alphabetic) && cells[1..].iter().all(String::is_empty);
+    let table = table_below(cells);
+    (table.is_some() || is_heading()).then_some((level, table))
+}
+
 /// A title above rows, such as the name of their sheet, as a line of its own where it names a table.
 pub fn titled(title: &str) -> Option<Cells> {
     let cells = vec![title.to_owned()];
     table_below(&cells).map(|_| Cells { line: 0, cells, is_unclosed: false })
 }
 
-/// The rows without such lines, and of each its number with the table.
-pub fn split(all: &[Cells], is_separated: bool) -> (Vec<Cells>, Vec<(usize, Table)>) {
-    let mut sections = Vec::new();
+/// The rows without such lines, and of each its number with the table, if one holds from there on.
+pub fn split(all: &[Cells], is_separated: bool) -> (Vec<Cells>, Vec<(usize, Option<Table>)>) {
+    let (mut sections, mut section_level) = (Vec::new(), 0);
     let (mut rows, mut is_below) = (Vec::new(), false);
     for row in all {
         let joined = [row.cells.join(" ")];
         // The words of a line of a PDF are a cell each.
         let cells = if is_separated { &row.cells } else { &joined[..] };
-        let table = table_below(cells).filter(|_| !row.cells.iter().any(|cell| is_address(cell)));
-        match table {
-            Some(table) => sections.push((row.line, table)),
+        let title = title_of(cells).filter(|_| !row.cells.iter().any(|cell| is_address(cell)));
+        match title {
+            Some((level, table)) if table.is_some() || level <= section_level => {
+                sections.push((row.line, table));
+                section_level = level;
+            }
+            Some(_) => {}
             None => rows.push(row.clone()),
         }
-        is_below |= table.is_none();
+        is_below |= title.is_none();
     }
     // A list of nothing but such lines is none, which its refusal says of all of them.
     if is_below { (rows, sections) } else { (all.to_vec(), Vec::new()) }
@@ -59,12 +73,12 @@ pub fn split(all: &[Cells], is_separated: bool) -> (Vec<Cells>, Vec<(usize, Tabl
 
 /// Gives the rows the tables of their sections. One without a table where others of its list have a cell for it has none:
 /// merged cells leave such gaps.
-pub fn assign(rows: &mut [Row], sections: &[(usize, Table)], is_stated: bool) {
+pub fn assign(rows: &mut [Row], sections: &[(usize, Option<Table>)], is_stated: bool) {
     let is_some_stated = rows.iter().any(|row| row.is_tabled && row.table.is_some());
     for row in rows.iter_mut().filter(|row| row.table.is_none()) {
         let Some(written) = row.address.as_deref().map(first_of) else { continue };
         let modicon = of_modicon(written).map(|(table, _)| table);
-        let above = sections.iter().rev().find(|(line, _)| *line <= row.line).map(|(_, table)| *table);
+        let above = sections.iter().rev().find(|(line, _)| *line <= row.line).and_then(|(_, table)| *table);
         // A number of another table says more than a line far above.
         row.table = above.filter(|above| modicon.is_none_or(|table| table == *above));
         let is_clear = row.table.is_some() || modicon.is_some() || is_stated || written.contains(':');

@@ -82,6 +82,11 @@ fn a_title_says_the_table_of_the_rows_below_it() {
         "Address;Name;Type\n4. Diagnostics;;\n5;A;int16\n2 Alarms;;\n6;B;int16\n3.1 Input registers;;\n7;C;int16\n";
     let expect = ["40006 A int16 ABCD x1", "40007 B int16 ABCD x1", "30008 C int16 ABCD x1"];
     assert_eq!(read(chapters).0, expect, "the number of a chapter is no function code");
+    let table = |n: u16| format!("| Address | Name | Type |\n|---|---|---|\n| {n} | T{n} | int16 |\n\n");
+    let parts = ["## Input registers", "### Phases", "## Configuration", "### Clock"];
+    let text: String = parts.iter().zip(1..).map(|(part, n)| format!("{part}\n\n{}", table(n))).collect();
+    let expect = ["30002 T1", "30003 T2", "40004 T3", "40005 T4"].map(|row| format!("{row} int16 ABCD x1"));
+    assert_eq!(read(&text).0, expect, "another part of the list ends it");
     let rows: &[[&str; 4]] = &[["Address", "Name", "Type", ""], ["5", "A", "int16", ""]];
     let bytes = workbook(&[("Input registers", rows), ("Holding", rows), ("Coils", rows)]);
     let list = crate::register_map::read(&bytes, &ListContext::default());
