@@ -133,6 +133,8 @@ pub enum LineTrouble {
     System(String),
 }
 
+/// Tests say any words.
+#[cfg(test)]
 impl From<&str> for LineTrouble {
     fn from(words: &str) -> LineTrouble {
         LineTrouble::System(words.to_owned())

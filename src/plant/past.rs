@@ -10,6 +10,7 @@ use super::{
     event::{LineCounters, LineState},
     interlock::ActuatorTracker,
     line_minute::LineMinute,
+    line_trouble::LineTrouble,
     record::AlarmRecord,
     reducer::Plant,
     sample::{Cause, Quality, Sample},
@@ -86,7 +87,7 @@ impl Past {
         let samples: Vec<Sample> = devices.flat_map(|device| self.samples_of(def, device)).collect();
         let counted = self.minutes.get(line.index()).is_some_and(Option::is_some);
         if samples.iter().any(|sample| sample.quality == Quality::Bad(Cause::NotConnected)) {
-            LineState::Waiting { why: Cause::NotConnected.word().into(), retry_at: self.at }
+            LineState::Waiting { why: LineTrouble::NotConnected, retry_at: self.at }
         } else if counted || samples.iter().any(|sample| is_of_requests(sample.quality)) {
             LineState::Connected
         } else {

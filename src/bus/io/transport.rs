@@ -53,7 +53,7 @@ impl Connector {
             Connector::Real(transport) => open(transport).await,
             Connector::Memory(streams) => match streams.try_recv() {
                 Ok(stream) => Ok(Opened { stream: Box::new(stream), pause: Pause::Coarse, watch: None }),
-                Err(_) => Err("no such port".into()),
+                Err(_) => Err(LineTrouble::System("no such port".to_owned())),
             },
         }
     }
