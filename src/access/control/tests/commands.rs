@@ -85,7 +85,7 @@ fn a_tag_with_second_user_is_written_only_with_one() {
             RequestRefusal::ApproverRole { name: "view".into(), needed: Role::Technician },
         ),
         (credentials(Some("boss"), "guess"), wrong.clone()),
-        (credentials(Some("nobody"), BOSS), wrong),
+        (credentials(Some("stranger"), BOSS), wrong),
     ];
     for (credentials, why) in refused {
         let (_, refused) = bench.send_command(1, SV, credentials).unwrap();
