@@ -194,7 +194,7 @@ fn the_station_reads_pymodbus_over_udp_and_no_faulty_answer() {
     for mode in ["udp", "rtu-over-udp"] {
         let port = free_port();
         let _slave = slave(&python, mode, &port.to_string());
-        let said = read_faults(&[WELL, CORRUPT, SILENT, CUT], mode, &format!("127.0.0.1:{port}"));
+        let said = read_faults(&[WELL, LATE, CORRUPT, SILENT, CUT], mode, &format!("127.0.0.1:{port}"));
         check(&said, &[("WELL.N", "10 good")]);
         for tag in ["CORRUPT.N", "SILENT.N", "CUT.N"] {
             check(&said, &[(tag, "---- bad: device not responding")]);

@@ -77,7 +77,7 @@ def send(frame):
     """Sends what is late. A library's action that waits would not do: its answer gets unit and transaction of the latest request,
     so that no master could tell it from a right one."""
     for connection in list(server.active_connections.values()):
-        connection.send(frame)
+        connection.send(frame, addr=connection.last_addr if "udp" in KIND else None)
 
 
 def trace_packet(sending, frame):
