@@ -51,6 +51,8 @@ const BEFORE: SignedDuration = SignedDuration::from_secs(5);
 const AFTER: SignedDuration = SignedDuration::from_millis(600);
 /// Samples of the last seconds may be lost.
 const LAST: SignedDuration = SignedDuration::from_secs(3);
+/// In an entry of the audit log.
+const END: &str = r#""action":"end procedure""#;
 const STOP_MAX: Duration = Duration::from_secs(30);
 
 /// How a life goes.
@@ -82,6 +84,7 @@ pub fn main(seed: u64) -> ExitCode {
         folder,
     };
     say("life", &life.name);
+    let life = life.without_ended_procedures();
     let base = Timestamp::from_second(said("SIGHTGLASS_BASE").parse().unwrap()).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build().unwrap();
     runtime.block_on(life.live(base));
@@ -92,6 +95,16 @@ pub fn main(seed: u64) -> ExitCode {
 impl Life {
     fn history(&self) -> PathBuf {
         self.folder.join("state/sightglass/tank.duckdb")
+    }
+
+    /// The one that was seen at work may have ended before the station did: the log says so.
+    fn without_ended_procedures(mut self) -> Life {
+        let log = std::fs::read_to_string(audit_log::beside(&self.history())).unwrap_or_default();
+        let is_of_procedure = |line: &&str| line.contains(r#""action":"start procedure""#) || line.contains(END);
+        if log.lines().rfind(is_of_procedure).is_some_and(|line| line.contains(END)) {
+            self.facts.procedures.clear();
+        }
+        self
     }
 
     async fn live(mut self, base: Timestamp) {

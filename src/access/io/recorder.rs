@@ -1,5 +1,6 @@
 //! The one thread that writes actions and alarm state to disk before they are reported as recorded: the audit log first.
 
+mod completion;
 mod start;
 
 use std::{
@@ -23,15 +24,12 @@ use super::{
     sealing,
 };
 use crate::{
-    access::{
-        audit_log::{Comparison, START, compare, fit},
-        sealing::is_due,
-    },
+    access::{audit_log::fit, sealing::is_due},
     bus::io::{clock::Clock, worker::Worker},
     history::{
         io::{
             alarm_file::{self, AlarmFile, RestoredAlarms},
-            chain::{CHAIN_HASHES_MAX, StoredEntries},
+            chain::StoredEntries,
             thread::{HistoryInput, offer},
         },
         words::plain,
@@ -118,9 +116,11 @@ struct Recorder {
     audit_log: Option<AuditLog>,
     alarms: AlarmFile,
     pending: Vec<Pending>,
-    /// The latest entries of the log at the start, until they were compared with the history, and its chain hash then.
-    tail: VecDeque<ActionRecord>,
-    last_at_start: ChainHash,
+    /// The latest entries of the log when it was first opened, and what the history held when it was; compared once both
+    /// are known, whichever comes first.
+    tail: Option<VecDeque<ActionRecord>>,
+    entries: Option<StoredEntries>,
+    is_compared: bool,
     /// What was found wrong in the log and in the alarm-state file: true until the next start.
     found: Vec<String>,
     alarms_found: Option<String>,
@@ -150,8 +150,9 @@ impl Recorder {
             audit_log: None,
             alarms,
             pending: Vec::new(),
-            tail: VecDeque::new(),
-            last_at_start: START,
+            tail: None,
+            entries: None,
+            is_compared: false,
             found: Vec::new(),
             alarms_found: found.trouble.clone(),
             log_fault: None,
@@ -175,9 +176,7 @@ impl Recorder {
         history: mpsc::Sender<HistoryInput>,
     ) -> (Recorder, (Opened, RestoredAlarms)) {
         let (mut recorder, alarms) = Recorder::new(history_file, clock, history);
-        let mut opened = recorder.open();
-        recorder.tail = std::mem::take(&mut opened.tail);
-        recorder.last_at_start = recorder.tail.back().and_then(|entry| entry.chain_hash).unwrap_or(START);
+        let opened = recorder.open();
         (recorder, (opened, alarms))
     }
 
@@ -190,7 +189,7 @@ impl Recorder {
             }
             messages.drain(..).for_each(|message| match message {
                 Message::WriteGroup(group) => self.on_group(group),
-                Message::Stored(entries) => self.compare(entries),
+                Message::Stored(entries) => self.on_stored(entries),
             });
             self.write();
             status.send_replace(self.status());
@@ -220,30 +219,6 @@ impl Recorder {
         self.alarms.on_events(events);
     }
 
-    /// Compares the history with the log as both were at the start, and sends it what it lacks: a station that was killed
-    /// had written it here first.
-    fn compare(&mut self, StoredEntries { chain_hashes: rows, unchained }: StoredEntries) {
-        let tail = std::mem::take(&mut self.tail);
-        let Comparison { missing, differing, not_in_log } = compare(&tail, self.last_at_start, &rows, CHAIN_HASHES_MAX);
-        let mut wrong = Vec::new();
-        if let Some(first) = differing.first() {
-            wrong.push(format!("{} entries differ from the history, the first is {first}", differing.len()));
-        }
-        if let (Some(first), false) = (not_in_log.iter().min(), self.last_at_start == START && rows.is_empty()) {
-            wrong.push(format!("it lacks {} entries that the history holds, from {first} on", not_in_log.len()));
-        }
-        let completed = (!missing.is_empty()).then(|| format!("{} entries were missing in the history", missing.len()));
-        // It was killed while the log could not be written.
-        let is_in_log = |action: &ActionRecord| tail.iter().any(|entry| is_same(entry, action));
-        let lacking: Vec<_> = unchained.into_iter().map(fit).filter(|action| !is_in_log(action)).collect();
-        let appended = (!lacking.is_empty()).then(|| format!("{} actions were in the history only", lacking.len()));
-        let notes: Vec<_> = wrong.iter().chain(&completed).chain(&appended).map(|words| self.note(words)).collect();
-        let lacking = lacking.into_iter().map(|action| Pending { action, stored: true });
-        self.pending.extend(lacking.chain(notes.into_iter().map(|action| Pending { action, stored: false })));
-        self.found.extend(wrong.iter().map(|words| format!("the audit log does not agree with the history: {words}")));
-        self.store(missing);
-    }
-
     /// The log first: a loss of power between the two leaves no acknowledged alarm without a trace of who did it.
     fn write(&mut self) {
         if self.audit_log.is_none() && REOPEN <= self.opened_at.elapsed() {
@@ -266,7 +241,7 @@ impl Recorder {
     fn open(&mut self) -> Opened {
         self.opened_at = Instant::now();
         match AuditLog::open(&self.path) {
-            Ok((audit_log, opened)) => {
+            Ok((audit_log, mut opened)) => {
                 (self.audit_log, self.in_use) = (Some(audit_log), false);
                 let broken: Vec<_> = opened.wrong.iter().filter(|wrong| wrong.contains("broken")).cloned().collect();
                 if !broken.is_empty() {
@@ -277,6 +252,7 @@ impl Recorder {
                 // In front of what waits.
                 self.pending.splice(0..0, notes.into_iter().map(|action| Pending { action, stored: false }));
                 self.write_log();
+                self.on_opened(std::mem::take(&mut opened.tail));
                 opened
             }
             Err(error) => {

@@ -47,6 +47,8 @@ pub enum HistoryInput {
     Records(Vec<Record>),
     /// The plant has another definition: what follows has its ids.
     Definition(Definition),
+    /// What it lacked of the audit log at the start was sent before this.
+    Completed,
 }
 
 impl From<Vec<Record>> for HistoryInput {
@@ -235,6 +237,7 @@ async fn run(
                     writer.commit(clock.utc());
                     outputs.publish(writer);
                 },
+                Some(HistoryInput::Completed) => writer.completed(),
                 Some(HistoryInput::Definition(Definition { def, queries, restored })) => {
                     writer.redefine(def, queries, clock.utc());
                     restoring = restored.or(restoring);
@@ -248,7 +251,7 @@ async fn run(
                     writer.commit(clock.utc());
                     outputs.publish(writer);
                     // The query may have been cancelled meanwhile.
-                    let _ = done.send(writer.status().waiting);
+                    let _ = done.send(writer.unstored());
                 }
                 WriterRequest::Unreadable(what) => {
                     writer.unreadable(what);

@@ -48,6 +48,8 @@ pub struct Writer {
     store: Option<Store>,
     /// What the station restores from the store, until it is taken.
     restored: Option<Restored>,
+    /// The audit log may have entries that the store lacks: they are not compared yet.
+    lacks_entries: bool,
     /// Where each store goes that is opened, and none before one is closed.
     reader: Option<mpsc::Sender<HandedOver>>,
     /// The store that was closed: readers may still have connections to it.
@@ -106,7 +108,19 @@ impl Writer {
 
     /// What a station restores from its history, once after it was opened for the first time.
     pub fn take_restored(&mut self) -> Option<Restored> {
-        self.restored.take()
+        let restored = self.restored.take()?;
+        self.lacks_entries = restored.entries.is_some();
+        Some(restored)
+    }
+
+    /// What was missing of the audit log has been taken.
+    pub fn completed(&mut self) {
+        self.lacks_entries = false;
+    }
+
+    /// How many records wait for the store; `None` where entries of the audit log may be missing in it, too.
+    pub fn unstored(&self) -> Option<u64> {
+        (!self.lacks_entries).then_some(self.status.waiting)
     }
 
     /// Whether a store should be opened now: there is none, all connections to the last one are closed, and the last

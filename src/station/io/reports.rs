@@ -59,6 +59,9 @@ const DISK_MAX: Duration = Duration::from_secs(10);
 const SILENT: &str = "the folder of reports does not respond";
 /// A report that takes too long is tried so often.
 const TOO_LONG_MAX: usize = 3;
+/// And one of which it is not known what it lacks: then it is made, and says so. An audit log that is never opened again
+/// costs no shift its report.
+const UNKNOWN_MAX: usize = 5;
 
 /// Everything that the task needs.
 pub(crate) struct ReportTask {
@@ -262,8 +265,9 @@ impl Maker {
             return Err(NotMade::Yet("the clock was set back".to_owned()));
         }
         // Its file would stay as it is.
-        if report.unstored != Some(0) {
-            return Err(NotMade::Yet("records wait for the disk of the history".to_owned()));
+        let is_last = self.failures.attempts(&due.sequence()) + 1 >= UNKNOWN_MAX;
+        if report.unstored.map_or(!is_last, |records| records > 0) {
+            return Err(NotMade::Yet("records wait for the disk of the history, or for the audit log".to_owned()));
         }
         let (def, rule) = (self.task.def.clone(), due.rule);
         let format = report::format(due.format).map_err(NotMade::Ever)?;

@@ -19,6 +19,7 @@ use crate::{
     },
 };
 
+mod completion;
 mod seals;
 mod torn;
 
@@ -53,7 +54,8 @@ fn group(actions: &[&str], events: &[AlarmEvent]) -> WriteGroup {
 /// What went to the history.
 fn stored(rows: &mut mpsc::Receiver<HistoryInput>) -> Vec<ActionRecord> {
     let mut kept = Vec::new();
-    while let Ok(HistoryInput::Records(group)) = rows.try_recv() {
+    while let Ok(input) = rows.try_recv() {
+        let HistoryInput::Records(group) = input else { continue };
         kept.extend(group.into_iter().map(|record| match record {
             Record::Action(record) => record,
             other => panic!("{other:?}"),
@@ -253,10 +255,10 @@ fn entries_about_the_log_itself_wait_for_the_disk_too() {
     life(&history_file, &["start"]);
     let (history, _rows) = mpsc::channel(64);
     let (mut recorder, _) = Recorder::new(&history_file, clock(), history);
-    recorder.tail = recorder.open().tail;
+    recorder.open();
     assert!(recorder.is_written());
     recorder.audit_log.as_mut().unwrap().set_file(fs::File::open(beside(&history_file)).unwrap());
-    recorder.compare(StoredEntries::default());
+    recorder.on_stored(StoredEntries::default());
     recorder.write();
     assert!(!recorder.is_written(), "it is tried again each second");
 }
@@ -277,57 +279,6 @@ fn acknowledgements_survive_without_a_history() {
     assert_eq!(found.events.unwrap(), group(&[], &[AlarmEvent::Raised, AlarmEvent::Acknowledged]).events);
     drop(groups);
     join.unwrap().join().unwrap();
-}
-
-/// What a start sends to a history that holds these entries, and what is wrong with the log then.
-fn compared(history_file: &Path, entries: StoredEntries) -> (Vec<ActionRecord>, Option<String>) {
-    let (history, mut stored_rows) = mpsc::channel(64);
-    let Handle { groups, recorded, join, .. } = start(history_file, clock(), history);
-    groups.try_send(Message::Stored(entries)).unwrap();
-    drop(groups);
-    join.unwrap().join().unwrap();
-    (stored(&mut stored_rows), recorded.borrow().log.clone())
-}
-
-/// What a station that was killed had written into the history while the log could not be written.
-#[test]
-fn the_log_is_completed_from_the_history() {
-    let folder = tempfile::tempdir().unwrap();
-    let history_file = folder.path().join("tank.duckdb");
-    let (rows, ..) = life(&history_file, &["start", "write"]);
-    let bare = |row: &ActionRecord| ActionRecord { chain_hash: None, ..row.clone() };
-    let only_there = ActionRecord { note: Some("by hand".into()), ..bare(&rows[1]) };
-    // The last entry was in the log, and the station killed before the history had its hash.
-    let unchained = vec![bare(&rows[1]), only_there.clone()];
-    let (sent, log) = compared(&history_file, StoredEntries { chain_hashes: chain_hashes(&rows[..1]), unchained });
-    assert_eq!(log, None, "nothing is wrong with the log");
-    assert_eq!(sent[0], rows[1], "it is in the log");
-    assert_eq!((bare(&sent[1]), sent[1].chain_hash.map(|hash| hash.number)), (only_there, Some(3)));
-    assert!(sent[2].outcome.contains("1 entries were missing in the history"), "{sent:?}");
-    assert!(sent[3].outcome.contains("1 actions were in the history only"), "{sent:?}");
-    let summary = verify(&beside(&history_file), &chain_hashes(&rows[..1])).unwrap();
-    assert_eq!((sent.len(), summary.entries), (4, 5));
-}
-
-/// What a station that was killed had written into the log and not into the history.
-#[test]
-fn the_history_is_completed_and_differences_are_reported() {
-    let folder = tempfile::tempdir().unwrap();
-    let history_file = folder.path().join("tank.duckdb");
-    let (rows, ..) = life(&history_file, &["start", "write", "acknowledge"]);
-    let compared = |chain_hashes| compared(&history_file, StoredEntries { chain_hashes, unchained: Vec::new() });
-    let (sent, log) = compared(chain_hashes(&rows[..1]));
-    assert_eq!(sent[..2], rows[1..], "the very entries, with their chain hashes");
-    assert!(sent.len() == 3 && sent[2].outcome.contains("2 entries were missing in the history"), "{sent:?}");
-    assert_eq!(log, None, "nothing is wrong with the log");
-    let all: Vec<ChainHash> = chain_hashes(&rows).into_iter().chain(chain_hashes(&sent[2..])).collect();
-    assert_eq!(compared(all.clone()), (Vec::new(), None), "nothing is missing any more");
-    let forged = ChainHash { hash: [7; 32], ..all[1] };
-    let (_, log) = compared([&all[..1], &[forged], &all[2..]].concat());
-    assert!(log.unwrap().contains("1 entries differ from the history, the first is 2"));
-    let ahead = ChainHash { number: 99, hash: [7; 32] };
-    let (_, log) = compared([&all[..], &[ahead]].concat());
-    assert!(log.unwrap().contains("lacks 1 entries that the history holds, from 99 on"));
 }
 
 #[test]

@@ -114,7 +114,7 @@ fn alarms_and_actions_fit_when_samples_fill_the_queue() {
     drop(queue);
     let records = || match waiting.blocking_recv()? {
         HistoryInput::Records(records) => Some(records),
-        HistoryInput::Definition(other) => panic!("{other:?}"),
+        other @ (HistoryInput::Definition(_) | HistoryInput::Completed) => panic!("{other:?}"),
     };
     let batches: Vec<_> = std::iter::from_fn(records).skip(sent as usize - 1).collect();
     assert_eq!(batches, [vec![alarm], vec![Record::Action(action(sent))]]);
@@ -207,7 +207,7 @@ async fn a_report_waits_for_the_commit_but_not_for_ever() {
         let Some(WriterRequest::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
         assert!(answer.try_recv().is_err(), "answered before the commit");
         if let Some(waiting) = stored {
-            done.send(waiting).unwrap();
+            done.send(Some(waiting)).unwrap();
         }
         let Ok(Ok(Answer::Report(report))) = answer.await else { panic!("no report") };
         assert_eq!(report.unstored, stored, "what is missing in it is said");

@@ -60,3 +60,14 @@ fn a_failing_archive_and_a_missing_file_are_said_once_each() {
     writer.archived(Ok(ArchiveOutcome::Idle(None)));
     assert_eq!(damaged(&writer), "missing of its archive: raw/1");
 }
+
+#[test]
+fn what_is_missing_is_known_after_the_log_was_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let now = Timestamp::from_second(1_000_000).unwrap();
+    let mut writer = Writer::open(folder.path().join("h.duckdb"), Arc::default(), now).unwrap();
+    assert!(writer.take_restored().unwrap().entries.is_some());
+    assert_eq!(writer.unstored(), None, "the log may have more");
+    writer.completed();
+    assert_eq!(writer.unstored(), Some(0));
+}

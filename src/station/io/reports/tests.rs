@@ -263,6 +263,17 @@ async fn a_report_is_not_made_while_records_wait_for_the_disk() {
     }
 }
 
+/// The audit log is never opened again: what the report lacks is not known, which it says.
+#[tokio::test(start_paused = true)]
+async fn a_report_of_which_it_is_unknown_what_it_lacks_is_made() {
+    let mut stand = Stand::new(&[(PeriodKind::Shift, "csv")], "2026-11-01T06:00+07");
+    let mut running = Running { unstored: None, ..stand.start(at("2026-11-01T06:00+07"), FOREVER) };
+    stand.follow(&mut running, at("2026-11-01T15:00+07")).await;
+    assert_eq!(stand.alarms.last(), Some(&FaultState::Cleared));
+    assert_eq!(stand.files(), stand.expected(PeriodKind::Shift, "2026-11-01T15:00+07"));
+    running.task.abort();
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_folder_that_cannot_be_written_is_an_alarm_until_it_can() {
     let mut stand = Stand::new(&[(PeriodKind::Shift, "csv")], "2026-11-01T06:00+07");
