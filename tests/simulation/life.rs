@@ -344,8 +344,9 @@ impl Watch {
                 continue;
             }
             self.compared += 1;
-            if self.is_wrong(tag.id, sample, snapshot.decimals[tag.id.index()]) {
-                wrong(format!("values: {} is shown as {:?} and good, read at {}", tag.name, sample.value, sample.at));
+            if let Some(was) = self.is_wrong(tag.id, sample, snapshot.decimals[tag.id.index()]) {
+                let (value, at) = (sample.value, sample.at);
+                wrong(format!("values: {} is shown as {value:?} and good, read at {at}; it was {was:?}", tag.name));
             }
         }
         for status in snapshot.commands.iter().filter(|status| status.outcome.is_success() && status.recorded) {
@@ -377,12 +378,17 @@ impl Watch {
         }
     }
 
-    fn is_wrong(&self, tag: TagId, sample: &Sample, decimals: u8) -> bool {
-        let Some(value) = sample.value else { return true };
+    /// What it was about then, where that is something else.
+    fn is_wrong(&self, tag: TagId, sample: &Sample, decimals: u8) -> Option<(f64, f64)> {
         let then = |at: Timestamp| sample.at - BEFORE <= at && at <= sample.at + AFTER;
-        let of_then = self.truth.iter().filter(|(at, _)| then(*at)).filter_map(|(_, truth)| truth.get(&tag));
-        let (low, high) = of_then.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(*value), high.max(*value)));
-        let grain = 10f64.powi(-i32::from(decimals)) * 1.5;
-        low <= high && !(low - grain..=high + grain).contains(&value)
+        let of_then = self.truth.iter().filter(|(at, _)| then(*at)).filter_map(|(_, truth)| truth.get(&tag).copied());
+        let of_then: Vec<f64> = of_then.collect();
+        let (low, high) = of_then.iter().fold((f64::MAX, f64::MIN), |(low, high), now| (low.min(*now), high.max(*now)));
+        // Where it keeps changing it may have been further between two looks; where it has stepped once it was not.
+        let changes = of_then.windows(3).map(|w| (w[1] - w[0]).abs().min((w[2] - w[1]).abs()));
+        let step = changes.fold(0.0, f64::max);
+        let grain = 10f64.powi(-i32::from(decimals)) * 1.5 + step;
+        let is_right = |value: f64| high < low || (low - grain..=high + grain).contains(&value);
+        (!sample.value.is_some_and(is_right)).then_some((low, high))
     }
 }

@@ -4,6 +4,8 @@ use super::{headings::is_heading, sections::title_of};
 
 /// Most rows of a list.
 pub const ROWS_MAX: usize = 10_000;
+/// What is further right in a row is not read: each heading is compared with all others.
+const COLUMNS_MAX: usize = 1_000;
 /// A cell may have several lines; one with more has lost its closing quote.
 const CELL_LINES_MAX: usize = 40;
 
@@ -92,7 +94,7 @@ fn separated(text: &str, separator: char) -> Vec<Cells> {
             place(at.line()) + rest.lines().take_while(|line| line.trim().is_empty()).count()
         });
         let is_unclosed = record.iter().any(|cell| CELL_LINES_MAX < cell.lines().count());
-        let mut cells: Vec<String> = record.iter().map(one_line).collect();
+        let mut cells: Vec<String> = record.iter().take(COLUMNS_MAX).map(one_line).collect();
         if separator == '|' {
             // Markdown has one at both ends.
             cells.pop_if(|last| last.is_empty());
@@ -124,6 +126,13 @@ fn by_blanks(line: &str) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_line_of_separators_is_cut_at_the_last_column() {
+        let text = format!("a{}\n5,b\n", ",x".repeat(5_000_000));
+        let lengths: Vec<usize> = rows(&text, Some(',')).iter().map(|row| row.cells.len()).collect();
+        assert_eq!(lengths, [COLUMNS_MAX, 2]);
+    }
 
     #[test]
     fn a_quoted_cell_keeps_its_separators_quotes_and_lines() {

@@ -15,6 +15,7 @@ pub mod mimic;
 pub mod mqtt;
 pub mod parameter_set;
 pub mod plant;
+pub mod register_list;
 pub mod socket;
 pub mod typed;
 
@@ -35,6 +36,7 @@ pub const TARGETS: &[(&str, Target)] = &[
     ("mqtt", mqtt::run),
     ("parameter_set", parameter_set::run),
     ("plant", plant::run),
+    ("register_list", register_list::run),
     ("socket", socket::run),
     ("typed", typed::run),
 ];

@@ -63,10 +63,9 @@ fn a_failing_archive_and_a_missing_file_are_said_once_each() {
 
 #[test]
 fn what_is_missing_is_known_after_the_log_was_compared() {
-    let folder = tempfile::tempdir().unwrap();
-    let now = Timestamp::from_second(1_000_000).unwrap();
-    let mut writer = Writer::open(folder.path().join("h.duckdb"), Arc::default(), now).unwrap();
-    assert!(writer.take_restored().unwrap().entries.is_some());
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut writer = Writer::open(folder.path().join("h.duckdb"), Arc::default(), sec(0)).expect("a store");
+    assert!(writer.take_restored().is_some_and(|restored| restored.entries.is_some()));
     assert_eq!(writer.unstored(), None, "the log may have more");
     writer.completed();
     assert_eq!(writer.unstored(), Some(0));
