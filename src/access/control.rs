@@ -29,7 +29,7 @@ use self::{
     user_admin::Saving,
 };
 use super::{
-    LoggedInUser, Secret, SessionRequest,
+    LoggedInUser, Secret, SessionEnd, SessionRequest,
     lockout::LoginAttempts,
     right,
     user::{UserChange, Users},
@@ -99,7 +99,7 @@ pub enum Effect {
     /// Import this file into the history, then the same.
     Import(u64, String),
     /// This terminal may not stay.
-    HangUp(u32, String),
+    HangUp(u32, SessionEnd),
 }
 
 /// The state of users, sessions and pending requests.

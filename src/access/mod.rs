@@ -1,6 +1,7 @@
 //! Who may: users and their passwords, sessions, rights, lockout, and the audit log.
 
 pub mod right;
+mod session_end;
 pub mod session_request;
 pub mod password;
 pub mod user;
@@ -13,6 +14,7 @@ pub mod io;
 
 pub use control::{AccessControl, Effect, Peer};
 pub(crate) use rate_limit::RateLimit;
+pub use session_end::SessionEnd;
 pub use session_request::{
     Completion, Credentials, Durability, LoggedInUser, Secret, SessionRequest, SessionRow, SessionStatus, UserRow,
 };

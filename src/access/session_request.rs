@@ -5,6 +5,7 @@ use std::{fmt, sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
+use super::SessionEnd;
 use crate::plant::{command::CommandId, request_refusal::RequestRefusal, role::Role};
 
 /// A password on its way: never shown, not even in a log.
@@ -185,7 +186,7 @@ pub struct SessionStatus {
     /// The latest commands that did not reach the plant, and why; the latest last.
     pub undelivered: Vec<(CommandId, RequestRefusal)>,
     /// The station has gone, and why; set by the terminal's own end of the socket.
-    pub gone: Option<Arc<str>>,
+    pub gone: Option<SessionEnd>,
 }
 
 /// A row of the list of users.

@@ -316,12 +316,9 @@ impl SessionServer {
                 Effect::Import(ticket, file) => self.import(ticket, &file),
                 Effect::HangUp(terminal, why) => {
                     // The audit log holds it, in bounded rate; attempts without end must not fill this one.
-                    tracing::debug!(terminal, why, "a terminal was disconnected");
+                    tracing::debug!(terminal, %why, "a terminal was disconnected");
                     if let Some(end) = self.terminals.remove(&terminal) {
-                        end.send_replace(Arc::new(SessionStatus {
-                            gone: Some(why.into()),
-                            ..SessionStatus::default()
-                        }));
+                        end.send_replace(Arc::new(SessionStatus { gone: Some(why), ..SessionStatus::default() }));
                     }
                 }
             }

@@ -5,18 +5,16 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use super::{AccessControl, Effect, session::SessionState};
-use crate::{access::Users, plant::PlantDef};
-
-/// Said to terminals that have the plant as it was.
-const RELOADED: &str = "the plant file was reloaded";
-/// Said to those of users who may be others now.
-const USERS_RELOADED: &str = "the users file was reloaded";
+use crate::{
+    access::{SessionEnd, Users},
+    plant::PlantDef,
+};
 
 impl AccessControl {
     /// The plant has another definition, in another run. What terminals still ask would mean what it meant before: they go, and
     /// come back to the new one. Requests from outside go with them, unless they `keep` what they know of the plant.
     pub fn redefine(&mut self, def: Arc<PlantDef>, run: u64, keep: bool, at: Timestamp) -> Vec<Effect> {
-        let effects = self.hang_up(RELOADED, |session| session.acts_as.is_none() || !keep, at);
+        let effects = self.hang_up(&SessionEnd::PlantReloaded, |session| session.acts_as.is_none() || !keep, at);
         (self.def, self.run) = (def, run);
         effects
     }
@@ -29,17 +27,17 @@ impl AccessControl {
         if self.users.is_none() || changed_here || own == Some(users.digest()) {
             return None;
         }
-        let mut effects = self.hang_up(USERS_RELOADED, |session| session.acts_as.is_none(), at);
+        let mut effects = self.hang_up(&SessionEnd::UsersReloaded, |session| session.acts_as.is_none(), at);
         (self.users, self.closed) = (Some(users), None);
         effects.extend(self.follow_delegates());
         Some(effects)
     }
 
     /// Closes the sessions that are meant.
-    fn hang_up(&mut self, why: &str, is_meant: impl Fn(&SessionState) -> bool, at: Timestamp) -> Vec<Effect> {
+    fn hang_up(&mut self, why: &SessionEnd, is_meant: impl Fn(&SessionState) -> bool, at: Timestamp) -> Vec<Effect> {
         let meant = self.sessions.iter().filter(|(_, session)| is_meant(session)).map(|(terminal, _)| *terminal);
         let meant: Vec<u32> = meant.collect();
-        let gone = |terminal| [self.close(terminal, at), vec![Effect::HangUp(terminal, why.to_owned())]].concat();
+        let gone = |terminal| [self.close(terminal, at), vec![Effect::HangUp(terminal, why.clone())]].concat();
         meant.into_iter().flat_map(gone).collect()
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use jiff::Timestamp;
 
 use super::{AccessControl, Effect, session::SessionState};
-use crate::plant::time::elapsed;
+use crate::{access::SessionEnd, plant::time::elapsed};
 
 /// A terminal without login and without a request for so long is closed when another needs its place.
 const IDLE: Duration = Duration::from_secs(600);
@@ -14,7 +14,7 @@ const KEPT: usize = 8;
 
 impl AccessControl {
     /// Admits a session. One user of the operating system gets at most half of all. `Ok`: the effects; `Err`: why not.
-    pub(super) fn admit(&mut self, new: &SessionState, at: Timestamp) -> Result<Vec<Effect>, String> {
+    pub(super) fn admit(&mut self, new: &SessionState, at: Timestamp) -> Result<Vec<Effect>, SessionEnd> {
         if new.peer.in_process {
             return Ok(Vec::new());
         }
@@ -26,9 +26,9 @@ impl AccessControl {
         if !is_owner {
             let user = &new.origin;
             let of_user = |session: &SessionState| session.origin == *user;
-            effects.extend(self.limit_among(of_user, most.div_ceil(2), &format!(" of {user}"), at)?);
+            effects.extend(self.limit_among(of_user, most.div_ceil(2), Some(user), at)?);
         }
-        effects.extend(self.limit_among(|_| true, all, "", at)?);
+        effects.extend(self.limit_among(|_| true, all, None, at)?);
         Ok(effects)
     }
 
@@ -37,9 +37,9 @@ impl AccessControl {
         &mut self,
         counts: impl Fn(&SessionState) -> bool,
         most: usize,
-        whose: &str,
+        user: Option<&str>,
         at: Timestamp,
-    ) -> Result<Vec<Effect>, String> {
+    ) -> Result<Vec<Effect>, SessionEnd> {
         let is_terminal = |session: &SessionState| !session.peer.in_process && session.acts_as.is_none();
         let these = || self.sessions.iter().filter(|(_, session)| is_terminal(session) && counts(session));
         let there = these().count();
@@ -48,11 +48,10 @@ impl AccessControl {
         }
         let idle = these().filter(|(_, session)| session.who.is_none() && IDLE <= elapsed(session.active, at));
         let Some(longest) = idle.min_by_key(|(_, session)| session.active).map(|(terminal, _)| *terminal) else {
-            return Err(format!("{there} terminals{whose} are attached, no more may be"));
+            return Err(SessionEnd::TooMany { count: there, user: user.map(str::to_owned) });
         };
         let mut effects = self.close(longest, at);
-        let why = "closed: no login for a long time, and another terminal needed the session".to_owned();
-        effects.push(Effect::HangUp(longest, why));
+        effects.push(Effect::HangUp(longest, SessionEnd::Idle));
         Ok(effects)
     }
 }

@@ -13,7 +13,7 @@ use super::{
     wire::{self, WireError},
 };
 use crate::{
-    access::{Completion, SessionStatus},
+    access::{Completion, SessionEnd, SessionStatus},
     attach::{
         assembly::Assembly,
         command_id_map::CommandIdMap,
@@ -69,8 +69,8 @@ pub struct ClientTask {
 enum Disconnected {
     /// All handles of the session were dropped.
     Left,
-    /// The station has gone, in words.
-    Gone(String),
+    /// The station has gone.
+    Gone(SessionEnd),
 }
 
 impl ClientTask {
@@ -95,8 +95,8 @@ impl ClientTask {
                 None => Disconnected::Left,
             };
             let Disconnected::Gone(why) = end else { return };
-            tracing::warn!(why, "the station is disconnected");
-            self.update_status(|status| status.gone = Some(why.into()));
+            tracing::warn!(%why, "the station is disconnected");
+            self.update_status(|status| status.gone = Some(why));
             for (_, waiting) in self.waiting.drain() {
                 waiting.refuse(RequestRefusal::StationGone);
             }
@@ -119,7 +119,7 @@ impl ClientTask {
             loop {
                 self.cancel(&out);
                 tokio::select! {
-                    Some(message) = incoming.recv() => if let Err(why) = self.on_message(message) { break Disconnected::Gone(why) },
+                    Some(message) = incoming.recv() => if let Err(why) = self.on_message(message) { break Disconnected::Gone(SessionEnd::Connection(why)) },
                     request = requests.recv() => match request {
                         Some((_, request)) => self.send(request, &out),
                         None => break Disconnected::Left,
@@ -129,8 +129,8 @@ impl ClientTask {
         };
         let end = tokio::select! {
             end = conversation => end,
-            error = receive_messages(read, inbound) => Disconnected::Gone(error.to_string()),
-            error = send_messages(write, outbound) => Disconnected::Gone(error.to_string()),
+            error = receive_messages(read, inbound) => Disconnected::Gone(SessionEnd::Connection(error.to_string())),
+            error = send_messages(write, outbound) => Disconnected::Gone(SessionEnd::Connection(error.to_string())),
         };
         // A reply that came just before the end counts.
         while let Ok(message) = incoming.try_recv() {
@@ -273,7 +273,9 @@ impl ClientTask {
                 }
                 Err(AttachError::NoStation { .. }) => {}
                 // It is there, but does not want this terminal: its operator should know why.
-                Err(error) => self.update_status(|status| status.gone = Some(error.to_string().into())),
+                Err(error) => {
+                    self.update_status(|status| status.gone = Some(SessionEnd::Connection(error.to_string())))
+                }
             }
         }
     }

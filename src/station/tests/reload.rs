@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    access::io::users,
+    access::{SessionEnd, io::users},
     plant::{
         PlantDef,
         calculation::{Calculation, OverTime},
@@ -48,7 +48,7 @@ async fn a_total_that_is_new_begins_and_terminals_of_before_go() {
     let (def, hours) = with_hours();
     assert!(reload(&mut station, reloaded(def)).await);
     let gone = session.status.wait_for(|status| status.gone.is_some()).await.unwrap().gone.clone();
-    assert_eq!(gone.as_deref(), Some("the plant file was reloaded"));
+    assert_eq!(gone, Some(SessionEnd::PlantReloaded));
     let begun =
         |snapshot: &Arc<crate::plant::Snapshot>| snapshot.run != run && snapshot.sample(hours).value == Some(0.0);
     session.snapshots.wait_for(begun).await.unwrap();

@@ -10,7 +10,7 @@ use tokio::{
 
 use super::*;
 use crate::{
-    access::{Completion, Durability, Peer},
+    access::{Completion, Durability, Peer, SessionEnd},
     attach::io::shared::SnapshotSender,
     plant::fixture,
     station::SessionAcceptor,
@@ -121,13 +121,13 @@ async fn a_terminal_that_is_sent_away_learns_why() {
     let (_sender, shared) = SnapshotSender::new(snapshots.borrow().clone());
     let (acceptor, mut attach_requests, _requests) = SessionAcceptor::new(snapshots);
     let session = acceptor.attach(Peer { from: "test".into(), unix_user: None, in_process: false });
-    let why = "64 terminals are attached, no more may be";
-    let gone = SessionStatus { gone: Some(why.into()), ..SessionStatus::default() };
+    let why = SessionEnd::TooMany { count: 64, user: None };
+    let gone = SessionStatus { gone: Some(why.clone()), ..SessionStatus::default() };
     attach_requests.recv().await.unwrap().status.send_replace(Arc::new(gone));
     let (near, mut far) = tokio::io::duplex(REQUEST_BYTES_MAX);
     let (read, write) = tokio::io::split(near);
     let ended = serve(read, write, session, shared).await;
     assert!(matches!(ended, ConnectionEnd::SentAway));
     let reply = wire::read(&mut far, SERVER_MESSAGE_BYTES_MAX).await.unwrap();
-    assert_eq!(protocol::handshake_reply(&reply).unwrap().unwrap_err(), why);
+    assert_eq!(protocol::handshake_reply(&reply).unwrap().unwrap_err(), why.to_string());
 }

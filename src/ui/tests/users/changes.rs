@@ -36,7 +36,9 @@ fn refused_credentials_are_asked_again_in_their_window() {
 #[test]
 fn a_station_that_has_gone_is_shown_and_takes_no_commands() {
     let mut model = with(&Fixture::normal(), person("anna", Role::Technician));
-    change_session(&mut model, |session| session.gone = Some("the socket was closed".into()));
+    change_session(&mut model, |session| {
+        session.gone = Some(crate::access::SessionEnd::Connection("the socket was closed".into()))
+    });
     assert!(model.snapshot.samples.iter().all(|sample| !matches!(sample.quality, Quality::Good)));
     for _ in 0..8 {
         update(&mut model, Msg::Tick { silent: Duration::ZERO });
