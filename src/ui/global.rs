@@ -261,7 +261,7 @@ fn on_past(model: &mut Model, page: bool) -> Vec<UiAction> {
         return Vec::new();
     }
     if page && model.replay.shown().is_some() {
-        return with_replay(model, Replay::toggle_page).into_iter().map(UiAction::Do).collect();
+        return with_replay(model, Replay::toggle_page);
     }
     let (cx, tab) = (model.cx(), model.tabs.shown());
     match tab.moment(&cx).filter(|_| page) {

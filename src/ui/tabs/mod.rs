@@ -27,7 +27,7 @@ use ratatui::{
 };
 
 pub use listing::ListPage;
-use periodic_query::Queries;
+pub use periodic_query::{Answered, Queries};
 
 use super::{
     Effect, UiAction, ViewContext,
