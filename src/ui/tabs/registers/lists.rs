@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use super::{Registers, find, view::named_text};
+use super::{ReadFor, Registers, find, view::named_text};
 use crate::bus::recognise;
 use crate::plant::{
     PlantDef,
@@ -251,10 +251,8 @@ impl Registers {
         if spans.is_empty() {
             return Ok(self.list_of(cx, What::Hits(text.to_owned())));
         }
-        let number = cx.numbers.next();
-        self.value_search = Some((number, text.to_owned()));
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
-        Ok(vec![UiAction::query(self.tab, number, Query::Registers(read))])
+        Ok(vec![self.send(cx, ReadFor::Search(text.to_owned()), read)])
     }
 
     /// Does what the selected row leads to.
