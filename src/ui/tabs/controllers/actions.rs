@@ -54,7 +54,7 @@ impl Controllers {
 
     /// The comparison that is shown.
     pub(super) fn compared(&self) -> Option<&Compare> {
-        if let Page::Compare(compare) = &self.page { Some(compare) } else { None }
+        if let Page::Compare(compare) = self.page() { Some(compare) } else { None }
     }
 
     /// Acts on the device.
@@ -71,7 +71,7 @@ impl Controllers {
         self.on_device(cx, |tab, device| match why_not {
             Some(why) => notice(device, why),
             None => {
-                tab.page = page;
+                tab.pages.push(page);
                 Vec::new()
             }
         })
@@ -183,13 +183,12 @@ impl Controllers {
     }
 
     pub(super) fn show_guide(&mut self, _cx: &ViewContext) {
-        let before = std::mem::replace(&mut self.page, Page::List);
-        self.page = Page::Guide(0, Box::new(before));
+        self.pages.push(Page::Guide(0));
     }
 
     /// Turns the pages of the guide.
     pub(super) fn turn(&mut self, by: isize) {
-        if let Page::Guide(page, _) = &mut self.page {
+        if let Some(Page::Guide(page)) = self.pages.last_mut() {
             *page = page.saturating_add_signed(by).min(guide::count() - 1);
         }
     }
@@ -201,7 +200,7 @@ impl Controllers {
             if let Some(notice) = sets::problems(cx, &source) {
                 return open(Modal::Notice(notice));
             }
-            tab.page = Page::Compare(Compare::new(source));
+            tab.pages.push(Page::Compare(Compare::new(source)));
             Vec::new()
         })
     }
@@ -218,7 +217,7 @@ impl Controllers {
                 return notice(device, t!("only a copy between two controllers can be turned around"));
             };
             tab.show(*other);
-            tab.page = Page::Compare(Compare::new(Source::Device(device.id)));
+            tab.pages.extend([Page::Sets, Page::Compare(Compare::new(Source::Device(device.id)))]);
             Vec::new()
         })
     }

@@ -1,6 +1,6 @@
 //! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
 
-use super::{Export, Key, Reports};
+use super::{Export, Key, Page, Reports};
 use crate::ui::tabs::{
     overlay::{Kind, Laid, Laying, Overlaid},
     prelude::*,
@@ -15,7 +15,7 @@ use crate::{
 pub const LIST: &[&[Key]] = &[&[
     Key::change(code(KeyCode::Enter), "report", "the whole report of its time", |reports, cx| {
         if let Some(period) = reports.batches.period(cx) {
-            reports.batches_shown = false;
+            reports.page = Page::Report;
             reports.show(Some(period));
         }
     }),
@@ -24,7 +24,7 @@ pub const LIST: &[&[Key]] = &[&[
     }),
     Key::new(char('e'), "export", "write the list as CSV", Reports::export_batches).needs(Role::Technician),
     Key::change(char('b'), "shifts", "the reports of shifts", |reports, _| {
-        (reports.batches_shown, reports.export) = (false, Export::Not);
+        (reports.page, reports.export) = (Page::Report, Export::Not);
     }),
 ]];
 

@@ -1,6 +1,6 @@
 //! The reports that the station makes by itself: each with its state, its file and how to fetch it, and the selected one as text.
 
-use super::{Key, Reports};
+use super::{Key, Page, Reports};
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::MadeReports,
@@ -13,7 +13,7 @@ pub const LIST: &[&[Key]] = &[&[
     Key::change(code(KeyCode::Enter), "text", "the selected report as text", |reports, cx| {
         reports.made.open = reports.made.list.selected(cx).map(|report| opened(cx, &report));
     }),
-    Key::change(char('r'), "shifts", "the reports of shifts", |reports, _| reports.made.shown = false),
+    Key::change(char('r'), "shifts", "the reports of shifts", |reports, _| reports.page = Page::Report),
 ]];
 /// Keys of the text.
 pub const TEXT: &[&[Key]] = &[
@@ -31,8 +31,6 @@ const WIDTH: u16 = 80;
 /// State of the page.
 #[derive(Debug, Default)]
 pub struct AutomaticReportsPage {
-    /// It is shown in place of a report.
-    pub shown: bool,
     pub list: List<AutomaticReports>,
     /// The report that is shown as text, in place of the list.
     pub open: Option<Opened>,

@@ -2,7 +2,7 @@
 
 use jiff::{civil, tz::TimeZone};
 
-use super::{Export, Key, Reports};
+use super::{Export, Key, Page, Reports};
 use crate::report::{self, RecordRow, ShiftReport, record_csv::record_decimals};
 use crate::ui::tabs::prelude::*;
 
@@ -24,7 +24,7 @@ pub const KEYS: &[&[Key]] = &[
         })
         .needs(Role::Technician),
         Key::change(char('n'), "report", "the figures of the report", |reports, _| {
-            (reports.rows.shown, reports.export) = (false, Export::Not);
+            (reports.page, reports.export) = (Page::Report, Export::Not);
         }),
     ],
     &motions!("scroll", |reports: &mut Reports, cx: &ViewContext, motion| {
@@ -35,8 +35,6 @@ pub const KEYS: &[&[Key]] = &[
 /// State of the page.
 #[derive(Debug, Default)]
 pub struct Rows {
-    /// It is shown in place of the figures.
-    pub shown: bool,
     conditions: Vec<Condition>,
     scroll: Scroll,
 }
