@@ -38,7 +38,6 @@ enum Does {
 /// Where a key of the terminal is heard; each of these includes the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Reach {
-    /// On the tabs.
     Tabs,
     /// In windows that only show something.
     Looking,
@@ -46,7 +45,6 @@ pub enum Reach {
     Small,
     /// Where a form of the login page takes every letter.
     Typed,
-    /// In every window.
     Windows,
 }
 
@@ -61,7 +59,6 @@ enum Rule {
 }
 
 impl GlobalKey {
-    /// A key of the tabs.
     pub const fn new(
         chord: Chord,
         label: &'static str,
@@ -81,7 +78,6 @@ impl GlobalKey {
         GlobalKey { rule: Rule::Unlocked, ..self }
     }
 
-    /// What is pressed.
     pub fn chord(self) -> Chord {
         self.chord
     }
@@ -102,7 +98,6 @@ impl GlobalKey {
         Hint::of(self.chord, self.label, self.help)
     }
 
-    /// Does what it does.
     pub fn press(self, model: &mut Model) -> Vec<UiAction> {
         match (self.rule, self.does) {
             (Rule::OfPresent, _) if model.replay.shown().is_some() => {

@@ -122,7 +122,6 @@ pub struct Below<P> {
 }
 
 impl<P> Keys<P> {
-    /// Those of these tables.
     pub fn of(tables: &[&'static [Key<P>]]) -> Keys<P> {
         Keys(tables.iter().copied().map(Part::Rows).collect())
     }
@@ -130,7 +129,6 @@ impl<P> Keys<P> {
     pub fn below(below: &'static Below<P>) -> Keys<P> {
         Keys(vec![Part::Below(below)])
     }
-    /// These and others.
     pub fn and(mut self, others: Keys<P>) -> Keys<P> {
         self.0.extend(others.0);
         self
@@ -176,7 +174,6 @@ impl<P> Keys<P> {
         None
     }
 
-    /// Is this one of them?
     pub fn has(&self, chord: Chord) -> bool {
         self.rows().any(|key| key.chord == chord)
     }
@@ -195,13 +192,10 @@ impl<P> Keys<P> {
 /// What is pressed: a key, alone or with Ctrl.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Chord {
-    /// The key.
     pub code: KeyCode,
-    /// With Ctrl.
     pub ctrl: bool,
 }
 
-/// The chords of each page of a tab.
 #[cfg(test)]
 pub type PageChords = Vec<(&'static str, Vec<Chord>)>;
 
@@ -251,7 +245,6 @@ impl Hint {
 pub const fn char(c: char) -> Chord {
     Chord { code: KeyCode::Char(c), ctrl: false }
 }
-/// Ctrl with a letter.
 pub const fn ctrl(c: char) -> Chord {
     Chord { code: KeyCode::Char(c), ctrl: true }
 }
@@ -261,7 +254,6 @@ pub const fn code(code: KeyCode) -> Chord {
 }
 
 impl Chord {
-    /// As it is pressed.
     pub fn event(self) -> KeyEvent {
         KeyEvent::new(self.code, if self.ctrl { KeyModifiers::CONTROL } else { KeyModifiers::NONE })
     }
@@ -271,7 +263,6 @@ impl Chord {
             && event.modifiers.contains(KeyModifiers::CONTROL) == self.ctrl
             && !event.modifiers.contains(KeyModifiers::ALT)
     }
-    /// Its name on screen.
     pub fn name(self) -> String {
         let name = match self.code {
             KeyCode::Char(' ') => "space".to_owned(),

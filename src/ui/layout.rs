@@ -29,7 +29,6 @@ const LEAST: [(Size, (u16, u16)); 5] = [
 ];
 
 impl Size {
-    /// The size of this screen.
     pub fn of(screen: Rect) -> Size {
         let fits = |(_, (columns, rows)): &&(Size, (u16, u16))| *columns <= screen.width && *rows <= screen.height;
         LEAST.iter().find(fits).map_or(Size::Tiny, |(size, _)| *size)
@@ -61,7 +60,6 @@ pub struct Layout {
     pub body: Rect,
     /// Outcome of the last command.
     pub status: Rect,
-    /// Keys.
     pub footer: Rect,
 }
 

@@ -232,7 +232,6 @@ impl PreferencesFile {
         file
     }
 
-    /// Its text.
     pub fn text(&self) -> String {
         let users: toml::Table = self.users.iter().map(|(user, chosen)| (user.clone(), section(chosen))).collect();
         let mut body = toml::Table::new();

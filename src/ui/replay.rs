@@ -34,7 +34,6 @@ const SPEEDS: [i32; 5] = [0, 1, 10, 60, 600];
 /// Snapshots that are fetched ahead while playing.
 const PREFETCH_MAX: usize = 3;
 
-/// A direction in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
     /// Towards the past.
@@ -46,7 +45,6 @@ pub enum Direction {
 /// A past instant of the plant.
 #[derive(Debug)]
 pub struct Shown {
-    /// The instant.
     pub at: Timestamp,
     /// The plant at it.
     pub snapshot: Arc<Snapshot>,
@@ -55,17 +53,13 @@ pub struct Shown {
 /// What happened at an instant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// An alarm event.
     Alarm(AlarmRecord),
-    /// An action of an operator.
     Action(ActionRecord),
     /// A batch began, or it ended.
     Batch {
-        /// When.
         at: Timestamp,
         /// Its name and number.
         label: String,
-        /// It ended.
         ended: bool,
     },
     /// A value was stored.
@@ -73,7 +67,6 @@ pub enum Event {
 }
 
 impl Event {
-    /// When.
     pub fn at(&self) -> Timestamp {
         match self {
             Event::Alarm(record) => record.at,
@@ -94,7 +87,6 @@ pub struct Replay {
     search: Option<Search>,
     /// The query for the time of a stored value.
     sample: Option<u32>,
-    /// The event that was gone to.
     event: Option<Event>,
     /// Place in [`SPEEDS`].
     speed: usize,
@@ -163,7 +155,6 @@ impl Replay {
         self.ask_page(present)
     }
 
-    /// What is drawn of the instant.
     fn drawn(&self) -> Vec<Pen> {
         let of_page = self.page().map(|page| page.pens().to_vec());
         of_page.or_else(|| self.shown().map(|shown| page::pens(&shown.snapshot, shown.at))).unwrap_or_default()

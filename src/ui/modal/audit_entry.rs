@@ -11,7 +11,6 @@ use super::{
 };
 use crate::{plant::record::ActionRecord, ui::ViewContext};
 
-/// The dialog.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AuditEntryDialog(pub ActionRecord);
 

@@ -20,7 +20,6 @@ use crate::{
     },
 };
 
-/// Rows of a page.
 const PAGE_ROWS: usize = 8;
 
 /// A list to pick from; picking leads to a confirm window.

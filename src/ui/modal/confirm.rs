@@ -56,7 +56,6 @@ pub struct Confirm {
 pub enum ConfirmAction {
     /// Leave the terminal.
     Quit,
-    /// Give a command.
     Command(CommandKind),
 }
 
@@ -86,7 +85,6 @@ impl Confirm {
         }
     }
 
-    /// Is it the confirmation to leave?
     pub fn is_quit(&self) -> bool {
         self.action == ConfirmAction::Quit
     }
@@ -143,7 +141,6 @@ impl Confirm {
         self
     }
 
-    /// What Enter does.
     pub fn verb(&self) -> &'static str {
         match &self.action {
             ConfirmAction::Quit => t!("quit"),
@@ -191,7 +188,6 @@ impl Confirm {
         if self.wants_y() { "y" } else { "⏎" }
     }
 
-    /// What Esc does.
     pub fn escape(&self) -> &'static str {
         if self.is_quit() { t!("stay") } else { t!("cancel") }
     }

@@ -37,7 +37,6 @@ const AMOUNT: usize = 1;
 const REASON: usize = 2;
 const AMOUNT_CHARS: usize = 64;
 
-/// The window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// Never empty.

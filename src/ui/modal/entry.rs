@@ -41,7 +41,6 @@ fn needs_confirmation(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
 /// A number on its way into a tag.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// Which tag.
     pub tag: TagId,
     /// What has been typed.
     pub line: Line,
@@ -52,7 +51,6 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// An empty entry.
     pub fn new(cx: &ViewContext, tag: TagId) -> Entry {
         Entry { tag, line: Line::default(), problem: None, expected: ConfirmedValue::new(cx, tag) }
     }

@@ -26,7 +26,6 @@ use crate::{
 /// Least columns of the names at the left.
 const LABELS_MIN: u16 = 9;
 
-/// The window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guidance {
     alarm: AlarmId,
@@ -131,7 +130,6 @@ impl Guidance {
     }
 }
 
-/// Columns of the window.
 fn columns(body: Rect) -> u16 {
     body.width.saturating_sub(8).clamp(LABELS_MIN + 1, 76)
 }

@@ -31,7 +31,6 @@ impl Default for Line {
 }
 
 impl Line {
-    /// Any text.
     pub fn new(text: &str) -> Line {
         Line::long(text, CHARS_MAX)
     }

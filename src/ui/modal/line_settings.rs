@@ -30,7 +30,6 @@ use crate::{
 };
 use draft::{Draft, Row};
 
-/// The form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineSettings {
     line: LineId,

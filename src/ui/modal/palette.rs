@@ -45,7 +45,6 @@ const WIDTH: u16 = 76;
 /// What a row leads to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Target {
-    /// A tab.
     Tab(Tab),
     /// All devices at a glance.
     Overview,
@@ -55,13 +54,11 @@ pub enum Target {
     Procedure(ProcedureId),
     /// The faceplate of a tag.
     Tag(TagId),
-    /// The curve of a tag.
     Trend(TagId),
     /// What to do about an alarm.
     Alarm(AlarmId),
     /// What a key of the shown tab does.
     Key(Chord),
-    /// A past instant.
     Instant(Timestamp),
     /// One that was kept under a name.
     Bookmark(Timestamp),
@@ -81,7 +78,6 @@ impl Target {
     }
 }
 
-/// A row.
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
     target: Target,

@@ -18,7 +18,6 @@ use crate::ui::{
 /// A prompt with one line for the answer; the shown tab's `on_text` takes it, its list while it is typed, or the replay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prompt {
-    /// What is asked.
     pub title: String,
     /// The form that is expected, with an example.
     pub hint: String,
@@ -32,7 +31,6 @@ pub struct Prompt {
 /// Who takes what is typed.
 #[derive(Debug, Clone, PartialEq)]
 enum Taker {
-    /// The tab.
     Tab,
     /// The replay: it is an instant.
     Replay(replay::Asked),

@@ -21,7 +21,6 @@ use crate::{
     ui::{UiAction, ViewContext, keys::Hint, rights, widgets::text::wrap},
 };
 
-/// The window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reason {
     title: String,
@@ -37,7 +36,6 @@ pub struct Reason {
     problem: Option<String>,
 }
 
-/// What is done.
 #[derive(Debug, Clone, PartialEq)]
 enum Action {
     Command(CommandKind),

@@ -35,7 +35,6 @@ pub struct TerminalSettings {
     pub chosen: Preferences,
     /// Whose they are, and where they are kept, or why not.
     kept: Result<String, String>,
-    /// The selected row.
     row: usize,
 }
 

@@ -111,7 +111,6 @@ impl EventPage {
         asked
     }
 
-    /// The history has answered.
     pub fn on_answer(&mut self, present: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
         self.queries().into_iter().for_each(|asked| asked.on_answer(present, number, answer));
     }
@@ -128,7 +127,6 @@ impl EventPage {
         [self.alarms.value.as_ref().map_or(0, Vec::len), self.actions.value.as_ref().map_or(0, Vec::len)]
     }
 
-    /// Its curves.
     pub fn pens(&self) -> &[Pen] {
         &self.pens
     }

@@ -29,7 +29,6 @@ struct Span {
     present: Timestamp,
 }
 
-/// What is searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Searched {
     /// Alarm events and actions of operators.

@@ -53,9 +53,7 @@ pub enum Page {
     Suppressed,
     /// Alarms of what watches the process.
     System,
-    /// What was.
     Journal,
-    /// Metrics of the alarm system.
     Metrics,
     /// What the next shift must know.
     Handover,
@@ -66,7 +64,6 @@ impl Page {
     pub const ALL: [Page; 6] =
         [Page::Active, Page::Suppressed, Page::System, Page::Journal, Page::Metrics, Page::Handover];
 
-    /// Its heading.
     pub fn title(self) -> &'static str {
         match self {
             Page::Active => t!("active"),
@@ -79,7 +76,6 @@ impl Page {
     }
 }
 
-/// State of this tab.
 #[derive(Debug, Default)]
 pub struct Alarms {
     page: Page,
@@ -195,7 +191,6 @@ impl Alarms {
 }
 
 impl Alarms {
-    /// The alarms that the page is about.
     fn of_page<'a>(&self, cx: &ViewContext<'a>) -> impl Iterator<Item = &'a ActiveAlarm> {
         on_page(cx, self.page)
     }

@@ -38,24 +38,17 @@ const TREND_EVERY: SignedDuration = SignedDuration::from_secs(10);
 const TIMEOUT: SignedDuration = SignedDuration::from_secs(30);
 /// Columns of the small trend to ask for: two dots a cell, and some to spare.
 const TREND_BUCKETS: usize = 80;
-/// What is shown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Page {
-    /// All devices.
     List,
-    /// One device.
     Device,
-    /// Its bits as lamps.
     Lamps,
     /// Its ramp/soak program.
     Program,
-    /// Its parameter sets.
     Sets,
     /// A set against it.
     Compare(Compare),
-    /// Its control runs.
     Runs,
-    /// The procedures of the plant.
     Procedures,
     /// Some runs over each other.
     Overlay,
@@ -63,7 +56,6 @@ pub enum Page {
     Guide(usize),
 }
 
-/// State of this tab.
 #[derive(Debug)]
 pub struct Controllers {
     /// Over each other: the last one is shown, and Esc leads to the one before it.
@@ -278,7 +270,6 @@ impl Controllers {
         }
     }
 
-    /// Shows a device.
     pub fn show(&mut self, device: DeviceId) {
         let table = Table { defaults: self.table.defaults, ..Table::default() };
         let found = std::mem::take(&mut self.found);
@@ -287,7 +278,6 @@ impl Controllers {
         *self = Controllers { wall: self.wall, found, ..Controllers::on_pages(pages, device, table) };
     }
 
-    /// Shows a procedure.
     pub fn show_procedure(&mut self, id: ProcedureId) {
         self.pages.truncate(1);
         self.pages.push(Page::Procedures);

@@ -42,7 +42,6 @@ impl Laid {
         Laid { label, from, to, figures: None, is_whole: false }
     }
 
-    /// A control run with its figures.
     pub fn of_run(run: &ControlRun, figures: [String; 5]) -> Laid {
         let to = (!run.is_running()).then_some(run.until);
         // What a procedure has measured has its name.
@@ -65,7 +64,6 @@ pub enum Kind {
     Batches,
     /// Control runs of one controller.
     Runs,
-    /// Periods.
     Periods,
 }
 
@@ -79,7 +77,6 @@ impl Kind {
     }
 }
 
-/// State of the page.
 #[derive(Debug)]
 pub struct Overlay {
     kind: Kind,
@@ -158,7 +155,6 @@ impl Overlay {
         self.curves.iter_mut().map(|(_, curve)| curve as &mut dyn Asked)
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let (theme, tag) = (cx.theme, self.tags[self.tag]);
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
@@ -215,7 +211,6 @@ impl Overlay {
         draw::columns([label, begin, -7, -9, -9, -9, -8], cells)
     }
 
-    /// The figures of one of them.
     fn row(&self, cx: &ViewContext, tag: TagId, laid: &Laid, curve: &Answered<Vec<Series>>) -> String {
         let begin = match self.kind {
             Kind::Batches | Kind::Runs => moment(laid.from, cx.now, &cx.def().time_zone),
@@ -264,7 +259,6 @@ pub trait Laying: Listing {
 /// A list whose marked rows lie over each other on request.
 #[derive(Debug)]
 pub struct Overlaid<L: Laying> {
-    /// The list.
     pub list: List<L>,
     /// Some of it over each other, in place of the list.
     pub overlay: Option<Overlay>,

@@ -150,7 +150,6 @@ impl PeriodicQuery {
 /// What the history answered last to a periodic query, or why it could not.
 #[derive(Debug)]
 pub struct Answered<T> {
-    /// The query.
     pub query: PeriodicQuery,
     /// The last good answer.
     pub value: Option<T>,
@@ -190,7 +189,6 @@ impl<T: FromAnswer> Answered<T> {
 
 /// A query of a tab, and who takes its answer.
 pub trait Asked {
-    /// The query.
     fn query(&self) -> &PeriodicQuery;
 
     /// Takes the answer to query `number` if it is waited for.

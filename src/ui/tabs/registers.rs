@@ -45,7 +45,6 @@ use crate::{
 
 /// An answer that is not there after so long is asked for again: the line has dropped it.
 const LOST_AFTER: SignedDuration = SignedDuration::from_secs(15);
-/// State of this tab.
 #[derive(Debug)]
 pub struct Registers {
     /// Where it is shown: what it asks is answered there.

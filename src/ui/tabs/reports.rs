@@ -34,7 +34,6 @@ use crate::{
 /// A row of the tables here.
 type Key = crate::ui::keys::Key<Reports>;
 
-/// Keys of this tab.
 const KEYS: &[Key] = &[
     Key::change(code(KeyCode::Left), "earlier", "previous shift", |reports, cx| reports.step(cx, -1)),
     Key::change(code(KeyCode::Right), "later", "next shift", |reports, cx| reports.step(cx, 1)),
@@ -105,7 +104,6 @@ enum Page {
     Made,
 }
 
-/// State of this tab.
 #[derive(Debug)]
 pub struct Reports {
     page: Page,

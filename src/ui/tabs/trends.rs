@@ -62,7 +62,6 @@ const COMMIT_LAG_S: f64 = 3.0;
 /// Columns of the last hour, a minute each.
 const HOUR_COLUMNS: usize = 60;
 
-/// State of this tab.
 #[derive(Debug, Default)]
 pub struct Trends {
     /// Groups of the plant, and behind them the tags that were picked in the list of values.
@@ -98,7 +97,6 @@ pub struct Trends {
     end: Option<Timestamp>,
     /// Earlier and later windows, to go back to.
     visited: Visited,
-    /// Cursor A.
     cursor: Option<Timestamp>,
     /// Cursor B, and what lies between both.
     between: Between,
@@ -106,7 +104,6 @@ pub struct Trends {
     replayed: Option<Timestamp>,
     /// The list of values instead of the curves: first row shown, row selected.
     values: Option<(usize, usize)>,
-    /// Those that are listed.
     filter: Words,
     /// When the tab last got a snapshot.
     seen: Option<Timestamp>,
@@ -127,12 +124,10 @@ pub struct Trends {
 /// What a typed text is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Asking {
-    /// A time to go to.
     #[default]
     Time,
     /// The values that are listed.
     Filter,
-    /// The scale of a pen.
     Scale(TagId),
     /// The periods that lie over each other.
     Overlay,

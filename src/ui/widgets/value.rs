@@ -66,7 +66,6 @@ pub fn line(cx: &ViewContext, tag: TagId) -> String {
     [def.name.clone(), shown.text, shown.unit, quality, text::stamp(sample.at, &cx.def().time_zone)].join("\t")
 }
 
-/// The value in words.
 fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let def = cx.def().tag(tag);
     if def.is_text() {

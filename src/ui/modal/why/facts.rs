@@ -14,7 +14,6 @@ use crate::{
     ui::ViewContext,
 };
 
-/// All rows about a tag.
 pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
     let def = cx.def().tag(tag);
     let device = cx.def().device(def.device);

@@ -65,7 +65,6 @@ impl Columns {
         Columns { time, tag, what, value, ribbon: ribbon + more, respond, state, since, by }
     }
 
-    /// The headings.
     pub fn headings(&self) -> String {
         let hour = if self.ribbon < 16 { t!("last hour") } else { t!("last 60 minutes") };
         let names = ["", t!("time"), t!("tag"), t!("what"), t!("value"), hour, t!("respond"), t!("state"), t!("for")];

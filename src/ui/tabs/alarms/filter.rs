@@ -36,7 +36,6 @@ pub enum Sort {
 }
 
 impl Sort {
-    /// The next order.
     pub fn next(self) -> Sort {
         match self {
             Sort::Urgency => Sort::Time,
@@ -78,7 +77,6 @@ impl Filter {
     pub fn type_words(&mut self, text: &str) {
         self.words = Words::parse(text);
     }
-    /// The words, as they were typed.
     pub fn typed(&self) -> String {
         self.words.to_string()
     }
@@ -125,7 +123,6 @@ impl Filter {
     }
 }
 
-/// The areas of the plant that have alarms.
 pub fn areas(def: &PlantDef) -> Vec<String> {
     let mut areas: Vec<String> = def.alarms.iter().map(|alarm| alarm.area.clone()).collect();
     areas.retain(|area| !area.is_empty());

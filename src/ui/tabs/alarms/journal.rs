@@ -24,10 +24,8 @@ const EVERY_S: f64 = 5.0;
 /// What may be typed, for the entry window.
 pub const FORMS: &str = "words of tag, message, user; a time or a day:  TIC-1 anna   06:00-14:00   2026-11-20";
 
-/// The page.
 pub type Journal = List<Events>;
 
-/// What is listed.
 #[derive(Debug, Default)]
 pub struct Events {
     pub alarms: Answered<Vec<AlarmRecord>>,
@@ -210,7 +208,6 @@ impl Journal {
     }
 }
 
-/// What belongs to an area.
 struct InArea<'a> {
     def: &'a PlantDef,
     alarms: Vec<&'a AlarmDef>,

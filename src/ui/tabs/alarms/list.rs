@@ -10,10 +10,8 @@ use crate::plant::{
     snapshot::ActiveAlarm,
 };
 
-/// A row of the list.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Row<'a> {
-    /// The alarm that stands there.
     pub alarm: &'a ActiveAlarm,
     /// It is the first-out alarm, and others of its group are in the list.
     pub first: bool,
@@ -25,7 +23,6 @@ pub struct Row<'a> {
     pub more: usize,
     /// So many of those wait for an acknowledgement.
     pub more_waiting: usize,
-    /// They are folded away.
     pub folded: bool,
 }
 

@@ -25,7 +25,6 @@ pub fn columns(width: u16) -> u16 {
 /// A row: its name at the left, its words.
 type Row = (&'static str, String, Style);
 
-/// Draws it.
 pub fn view(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     for y in 0..canvas.height() {
         canvas.text(0, y, cx.theme.pick("┊", "|"), cx.theme.dim());

@@ -12,7 +12,6 @@ use crate::{
 /// Rows above the list: views, filter, headings.
 const HEAD: u16 = 3;
 
-/// Draws the tab.
 pub(super) fn draw(tab: &Alarms, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let top = history_trouble(cx, &mut canvas);

@@ -22,7 +22,6 @@ use crate::{
 /// A reply that takes this share of the timeout is near it.
 const NEAR: f64 = 0.8;
 
-/// All rows of the page.
 pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     if cx.is_past() {
         return past(cx, at);

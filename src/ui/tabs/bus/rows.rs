@@ -60,9 +60,7 @@ pub fn flow(label: &str, style: Style, room: u16, parts: impl IntoIterator<Item 
     rows
 }
 
-/// A column of a table.
 pub struct Column {
-    /// Its heading.
     pub title: &'static str,
     /// Numbers stand at the right.
     pub right: bool,
@@ -70,12 +68,10 @@ pub struct Column {
     pub need: u8,
 }
 
-/// A column of words.
 pub const fn words(title: &'static str, need: u8) -> Column {
     Column { title, right: false, need }
 }
 
-/// A column of numbers.
 pub const fn number(title: &'static str, need: u8) -> Column {
     Column { title, right: true, need }
 }

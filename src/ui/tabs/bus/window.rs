@@ -23,7 +23,6 @@ use crate::{
     },
 };
 
-/// A window of this tab.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Window {
     /// Something to read.
@@ -40,7 +39,6 @@ impl Window {
         matches!(self, Window::Text(_))
     }
 
-    /// A key.
     pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         match self {
             Window::Text(text) => text.on_key(event),
@@ -54,7 +52,6 @@ impl Window {
         Next::Stay(Modal::Bus(Box::new(self)))
     }
 
-    /// Opens it.
     pub fn open(self) -> UiAction {
         UiAction::Open(Modal::Bus(Box::new(self)))
     }
@@ -81,7 +78,6 @@ impl Window {
         }
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         match self {
             Window::Text(text) => text.view(cx, screen, body),
@@ -106,20 +102,14 @@ pub struct TextWindow {
 pub enum Shown {
     /// One frame, byte by byte.
     Frame {
-        /// Name of its line.
         line: String,
-        /// The frame.
         frame: Box<Frame>,
         /// Earlier frames, the latest first: one of them is the request.
         before: Vec<Frame>,
     },
-    /// The tags of a block.
     Block {
-        /// On which line.
         line: LineId,
-        /// Of which device.
         device: DeviceId,
-        /// In which table.
         table: Table,
         /// From which address on.
         address: u16,

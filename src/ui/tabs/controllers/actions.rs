@@ -32,7 +32,6 @@ impl Controllers {
         Offer::footer_if(self.device(cx).is_some_and(has))
     }
 
-    /// The role that may write to this tag of the device.
     pub(super) fn role_for(&self, cx: &ViewContext, tag: impl FnOnce(&DeviceDef) -> Option<TagId>) -> Option<Role> {
         self.device(cx).and_then(tag).map(|tag| rights::to_write(cx, [tag]))
     }
@@ -57,7 +56,6 @@ impl Controllers {
         if let Page::Compare(compare) = self.page() { Some(compare) } else { None }
     }
 
-    /// Acts on the device.
     fn on_device(
         &mut self,
         cx: &ViewContext,
@@ -120,7 +118,6 @@ impl Controllers {
         })
     }
 
-    /// The window that writes a tag of the device.
     pub(super) fn write(
         &mut self,
         cx: &ViewContext,
@@ -230,7 +227,6 @@ impl Controllers {
     }
 }
 
-/// The window that writes a tag.
 fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<UiAction> {
     open(tag.and_then(|tag| Modal::write(cx, tag)))
 }

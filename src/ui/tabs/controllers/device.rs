@@ -21,7 +21,6 @@ const PANEL_ROWS: u16 = 24;
 /// Columns of the faceplate beside the table.
 const PANEL: u16 = 36;
 
-/// Draws the page.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Table, trend: Option<&Series>) {
     heading(cx, device, canvas);
     let (wide, high) = (canvas.width(), canvas.height());

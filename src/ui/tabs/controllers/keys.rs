@@ -238,7 +238,6 @@ impl KeyTable for Controllers {
     }
 }
 
-/// The keys of a page.
 fn table(page: &Page) -> Keys<Controllers> {
     Keys::of(match page {
         Page::List => &[&SELECT, LIST],

@@ -37,7 +37,6 @@ impl Columns {
     }
 }
 
-/// Draws the list of these devices with this one selected.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, (devices, selected): (&[&DeviceDef], usize), found: &str) {
     let theme = cx.theme;
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));

@@ -32,7 +32,6 @@ impl Table {
         sorted
     }
 
-    /// The selected tag.
     pub fn tag<'a>(&self, cx: &ViewContext<'a>, device: DeviceId) -> Option<&'a TagDef> {
         self.rows(cx, device).into_iter().nth(self.selected)
     }

@@ -73,7 +73,6 @@ pub fn tags(cx: &ViewContext, devices: &[&DeviceDef], selected: usize) -> Vec<Ta
     seen.filter_map(|device| Some(device.faceplate.as_ref()?.pv)).collect()
 }
 
-/// Draws these devices with this one selected.
 pub fn view(
     cx: &ViewContext,
     canvas: &mut Canvas,

@@ -21,14 +21,12 @@ const LISTS_BELOW: (u16, u16) = (5, 10);
 /// Rows of a list beside the cards.
 const ROWS_MAX: usize = 6;
 
-/// State of the page.
 #[derive(Debug, Default)]
 pub struct Overview {
     selected: usize,
     curves: Answered<Vec<Series>>,
 }
 
-/// The parts of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Parts {
     cards: Rect,
@@ -82,7 +80,6 @@ impl Overview {
         vec![&mut self.curves]
     }
 
-    /// The selected card.
     pub fn card(&self, cx: &ViewContext) -> Option<Card> {
         cards::cards(cx).into_iter().nth(self.selected)
     }
@@ -97,7 +94,6 @@ impl Overview {
         self.curves.query.want();
     }
 
-    /// Draws the page.
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect, shift: &Shift) {
         let parts = parts(cx, area, shift.height(cx));
         let series = self.curves.value.as_deref().unwrap_or_default();

@@ -265,7 +265,6 @@ fn steps(cx: &ViewContext, canvas: &mut Canvas, axis: Axis, lane: Lane, series: 
     }
 }
 
-/// When the shift ends.
 pub fn end(cx: &ViewContext) -> Option<Row> {
     let (_, to) = span(cx).filter(|_| !cx.def().shifts.is_empty())?;
     let left = running(elapsed(cx.now, to));

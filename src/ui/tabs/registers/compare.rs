@@ -11,7 +11,6 @@ use crate::{
     plant::live::{LiveRead, LiveReading},
 };
 
-/// What the window is compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reference {
     /// Another unit, read as often as the window.
@@ -20,7 +19,6 @@ pub enum Reference {
     Moment(Timestamp),
 }
 
-/// A comparison at work.
 #[derive(Debug)]
 pub struct Comparison {
     reference: Reference,
@@ -147,7 +145,6 @@ fn pair<'a>(
     (own, other, standing(own.and_then(|cell| cell.word), other.and_then(|cell| cell.word)))
 }
 
-/// The names of the columns.
 pub fn columns(tab: &Registers, cx: &ViewContext, comparison: &Comparison, canvas: &mut Canvas) {
     let theme = cx.theme;
     let labels = [t!("unit {unit}", unit = tab.unit), comparison.label(cx)];

@@ -13,7 +13,6 @@ pub struct Columns {
     pub hint: u16,
 }
 
-/// The columns of a screen of this width.
 pub fn layout(width: u16) -> Columns {
     let bcd = (120 <= width).then_some(36);
     let long = (100 <= width).then_some(if bcd.is_some() { 42 } else { 37 });

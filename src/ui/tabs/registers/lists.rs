@@ -24,17 +24,14 @@ const GAP_MAX: u32 = 8;
 /// Columns of a value or a model: a text, the names of many bits or of a whole family are cut.
 const VALUE_WIDTH: u16 = 28;
 
-/// The page.
 pub type Picking = List<Picks>;
 
-/// What is listed.
 #[derive(Debug)]
 pub struct Picks {
     what: What,
     rows: Vec<Pick>,
 }
 
-/// Of what.
 #[derive(Debug, Clone, PartialEq)]
 pub enum What {
     /// Everything that has a name.
@@ -45,7 +42,6 @@ pub enum What {
     Hits(String),
 }
 
-/// A row.
 #[derive(Debug, Clone)]
 pub struct Pick {
     id: usize,
@@ -63,7 +59,6 @@ pub struct Pick {
 pub enum Target {
     /// Registers, and the order to see them in.
     Place(AddressSpan, Option<ByteOrder>),
-    /// A profile.
     Profile(Arc<PlantDef>),
 }
 

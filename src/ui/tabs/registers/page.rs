@@ -47,7 +47,6 @@ impl Registers {
         }
     }
 
-    /// The line whose registers are shown.
     pub fn line(&self) -> LineId {
         self.line
     }

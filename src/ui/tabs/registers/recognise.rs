@@ -44,11 +44,9 @@ pub struct Recognised {
     /// Its device is the only one of this plant.
     pub def: Arc<PlantDef>,
     how: How,
-    /// Its names were taken.
     is_taken: bool,
 }
 
-/// By what.
 #[derive(Debug, Clone, Copy)]
 enum How {
     Probes(Fit),

@@ -35,7 +35,6 @@ struct Bench {
     asked: Vec<(QueryId, LiveRead)>,
     /// What the signatures ask.
     probed: Vec<(QueryId, LiveRead)>,
-    /// Rows of a log.
     rows: Vec<String>,
 }
 

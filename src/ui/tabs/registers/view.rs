@@ -40,7 +40,6 @@ pub fn rows(tab: &Registers, height: u16) -> usize {
     usize::from(height.saturating_sub(HEAD + below)).max(1)
 }
 
-/// Draws the tab.
 pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     heading(tab, cx, canvas);
     let height = canvas.height();

@@ -49,7 +49,6 @@ struct Log {
     rows: u64,
 }
 
-/// The list.
 #[derive(Debug, Default)]
 pub struct WatchList {
     items: Vec<Watched>,

@@ -20,7 +20,6 @@ const PERIODS_MS: [i64; 8] = [200, 500, 1_000, 2_000, 5_000, 10_000, 30_000, 60_
 const BEHIND: u32 = 3;
 
 impl Registers {
-    /// The rows of the window.
     pub(super) fn rows(&self, cx: &ViewContext) -> Range<u32> {
         let first = u32::from(self.first);
         first..(first + to_u32(view::rows(self, cx.area.height))).min(0x1_0000)

@@ -11,7 +11,6 @@ use crate::{
     text::file,
 };
 
-/// Keys of the list.
 pub const LIST: &[&[Key]] = &[&[
     Key::change(code(KeyCode::Enter), "report", "the whole report of its time", |reports, cx| {
         if let Some(period) = reports.batches.period(cx) {
@@ -40,7 +39,6 @@ const ROWS: usize = 50;
 /// The list reaches back so far.
 const SPAN: SignedDuration = SignedDuration::from_hours(24 * 30);
 
-/// The page.
 pub type Batches = Overlaid<BatchReports>;
 
 /// The batches of the plant, newest first.
@@ -127,7 +125,6 @@ impl Batches {
         if self.overlay.is_some() { OVERLAY } else { LIST }
     }
 
-    /// The period of the selected batch.
     fn period(&self, cx: &ViewContext) -> Option<Period> {
         self.list.selected(cx).map(|report| report.period())
     }

@@ -15,9 +15,7 @@ pub(super) enum Export {
     Not,
     /// On its way to the disk.
     Writing,
-    /// Written here.
     Done(PathBuf),
-    /// Why not.
     Failed(String),
 }
 

@@ -6,7 +6,6 @@ use super::{Export, Key, Page, Reports};
 use crate::report::{self, RecordRow, ShiftReport, record_csv::record_decimals};
 use crate::ui::tabs::prelude::*;
 
-/// Keys of the page.
 pub const KEYS: &[&[Key]] = &[
     &[
         Key::change(code(KeyCode::Left), "earlier", "rows of the previous shift", |reports, cx| reports.step(cx, -1)),
@@ -32,14 +31,12 @@ pub const KEYS: &[&[Key]] = &[
     }),
 ];
 
-/// State of the page.
 #[derive(Debug, Default)]
 pub struct Rows {
     conditions: Vec<Condition>,
     scroll: Scroll,
 }
 
-/// A column of the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Column {
     Sv,
@@ -55,7 +52,6 @@ struct Condition {
     limit: f64,
 }
 
-/// What was typed.
 #[derive(Debug, Clone, PartialEq)]
 enum Typed {
     /// A time of day, of the first date that has it.
@@ -117,7 +113,6 @@ impl Rows {
         report.record.iter().filter(|row| self.conditions.iter().all(|condition| condition.holds(row))).collect()
     }
 
-    /// Scrolls.
     pub fn on_motion(&mut self, cx: &ViewContext, report: Option<&ShiftReport>, motion: Motion) {
         let count = report.map_or(0, |report| self.filtered(report).len());
         self.scroll.on(motion, count, room(cx.area.height.saturating_sub(1)));

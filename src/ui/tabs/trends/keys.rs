@@ -6,7 +6,6 @@ use crate::ui::tabs::prelude::*;
 /// A row of the tables here.
 pub(super) type Key = crate::ui::keys::Key<Trends>;
 
-/// Keys of the curves.
 pub(super) const CURVES: &[Key] = &[
     Key::elsewhere(code(KeyCode::Esc), "close", "close the picture, as every key does")
         .when(|trends, _| Offer::only_if(trends.pictured)),
@@ -96,7 +95,6 @@ const FIND: Key =
         .when(of_plant);
 const WHY: Key = Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Trends::why).when(of_plant);
 
-/// Keys of the list of all values.
 pub(super) const VALUES: &[Key] = &[
     // In a replay Esc leads back here before it ends the past.
     Key::elsewhere(code(KeyCode::Esc), "back", "previous page").when(|_, cx| Offer::only_if(cx.is_past())),

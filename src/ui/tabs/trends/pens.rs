@@ -54,7 +54,6 @@ impl Trends {
         if self.opened.is_empty() { &self.picked } else { &self.opened }
     }
 
-    /// The number of groups.
     pub(super) fn groups(&self, cx: &ViewContext) -> usize {
         cx.def().trends.len() + usize::from(!self.behind().is_empty())
     }
@@ -146,7 +145,6 @@ impl Trends {
         }
     }
 
-    /// Asks for the scale of the selected pen.
     pub(super) fn ask_scale(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(pen) = self.pens(cx).get(self.selected).copied() else { return Vec::new() };
         self.asking = Asking::Scale(pen.tag);

@@ -33,7 +33,6 @@ pub enum Plot {
 }
 
 impl Plot {
-    /// The next one.
     pub fn next(self) -> Plot {
         match self {
             Plot::Time => Plot::Xy,

@@ -17,10 +17,8 @@ pub enum Stroke {
 }
 
 impl Stroke {
-    /// All of them.
     pub const ALL: [Stroke; 4] = [Stroke::Step, Stroke::Line, Stroke::Dots, Stroke::Bars];
 
-    /// The next one.
     pub fn next(self) -> Stroke {
         match self {
             Stroke::Step => Stroke::Line,

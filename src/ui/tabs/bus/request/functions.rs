@@ -25,11 +25,9 @@ enum Kind {
     Address,
     /// Registers or bits to read, at most so many.
     Count(i64),
-    /// One bit.
     Bit,
     /// Bits with their count.
     Bits,
-    /// One register.
     Register,
     /// Registers with their count.
     Registers,
@@ -60,7 +58,6 @@ fn row(function: u8) -> Vec<(&'static str, Kind, &'static str)> {
     }
 }
 
-/// What may be typed.
 fn range(kind: Kind, table: Table) -> String {
     match kind {
         Kind::Address => t!("{first} …, or 0 – 65535 as sent", first = table.modicon(0)),

@@ -44,7 +44,6 @@ impl Send {
         Window::Send(self).stay()
     }
 
-    /// Pasted text.
     pub fn on_paste(&mut self, text: &str) {
         self.text.paste(text);
     }
