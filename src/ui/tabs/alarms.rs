@@ -266,7 +266,9 @@ impl ListPage for Alarms {
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        self.selected(cx).map(|alarm| actions::line(cx, alarm)).into_iter().collect()
+        let meant = self.meant(cx);
+        let alarms = cx.snapshot.alarms.iter().filter(|alarm| meant.contains(&alarm.id));
+        alarms.map(|alarm| actions::line(cx, alarm)).collect()
     }
 
     fn filter(&self) -> String {

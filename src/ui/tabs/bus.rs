@@ -126,6 +126,13 @@ impl TabView for Bus {
         }
     }
 
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        match self.page(cx) {
+            Page::Registers => self.registers.copied(&below(cx)),
+            _ => self.list(cx).map_or(Vec::new(), |list| list.copied(cx)),
+        }
+    }
+
     fn back(&mut self, cx: &ViewContext) -> bool {
         self.frames.dismiss();
         if self.list_mut(cx).is_some_and(|list| list.back(cx)) {

@@ -180,7 +180,7 @@ impl TabView for Registers {
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        view::copied(self, cx)
+        self.list(cx).map_or_else(|| view::copied(self, cx), |list| list.copied(cx))
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {

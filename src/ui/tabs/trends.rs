@@ -126,8 +126,6 @@ pub struct Trends {
 enum Asking {
     #[default]
     Time,
-    /// The values that are listed.
-    Filter,
     Scale(TagId),
     /// The periods that lie over each other.
     Overlay,
@@ -139,6 +137,14 @@ impl TabView for Trends {
     fn new(_snapshot: &Snapshot) -> Trends {
         let window = WINDOWS.iter().position(|window| *window == 600).unwrap_or(0);
         Trends { window, rate: 1, ..Trends::default() }
+    }
+
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
+        self.values.map(|_| self as &dyn ListPage)
+    }
+
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
+        self.values.map(|_| self as &mut dyn ListPage)
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
@@ -201,11 +207,11 @@ impl TabView for Trends {
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
-        if self.overlay.take().is_some() {
+        if self.overlay.take().is_some() || self.list_mut(cx).is_some_and(|list| list.back(cx)) {
             return true;
         }
         let cancelled = [&mut self.curves, &mut self.hours.query].map(|query| query.cancel(cx));
-        cancelled.contains(&true) || self.values.is_some() && self.leave_values()
+        cancelled.contains(&true) || self.values.take().is_some()
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
@@ -223,7 +229,6 @@ impl TabView for Trends {
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         match self.asking {
             Asking::Time => self.go_to(cx, text)?,
-            Asking::Filter => self.filter_values(text),
             Asking::Scale(tag) => self.set_scale(tag, text)?,
             Asking::Overlay => self.lay_over(cx, text)?,
         }

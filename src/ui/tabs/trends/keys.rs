@@ -91,8 +91,7 @@ pub(super) const CURVES: &[Key] = &[
 ];
 
 const FIND: Key =
-    Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Trends::ask_filter)
-        .when(of_plant);
+    Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Trends::find).when(of_plant);
 const WHY: Key = Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Trends::why).when(of_plant);
 
 pub(super) const VALUES: &[Key] = &[
@@ -103,10 +102,6 @@ pub(super) const VALUES: &[Key] = &[
     FIND,
     Key::change(char('v'), "curves", "back to the curves", |trends, _| trends.show_values(None)),
     WHY,
-    Key::change(code(KeyCode::Up), "", "a row up", |trends, cx| trends.select_value(cx, Motion::Rows(-1))),
-    Key::change(code(KeyCode::Down), "select", "a row down", |trends, cx| trends.select_value(cx, Motion::Rows(1))),
-    Key::change(code(KeyCode::PageUp), "", "a page up", |trends, cx| trends.select_value(cx, Motion::Pages(-1))),
-    Key::change(code(KeyCode::PageDown), "", "a page down", |trends, cx| trends.select_value(cx, Motion::Pages(1))),
 ];
 
 /// A key of the present: a replay keeps its instant in the view with the cursor on it, and nothing moves.

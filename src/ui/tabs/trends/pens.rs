@@ -126,7 +126,7 @@ impl Trends {
 
     /// Marks the selected value of the list as a pen, or no longer.
     pub(super) fn pick(&mut self, cx: &ViewContext) {
-        let Some(tag) = self.values.and_then(|(_, row)| self.listed(cx).get(row).copied()) else { return };
+        let Some(tag) = self.listed_value(cx) else { return };
         match self.picked.iter().position(|picked| *picked == tag) {
             Some(place) => drop(self.picked.remove(place)),
             None if self.picked.len() < PENS_MAX => self.picked.push(tag),
