@@ -18,7 +18,6 @@ use crate::{
     t,
 };
 
-/// A key of the whole terminal.
 #[derive(Debug, Clone, Copy)]
 pub struct GlobalKey {
     chord: Chord,
@@ -130,7 +129,6 @@ pub const PALETTE: Chord = char(':');
 /// The same while something is typed.
 pub const PALETTE_TOO: Chord = ctrl('p');
 
-/// The other keys of every tab.
 const KEYS: &[GlobalKey] = &[
     GlobalKey::new(code(KeyCode::Tab), "", "next tab", |model| step(model, 1)),
     GlobalKey::new(code(KeyCode::BackTab), "", "previous tab", |model| step(model, -1)),

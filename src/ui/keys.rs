@@ -115,7 +115,6 @@ enum Part<P: 'static> {
 
 /// Keys that are no rows of a table: of a form that is typed into, of a page with a state of its own, of the plant file.
 pub struct Below<P> {
-    /// For footer and help.
     pub hints: fn(&P, &ViewContext) -> Vec<Hint>,
     /// `None` where it is none of them.
     pub press: fn(&mut P, &ViewContext, KeyEvent) -> Option<Vec<UiAction>>,

@@ -63,7 +63,6 @@ pub struct Layout {
     pub footer: Rect,
 }
 
-/// Cuts the screen into its parts.
 pub fn layout(screen: Rect) -> Layout {
     let row = |y: u16| Rect { y: screen.y.saturating_add(y), height: 1, ..screen }.intersection(screen);
     let none = Rect { width: 0, height: 0, ..screen };

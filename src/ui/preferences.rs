@@ -112,10 +112,8 @@ impl Bookmark {
     }
 }
 
-/// What a user wants kept.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kept {
-    /// Looks and sounds.
     Preferences(Preferences),
     /// All bookmarks.
     Bookmarks(Vec<Bookmark>),

@@ -50,7 +50,6 @@ pub struct Shown {
     pub snapshot: Arc<Snapshot>,
 }
 
-/// What happened at an instant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
     Alarm(AlarmRecord),
@@ -58,7 +57,6 @@ pub enum Event {
     /// A batch began, or it ended.
     Batch {
         at: Timestamp,
-        /// Its name and number.
         label: String,
         ended: bool,
     },
@@ -122,7 +120,6 @@ impl Replay {
         self.trouble.clone().or_else(|| waits.then(|| t!("reading the history …").to_owned()))
     }
 
-    /// Does it wait for this answer?
     pub fn awaits(&mut self, number: u32) -> bool {
         self.requested.is_some_and(|(requested, _)| requested == number)
             || self.sample == Some(number)
@@ -136,7 +133,6 @@ impl Replay {
         self.page.as_ref().filter(|_| self.shown.is_some())
     }
 
-    /// The same, to scroll it.
     pub fn page_mut(&mut self) -> Option<&mut EventPage> {
         self.page.as_mut().filter(|_| self.shown.is_some())
     }
@@ -171,7 +167,6 @@ impl Replay {
         page.follow(shown, present)
     }
 
-    /// Back to the present.
     pub fn leave(&mut self) {
         *self = Replay::default();
     }

@@ -81,7 +81,6 @@ impl Task {
         }
     }
 
-    /// Does it need a silent device?
     fn needs_silence(self) -> bool {
         matches!(self, Task::Acknowledge | Task::Guidance | Task::Why)
     }

@@ -54,7 +54,6 @@ pub struct Confirm {
 /// What a confirmed window does.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ConfirmAction {
-    /// Leave the terminal.
     Quit,
     Command(CommandKind),
 }

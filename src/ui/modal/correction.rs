@@ -66,7 +66,6 @@ impl Correction {
         CommandKind::CorrectCounter { tag: self.tag(), amount }
     }
 
-    /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
         let change = self.form.is_on_choice().then(|| Hint::in_window("←→", t!("change")));
         let (enter, select) = (Hint::in_window("⏎", t!("correct")), Hint::in_window("↑↓", t!("select")));

@@ -42,7 +42,6 @@ fn needs_confirmation(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
     pub tag: TagId,
-    /// What has been typed.
     pub line: Line,
     /// Why the last Enter was not taken.
     pub problem: Option<String>,

@@ -72,7 +72,6 @@ impl Form {
         self.fields.len()
     }
 
-    /// The place of the selected field.
     pub fn selected(&self) -> usize {
         self.at
     }
@@ -155,7 +154,6 @@ impl Form {
         self.fields[n].hidden
     }
 
-    /// Hides a field, or shows it.
     pub fn hide(&mut self, n: usize, hidden: bool) {
         self.fields[n].hidden = hidden;
     }
@@ -233,7 +231,6 @@ impl Form {
         }
     }
 
-    /// Columns that it wants.
     pub fn width(&self) -> u16 {
         self.labels() + 36
     }

@@ -43,7 +43,6 @@ impl Line {
     pub fn offered(text: &str) -> Line {
         Line { is_offered: !text.is_empty(), ..Line::new(text) }
     }
-    /// What has been entered.
     pub fn text(&self) -> String {
         self.text.iter().collect()
     }

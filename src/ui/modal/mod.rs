@@ -57,7 +57,6 @@ pub enum Modal {
     /// All keys; the number is the first row shown.
     Help(usize),
     Confirm(Confirm),
-    /// A number for a tag.
     Entry(Entry),
     Choice(Choice),
     /// Go to anything by its name.
@@ -232,7 +231,6 @@ impl Modal {
         }
     }
 
-    /// The keys of the moment.
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = match self {
             Modal::Help(_) => vec![

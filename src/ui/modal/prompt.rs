@@ -21,14 +21,12 @@ pub struct Prompt {
     pub title: String,
     /// The form that is expected, with an example.
     pub hint: String,
-    /// What has been typed.
     pub line: Line,
     /// Why the last Enter was not taken.
     pub problem: Option<String>,
     taker: Taker,
 }
 
-/// Who takes what is typed.
 #[derive(Debug, Clone, PartialEq)]
 enum Taker {
     Tab,

@@ -60,7 +60,7 @@ pub struct EventPage {
 
 /// An event of the journal.
 #[derive(Debug, Clone, PartialEq)]
-struct Entry {
+struct NearbyEvent {
     at: Timestamp,
     text: String,
     style: ratatui::style::Style,
@@ -155,18 +155,18 @@ impl EventPage {
     }
 
     /// Alarm events and actions, oldest first.
-    fn entries(&self, cx: &ViewContext) -> Vec<Entry> {
-        let alarms = self.alarms.value.iter().flatten().map(|row| Entry {
+    fn entries(&self, cx: &ViewContext) -> Vec<NearbyEvent> {
+        let alarms = self.alarms.value.iter().flatten().map(|row| NearbyEvent {
             at: row.at,
             text: event_text(cx, row),
             style: cx.theme.normal(),
         });
-        let actions = self.actions.value.iter().flatten().map(|row| Entry {
+        let actions = self.actions.value.iter().flatten().map(|row| NearbyEvent {
             at: row.at,
             text: action_text(cx, row).split_whitespace().collect::<Vec<_>>().join(" "),
             style: cx.theme.strong(),
         });
-        let mut entries: Vec<Entry> = alarms.chain(actions).collect();
+        let mut entries: Vec<NearbyEvent> = alarms.chain(actions).collect();
         entries.sort_by_key(|entry| entry.at);
         entries
     }

@@ -48,7 +48,6 @@ impl Searched {
     }
 }
 
-/// A search for the next event.
 #[derive(Debug)]
 pub(super) struct Search {
     what: Searched,

@@ -43,7 +43,6 @@ use metrics::Metrics;
 use recent::Recent;
 use suppressed::Suppressed;
 
-/// A view of the tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Page {
     /// Alarms of the process, and the urgent ones of the system.
@@ -195,7 +194,7 @@ impl Alarms {
         on_page(cx, self.page)
     }
 
-    fn rows<'a>(&self, cx: &ViewContext<'a>) -> Vec<list::Row<'a>> {
+    fn rows<'a>(&self, cx: &ViewContext<'a>) -> Vec<list::AlarmRow<'a>> {
         let listed = self.listed(cx).unwrap_or_default().into_iter();
         match self.sort {
             // A wide screen shows the tree of a first-out group until it is folded.
@@ -203,11 +202,11 @@ impl Alarms {
                 let chosen = |began| self.folds.iter().find(|(of, _)| *of == began).map(|(_, folded)| *folded);
                 list::rows(cx.def(), listed, |began| chosen(began).unwrap_or(cx.size < Size::Wide))
             }
-            Sort::Time | Sort::Name => listed.map(list::Row::plain).collect(),
+            Sort::Time | Sort::Name => listed.map(list::AlarmRow::plain).collect(),
         }
     }
 
-    fn place(&self, rows: &[list::Row]) -> usize {
+    fn place(&self, rows: &[list::AlarmRow]) -> usize {
         self.selected.place(rows.iter().map(|row| row.alarm.id))
     }
 
@@ -285,7 +284,7 @@ impl ListPage for Alarms {
 
     fn fingerprint(&self, cx: &ViewContext) -> Rows {
         let rows = self.rows(cx);
-        let seen = |row: &list::Row| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
+        let seen = |row: &list::AlarmRow| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
         Rows::of(rows.iter().map(seen), self.place(&rows))
     }
 

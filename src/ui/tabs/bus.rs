@@ -44,7 +44,6 @@ const DAY_HEIGHT: u16 = 3;
 /// Least rows of the recent frames below them.
 const FRAMES_MIN: u16 = 4;
 
-/// What is shown of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Page {
     /// Settings, load, counters, devices.

@@ -28,7 +28,7 @@ use self::{
     program::Cell,
     runs::{ControlRuns, Runs},
     sets::{Sets, SetsOf},
-    table::Table,
+    table::ParameterTable,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{history::Series, plant::parameter_set, ui::layout::Size};
@@ -43,7 +43,6 @@ pub enum Page {
     List,
     Device,
     Lamps,
-    /// Its ramp/soak program.
     Program,
     Sets,
     /// A set against it.
@@ -64,7 +63,7 @@ pub struct Controllers {
     device: DeviceId,
     /// Only devices with these words are listed.
     found: Words,
-    table: Table,
+    table: ParameterTable,
     cell: Cell,
     /// The devices as faceplates or as a table; `None` as there is room.
     wall: Option<bool>,
@@ -89,7 +88,7 @@ impl TabView for Controllers {
 
     fn new(snapshot: &Snapshot) -> Controllers {
         let page = if snapshot.def.devices.len() == 1 { Page::Device } else { Page::List };
-        Controllers::on_pages(vec![page], DeviceId(0), Table::default())
+        Controllers::on_pages(vec![page], DeviceId(0), ParameterTable::default())
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
@@ -100,7 +99,7 @@ impl TabView for Controllers {
         match popped {
             Some(Page::Device) => {
                 self.trend = Answered::default();
-                self.table = Table { defaults: self.table.defaults, ..Table::default() };
+                self.table = ParameterTable { defaults: self.table.defaults, ..ParameterTable::default() };
             }
             Some(Page::Overlay) => self.runs.overlay = None,
             Some(_) => {}
@@ -217,7 +216,7 @@ impl TabView for Controllers {
 }
 
 impl Controllers {
-    fn on_pages(pages: Vec<Page>, device: DeviceId, table: Table) -> Controllers {
+    fn on_pages(pages: Vec<Page>, device: DeviceId, table: ParameterTable) -> Controllers {
         let (cell, trend) = (Cell::default(), Answered::default());
         let runs = Runs::new(ControlRuns { device });
         Controllers {
@@ -271,7 +270,7 @@ impl Controllers {
     }
 
     pub fn show(&mut self, device: DeviceId) {
-        let table = Table { defaults: self.table.defaults, ..Table::default() };
+        let table = ParameterTable { defaults: self.table.defaults, ..ParameterTable::default() };
         let found = std::mem::take(&mut self.found);
         let pages = self.pages.iter().take(1).filter(|first| **first != Page::Device).cloned();
         let pages = pages.chain([Page::Device]).collect();

@@ -31,7 +31,6 @@ pub struct Faults {
     verdict: bool,
 }
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Faults>;
 
 const KEYS: &[Key] = &[

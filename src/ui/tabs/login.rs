@@ -11,7 +11,6 @@ use crate::{
     ui::modal::user_form::{Purpose, UserForm},
 };
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Login>;
 
 /// Keys of this tab while a user is logged in.

@@ -116,7 +116,6 @@ impl Overlay {
         }
     }
 
-    /// Shows another tag.
     pub fn next_tag(&mut self, by: isize) {
         self.tag = around(self.tag, by, self.tags.len());
         for (laid, curve) in &mut self.curves {
@@ -204,7 +203,6 @@ impl Overlay {
         chart.render(canvas.area(), canvas.buffer());
     }
 
-    /// A row of the legend.
     fn columns(&self, cells: [&str; 7]) -> String {
         // A period has a date where a batch has a number.
         let (label, begin) = if self.kind == Kind::Periods { (7, 20) } else { (15, 12) };
@@ -292,7 +290,6 @@ impl<L: Laying> Overlaid<L> {
         self.overlay = Overlay::new(kind, laid, (tags, 0));
     }
 
-    /// The curves of another tag.
     pub fn next_tag(&mut self, by: isize) {
         self.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by));
     }

@@ -93,7 +93,6 @@ pub struct Registers {
     writing: writing::Writing,
     watch: watch::WatchList,
     comparison: Option<compare::Comparison>,
-    /// What the open prompt asks for.
     asking: Asking,
 }
 
@@ -238,7 +237,7 @@ impl TabView for Registers {
         match (what, reading) {
             (ReadFor::Search(text), reading) => {
                 reading.ok().flatten().iter().for_each(|reading| self.cells.on_reading(reading));
-                self.list_of(cx, lists::What::Hits(text))
+                self.list_of(cx, lists::PicksOf::Hits(text))
             }
             (ReadFor::Recognition, reading) => self.on_probed(cx, reading.ok().flatten()),
             (ReadFor::Comparison(_), reading) => {

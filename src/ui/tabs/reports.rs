@@ -17,7 +17,7 @@ use self::{
     batches::{BatchReports, Batches},
     export::Export,
     made::AutomaticReportsPage,
-    rows::Rows,
+    rows::RecordRows,
 };
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
@@ -31,7 +31,6 @@ use crate::{
     ui::{tabs::trends::span::View, widgets::chart},
 };
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Reports>;
 
 const KEYS: &[Key] = &[
@@ -118,7 +117,7 @@ pub struct Reports {
     curve: Answered<Vec<Series>>,
     batches: Batches,
     made: AutomaticReportsPage,
-    rows: Rows,
+    rows: RecordRows,
     dialect: CsvDialect,
     format: &'static dyn ReportFormat,
     /// The report as text, while that is shown.
@@ -144,7 +143,7 @@ impl TabView for Reports {
             curve: Answered::default(),
             batches: Batches::new(BatchReports),
             made: AutomaticReportsPage::default(),
-            rows: Rows::default(),
+            rows: RecordRows::default(),
             dialect: snapshot.def.report.csv,
             format: report::FORMATS[0],
             preview: None,

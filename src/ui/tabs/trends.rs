@@ -121,7 +121,6 @@ pub struct Trends {
     ended: bool,
 }
 
-/// What a typed text is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Asking {
     #[default]

@@ -15,7 +15,6 @@ use crate::{
     },
 };
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Users>;
 
 const LIST: &[Key] = &[

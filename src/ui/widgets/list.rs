@@ -123,7 +123,6 @@ impl Words {
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
-    /// Does it let this text through?
     pub fn fit(&self, text: &str) -> bool {
         self.is_empty() || {
             let text = searchable(text).to_lowercase();

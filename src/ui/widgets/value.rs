@@ -26,7 +26,6 @@ pub struct Shown {
     pub note: String,
     /// A number, which is shown whole or not at all; words may be cut with a mark.
     pub number: bool,
-    /// Look of the text.
     pub style: Style,
 }
 

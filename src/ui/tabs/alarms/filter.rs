@@ -23,7 +23,6 @@ pub struct Filter {
     words: Words,
 }
 
-/// The order of the list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sort {
     /// By priority, unacknowledged first; first-out groups stand together.
@@ -99,7 +98,6 @@ impl Filter {
         self.area = area_after(def, self.area.as_ref());
     }
 
-    /// Does it let this alarm through?
     pub fn holds(&self, cx: &ViewContext, alarm: &ActiveAlarm) -> bool {
         if self.is_off() {
             return true;

@@ -107,7 +107,6 @@ impl Ring {
         UiAction::Open(Modal::Prompt(Prompt::new(t!("filter frames"), hint, &self.filter.to_string())))
     }
 
-    /// Takes a filter that was typed.
     pub fn set_filter(&mut self, text: &str) -> Result<(), String> {
         self.filter = Filter::parse(text).map_err(|error| error.to_string())?;
         Ok(())

@@ -3,7 +3,6 @@
 use super::*;
 use crate::ui::modal::LineSettings;
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Bus>;
 
 const MOVE: [Key; 6] = motions!("select", Bus::scroll);

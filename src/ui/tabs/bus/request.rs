@@ -40,7 +40,6 @@ use crate::{
 /// Most characters of a field.
 const CHARS: usize = 400;
 
-/// A test with its fields.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RequestForm {
     line: LineId,

@@ -10,7 +10,7 @@ use super::{
     frames::{broken, bytes_text},
     request::RequestForm,
     results,
-    rows::{self, Row, plain},
+    rows::{self, Spans, plain},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{

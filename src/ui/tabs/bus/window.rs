@@ -6,7 +6,7 @@ use super::{
     frames::{broken, bytes_text},
     line::short_ms,
     request::RequestForm,
-    rows::{self, Row, plain},
+    rows::{self, Spans, plain},
     test::Send,
 };
 use crate::ui::tabs::prelude::*;
@@ -29,12 +29,10 @@ pub enum Window {
     Text(TextWindow),
     /// Bytes or words to be sent.
     Send(Send),
-    /// A test with its fields.
     Form(RequestForm),
 }
 
 impl Window {
-    /// Is it only something to read?
     pub fn only_shows(&self) -> bool {
         matches!(self, Window::Text(_))
     }
@@ -47,7 +45,6 @@ impl Window {
         }
     }
 
-    /// Stays open.
     pub fn stay(self) -> Next {
         Next::Stay(Modal::Bus(Box::new(self)))
     }
@@ -65,7 +62,6 @@ impl Window {
         }
     }
 
-    /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let close = hint(t!("Esc"), t!("close"));
@@ -97,7 +93,6 @@ pub struct TextWindow {
     first: usize,
 }
 
-/// What a text shows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shown {
     /// One frame, byte by byte.
@@ -169,7 +164,7 @@ fn means(cx: &ViewContext, line: &str, frame: &Frame, before: &[Frame], message:
 }
 
 /// Every byte of a frame with its name and meaning.
-fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection, room: u16) -> Vec<Row> {
+fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection, room: u16) -> Vec<Spans> {
     let theme = cx.theme;
     let at = draw::local(cx, frame.at, "%H:%M:%S%.6f");
     let direction = if frame.sent { t!("TX sent") } else { t!("RX received") };
@@ -189,9 +184,9 @@ fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection,
 }
 
 /// Summary and fields.
-pub fn dissection_rows(cx: &ViewContext, dissection: &dissect::Dissection, room: u16) -> Vec<Row> {
+pub fn dissection_rows(cx: &ViewContext, dissection: &dissect::Dissection, room: u16) -> Vec<Spans> {
     let theme = cx.theme;
-    let mut rows: Vec<Row> =
+    let mut rows: Vec<Spans> =
         wrap(&dissection.summary, room).into_iter().map(|line| plain(line, theme.strong())).collect();
     let widest = |text: fn(&dissect::Field) -> &str, most| {
         dissection.fields.iter().map(|field| width(text(field))).max().unwrap_or(0).min(most)
@@ -216,7 +211,7 @@ pub fn dissection_rows(cx: &ViewContext, dissection: &dissect::Dissection, room:
 }
 
 /// A request and its answer in words.
-pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Row> {
+pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Spans> {
     let theme = cx.theme;
     let framing = Some(exchange.framing);
     let asked = dissect::message_of(&exchange.request, exchange.framing);
@@ -224,7 +219,7 @@ pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Ro
     let row = |direction: &str, bytes: &[u8], words: &str, style| {
         let mut lines = broken(&format!("{direction} {}", bytes_text(exchange.framing, bytes)), room);
         lines.extend(wrap(words, room.saturating_sub(3)).into_iter().map(|line| format!("   {line}")));
-        lines.into_iter().map(|line| plain(line, style)).collect::<Vec<Row>>()
+        lines.into_iter().map(|line| plain(line, style)).collect::<Vec<Spans>>()
     };
     let mut rows = row("TX", &exchange.request, &request.summary, theme.dim());
     let reply =
@@ -240,7 +235,7 @@ pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Ro
 }
 
 /// The tags of a block as they stand.
-fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, address: u16) -> Vec<Row> {
+fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, address: u16) -> Vec<Spans> {
     let report = cx.snapshot.line(line).report.as_deref();
     let poll = report.and_then(|report| {
         report.polls.iter().find(|poll| (poll.device, poll.table, poll.address) == (device, table, address))
@@ -281,7 +276,7 @@ fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, ad
     rows.extend(poll.tags.iter().zip(lines).map(|(tag, line)| plain(line, value::show(cx, *tag).style)));
     let last = poll.tags.first().and_then(|tag| cx.snapshot.source_frames.get(tag.index())?.clone());
     if let Some(exchange) = last {
-        rows.push(Row::new());
+        rows.push(Spans::new());
         rows.push(plain(t!("last read: {hex}", hex = hex(&exchange.answer)), cx.theme.dim()));
     }
     rows

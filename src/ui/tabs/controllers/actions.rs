@@ -51,7 +51,6 @@ impl Controllers {
         self.cell.tag(device.program.as_ref()?)
     }
 
-    /// The comparison that is shown.
     pub(super) fn compared(&self) -> Option<&Compare> {
         if let Page::Compare(compare) = self.page() { Some(compare) } else { None }
     }
@@ -183,7 +182,6 @@ impl Controllers {
         self.pages.push(Page::Guide(0));
     }
 
-    /// Turns the pages of the guide.
     pub(super) fn turn(&mut self, by: isize) {
         if let Some(Page::Guide(page)) = self.pages.last_mut() {
             *page = page.saturating_add_signed(by).min(guide::count() - 1);

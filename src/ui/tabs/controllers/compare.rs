@@ -27,7 +27,6 @@ pub struct Compare {
 type Plan = Result<Vec<PlannedChange>, Vec<Problem>>;
 
 impl Compare {
-    /// A source against the device.
     pub fn new(source: Source) -> Compare {
         Compare { source, scroll: Scroll::default(), all: false }
     }

@@ -3,7 +3,6 @@
 use super::{Controllers, Page, compare::Compare, lamps, sets::Source};
 use crate::ui::tabs::prelude::*;
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Controllers>;
 
 const SELECT: [Key; 6] = motions!("select", Controllers::step);

@@ -181,7 +181,6 @@ impl Procedures {
     }
 }
 
-/// Why the page is not shown.
 pub fn why_none(cx: &ViewContext) -> &'static str {
     if cx.is_past() { t!("procedures are shown in the present only") } else { t!("this plant has no procedures") }
 }

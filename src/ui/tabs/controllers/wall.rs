@@ -29,7 +29,6 @@ const FIXED: u16 = 7;
 /// Rows above and below the faceplates.
 const AROUND: u16 = 2;
 
-/// The faceplates on a tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
     /// Beside each other.

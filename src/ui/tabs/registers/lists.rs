@@ -28,12 +28,12 @@ pub type Picking = List<Picks>;
 
 #[derive(Debug)]
 pub struct Picks {
-    what: What,
+    what: PicksOf,
     rows: Vec<Pick>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub enum What {
+pub enum PicksOf {
     /// Everything that has a name.
     Values,
     /// Device profiles, the likeliest first.
@@ -54,7 +54,6 @@ pub struct Pick {
     target: Target,
 }
 
-/// What a row leads to.
 #[derive(Debug, Clone)]
 pub enum Target {
     /// Registers, and the order to see them in.
@@ -69,9 +68,9 @@ impl Listing for Picks {
 
     fn heading<'a>(&self, _cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
         match &self.what {
-            What::Values => Heading::new(t!("values with names"), t!("nothing has a name yet")),
-            What::Profiles => Heading::new(t!("device profiles, the likeliest first"), t!("no profile")),
-            What::Hits(text) => {
+            PicksOf::Values => Heading::new(t!("values with names"), t!("nothing has a name yet")),
+            PicksOf::Profiles => Heading::new(t!("device profiles, the likeliest first"), t!("no profile")),
+            PicksOf::Hits(text) => {
                 Heading::new(t!("where {text} may be", text), t!("in none of the registers read so far"))
             }
         }
@@ -87,15 +86,15 @@ impl Listing for Picks {
 
     fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<Pick>> {
         let [group, name, value, note] = match self.what {
-            What::Values => [t!("group"), t!("name"), t!("now"), t!("address")],
-            What::Profiles => [t!("model"), t!("profile"), t!("probes fit"), t!("why not")],
-            What::Hits(_) => [t!("address"), t!("type"), t!("likelihood"), t!("as")],
+            PicksOf::Values => [t!("group"), t!("name"), t!("now"), t!("address")],
+            PicksOf::Profiles => [t!("model"), t!("profile"), t!("probes fit"), t!("why not")],
+            PicksOf::Hits(_) => [t!("address"), t!("type"), t!("likelihood"), t!("as")],
         };
         let label = Column::words(t!("label"), |_, row: &Pick| row.label.clone()).rank(1);
         let columns = [
             Some(Column::words(group, |_, row: &Pick| row.group.clone())),
             Some(Column::words(name, |_, row: &Pick| row.name.clone())),
-            (self.what == What::Values).then_some(label),
+            (self.what == PicksOf::Values).then_some(label),
             Some(Column::number(value, |_, row: &Pick| row.value.clone())),
             Some(rest(10, note, |_, row: &Pick, room| fit(&row.note, room))),
         ];
@@ -103,7 +102,6 @@ impl Listing for Picks {
     }
 }
 
-/// A row of the tables here.
 type Key = keys::Key<Registers>;
 
 /// Its own keys; those of every list come with it.
@@ -115,15 +113,14 @@ pub const KEYS: &[Key] = &[
 impl Registers {
     /// Shows everything that has a name.
     pub(super) fn list_values(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.list_of(cx, What::Values)
+        self.list_of(cx, PicksOf::Values)
     }
 
-    /// Shows the device profiles.
     pub(super) fn list_profiles(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.list_of(cx, What::Profiles)
+        self.list_of(cx, PicksOf::Profiles)
     }
 
-    pub(super) fn list_of(&mut self, cx: &ViewContext, what: What) -> Vec<UiAction> {
+    pub(super) fn list_of(&mut self, cx: &ViewContext, what: PicksOf) -> Vec<UiAction> {
         let rows = self.picks(cx, &what);
         self.picking = Some(List::new(Picks { what, rows }));
         self.follow_list(cx);
@@ -134,11 +131,11 @@ impl Registers {
     pub(super) fn follow_list(&mut self, cx: &ViewContext) {
         let Some(picking) = &self.picking else { return self.listed_spans.clear() };
         let what = picking.of.what.clone();
-        if what == What::Values {
+        if what == PicksOf::Values {
             let rows = self.picks(cx, &what);
             self.picking.iter_mut().for_each(|picking| picking.of.rows.clone_from(&rows));
         }
-        let Some(picking) = self.picking.as_ref().filter(|_| what == What::Values) else {
+        let Some(picking) = self.picking.as_ref().filter(|_| what == PicksOf::Values) else {
             return self.listed_spans.clear();
         };
         let (rows, selected) = (picking.rows(cx), picking.selected(cx).map(|row| row.id));
@@ -148,11 +145,11 @@ impl Registers {
         self.listed_spans = joined(spans.collect());
     }
 
-    fn picks(&self, cx: &ViewContext, what: &What) -> Vec<Pick> {
+    fn picks(&self, cx: &ViewContext, what: &PicksOf) -> Vec<Pick> {
         let mut rows = match what {
-            What::Values => self.value_rows(cx),
-            What::Profiles => self.profile_rows(),
-            What::Hits(text) => self.hit_rows(text),
+            PicksOf::Values => self.value_rows(cx),
+            PicksOf::Profiles => self.profile_rows(),
+            PicksOf::Hits(text) => self.hit_rows(text),
         };
         rows.iter_mut().enumerate().for_each(|(n, row)| row.id = n);
         rows
@@ -244,7 +241,7 @@ impl Registers {
         find::check(text)?;
         let spans = self.swept(cx);
         if spans.is_empty() {
-            return Ok(self.list_of(cx, What::Hits(text.to_owned())));
+            return Ok(self.list_of(cx, PicksOf::Hits(text.to_owned())));
         }
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
         Ok(vec![self.send(cx, ReadFor::Search(text.to_owned()), read)])

@@ -31,7 +31,6 @@ pub struct Preview {
     top: usize,
 }
 
-/// A row of the tables here.
 type Key = keys::Key<Registers>;
 
 const SCROLL: [Key; 6] = motions!("", Registers::scroll_list);

@@ -38,7 +38,6 @@ pub enum Recognition {
     Done(Option<Recognised>),
 }
 
-/// A profile that fits.
 #[derive(Debug)]
 pub struct Recognised {
     /// Its device is the only one of this plant.

@@ -42,7 +42,6 @@ struct Watched {
     greatest: Exact,
 }
 
-/// A log under way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Log {
     path: PathBuf,

@@ -8,7 +8,6 @@ use crate::{
     ui::tabs::prelude::*,
 };
 
-/// How the file stands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Export {
     /// Nothing written of this period.

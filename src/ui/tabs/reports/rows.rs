@@ -32,13 +32,13 @@ pub const KEYS: &[&[Key]] = &[
 ];
 
 #[derive(Debug, Default)]
-pub struct Rows {
+pub struct RecordRows {
     conditions: Vec<Condition>,
     scroll: Scroll,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Column {
+enum RecordColumn {
     Sv,
     Pv,
     Er,
@@ -47,7 +47,7 @@ enum Column {
 /// `pv > 60`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Condition {
-    column: Column,
+    column: RecordColumn,
     above: bool,
     limit: f64,
 }
@@ -60,11 +60,11 @@ enum Typed {
     Conditions(Vec<Condition>),
 }
 
-fn column_of(word: &str) -> Option<Column> {
+fn column_of(word: &str) -> Option<RecordColumn> {
     match word {
-        "sv" => Some(Column::Sv),
-        "pv" => Some(Column::Pv),
-        "er" => Some(Column::Er),
+        "sv" => Some(RecordColumn::Sv),
+        "pv" => Some(RecordColumn::Pv),
+        "er" => Some(RecordColumn::Er),
         _ => None,
     }
 }
@@ -95,15 +95,15 @@ impl Condition {
     /// What is not known is neither above nor below.
     fn holds(self, row: &RecordRow) -> bool {
         let value = match self.column {
-            Column::Sv => row.sv,
-            Column::Pv => row.pv,
-            Column::Er => row.er,
+            RecordColumn::Sv => row.sv,
+            RecordColumn::Pv => row.pv,
+            RecordColumn::Er => row.er,
         };
         value.is_some_and(|value| if self.above { value > self.limit } else { value < self.limit })
     }
 }
 
-impl Rows {
+impl RecordRows {
     /// Another period: its first row.
     pub fn rewind(&mut self) {
         self.scroll = Scroll::default();
@@ -192,10 +192,13 @@ mod tests {
             ("14:05", Some(Typed::Time(civil::time(14, 5, 0, 0)))),
             ("2026-11-26 14:05", Some(Typed::Instant(civil::date(2026, 11, 26).at(14, 5, 0, 0)))),
             ("2026-11-26", Some(Typed::Instant(civil::date(2026, 11, 26).at(0, 0, 0, 0)))),
-            ("PV>60", Some(Typed::Conditions(vec![condition(Column::Pv, true, 60.0)]))),
+            ("PV>60", Some(Typed::Conditions(vec![condition(RecordColumn::Pv, true, 60.0)]))),
             (
                 "er < -1 sv > 2",
-                Some(Typed::Conditions(vec![condition(Column::Er, false, -1.0), condition(Column::Sv, true, 2.0)])),
+                Some(Typed::Conditions(vec![
+                    condition(RecordColumn::Er, false, -1.0),
+                    condition(RecordColumn::Sv, true, 2.0),
+                ])),
             ),
             ("", Some(Typed::Conditions(Vec::new()))),
             ("mv > 3", None),

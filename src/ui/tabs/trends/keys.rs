@@ -3,7 +3,6 @@
 use super::{Asking, RATES, Trends, WINDOWS, overlay, plots::Plot, window::Direction};
 use crate::ui::tabs::prelude::*;
 
-/// A row of the tables here.
 pub(super) type Key = crate::ui::keys::Key<Trends>;
 
 pub(super) const CURVES: &[Key] = &[

@@ -21,7 +21,6 @@ pub(super) const KEYS: &[Key] = &[
 ];
 
 impl Trends {
-    /// Asks what lies over the view.
     pub(super) fn ask_overlay(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
         self.asking = Asking::Overlay;
         let typed = self.typed_overlay.as_deref().unwrap_or(OFFERED);

@@ -58,7 +58,6 @@ impl Trends {
         cx.def().trends.len() + usize::from(!self.behind().is_empty())
     }
 
-    /// The name of the shown group.
     pub(super) fn name(&self, cx: &ViewContext) -> String {
         match (cx.def().trends.get(self.group), self.behind()) {
             (Some(group), _) => group.name.clone(),

@@ -50,7 +50,6 @@ pub struct AuditLog {
     who: String,
     action: String,
     period: Option<Period>,
-    /// What the open window asks for.
     asking: Option<SearchField>,
 }
 

@@ -2,7 +2,6 @@
 
 use super::trace::Span;
 
-/// The look of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stroke {
     /// A value holds until the next: what the station knew.

@@ -18,7 +18,6 @@ const SUB_FUNCTIONS: [u16; 15] = [0, 2, 11, 12, 13, 14, 15, 16, 17, 18, 1, 3, 4,
 /// Read device identification codes of 43/14.
 const READ_CODES: [u8; 4] = [1, 2, 3, 4];
 
-/// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Address in the table of the function.

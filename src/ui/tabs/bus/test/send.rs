@@ -120,7 +120,7 @@ impl Send {
 }
 
 impl Ready {
-    fn rows(&self, cx: &ViewContext, line: LineId, bare: bool, width: u16) -> Vec<Row> {
+    fn rows(&self, cx: &ViewContext, line: LineId, bare: bool, width: u16) -> Vec<Spans> {
         let theme = cx.theme;
         let added = match (bare, self.added.is_empty()) {
             (true, _) => t!("as typed, nothing added").to_owned(),

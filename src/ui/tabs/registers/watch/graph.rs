@@ -131,7 +131,6 @@ impl WatchList {
         self.graph.as_ref().is_some_and(|graph| graph.log.is_some())
     }
 
-    /// Back to the registers.
     pub fn close_graph(&mut self) -> bool {
         !self.is_shown_log() && self.graph.take().is_some()
     }
