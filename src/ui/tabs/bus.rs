@@ -126,10 +126,10 @@ impl TabView for Bus {
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        match self.page(cx) {
-            Page::Registers => self.registers.copied(&below(cx)),
-            _ => self.list(cx).map_or(Vec::new(), |list| list.copied(cx)),
+        if self.page(cx) == Page::Registers {
+            return self.registers.copied(&below(cx));
         }
+        self.list(cx).map_or(Vec::new(), |list| list.copied(cx))
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {

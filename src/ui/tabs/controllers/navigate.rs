@@ -31,13 +31,14 @@ impl Controllers {
 
     /// Lays the marked runs, or those of the procedures, over each other, or goes back to their list.
     pub(super) fn swap_overlay(&mut self, cx: &ViewContext) {
-        match self.page() {
-            Page::Overlay => {
-                TabView::back(self, cx);
-                return;
-            }
-            Page::Procedures => self.runs.overlay = self.procedures.overlay(cx),
-            _ => self.runs.lay_over(cx),
+        if *self.page() == Page::Overlay {
+            TabView::back(self, cx);
+            return;
+        }
+        if *self.page() == Page::Procedures {
+            self.runs.overlay = self.procedures.overlay(cx);
+        } else {
+            self.runs.lay_over(cx);
         }
         self.pages.extend(self.runs.overlay.is_some().then_some(Page::Overlay));
     }

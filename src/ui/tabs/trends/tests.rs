@@ -7,6 +7,7 @@ mod overlay;
 mod pens;
 mod picture;
 mod queries;
+mod values;
 mod window;
 
 use queries::kinds;
@@ -241,22 +242,6 @@ fn the_list_of_all_values() {
     let footer = screen.lines().last().unwrap_or_default();
     assert!(footer.contains("⏎ curve") && !footer.contains("zoom"), "{footer}");
     insta::assert_snapshot!(screen);
-}
-
-#[test]
-fn the_list_of_all_values_is_filtered_while_it_is_typed() {
-    let mut stand = Stand::new(Theme::FULL, 80, 24);
-    stand.press("/lt-1");
-    stand.answer();
-    let shown = stand.screen();
-    assert!(shown.contains("PLC-1.LT-1") && !shown.contains("TIC-1.SV"), "{shown}");
-    stand.press("⎋");
-    assert!(stand.screen().contains("TIC-1.SV"), "Esc: as it was before");
-    stand.press("/lt-1⏎");
-    for (keys, expect) in [("", "1–1 of 1"), ("⎋", "All values"), ("⎋", "window 10 min")] {
-        stand.press(keys);
-        assert!(stand.screen().contains(expect), "{expect}: {}", stand.screen());
-    }
 }
 
 #[test]
