@@ -117,7 +117,6 @@ fn tab_bar(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     }
 }
 
-/// The headings of the tabs with their columns.
 fn headings(model: &Model, cx: &ViewContext, columns: u16) -> Vec<(u16, Tab, String)> {
     let name = |tab: Tab| {
         let count = if tab == Tab::Alarms { cx.snapshot.alarms.len() } else { 0 };

@@ -40,7 +40,7 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
             }
             UiAction::ShowOnTrends(tag, span) => {
                 if model.replay.shown().is_some() && span.0 == span.1 {
-                    effects.push(model.replay.go_to(span.0));
+                    effects.extend(replay(model, |replay, present| replay.go_to(span.0, present)));
                 }
                 with_tabs(model, |tabs, cx| {
                     tabs.trends.show(cx, tag, span);
@@ -48,9 +48,9 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
                 });
                 effects.extend(show(model, Tab::Trends));
             }
-            UiAction::Replay(at) => effects.push(model.replay.go_to(at)),
-            UiAction::EventPage(at) => effects.push(model.replay.open_page(at)),
-            UiAction::ReplayStep(by) => effects.extend(model.replay.step(by, model.present_cx().now)),
+            UiAction::Replay(at) => effects.extend(replay(model, |replay, present| replay.go_to(at, present))),
+            UiAction::EventPage(at) => effects.extend(replay(model, |replay, present| replay.open_page(at, present))),
+            UiAction::ReplayStep(by) => effects.extend(replay(model, |replay, present| replay.step(by, present))),
             UiAction::Command(kind) => effects.extend(model.send_command(kind.into(), None)),
             UiAction::SendCommand(command, credentials) => effects.extend(model.send_command(command, credentials)),
             UiAction::SessionRequest(tab, request) => {
@@ -76,6 +76,11 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
         }
     }
     effects
+}
+
+fn replay(model: &mut Model, change: impl FnOnce(&mut Replay, &ViewContext) -> Vec<UiAction>) -> Vec<Effect> {
+    let asked = with_replay(model, change);
+    perform(model, asked)
 }
 
 /// Keeps an instant under a name, in order of time, or forgets it.

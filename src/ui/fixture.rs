@@ -36,19 +36,13 @@ pub fn now() -> Timestamp {
 /// A plant and its state, to be changed by a test before it becomes a snapshot.
 #[derive(Debug, Clone)]
 pub struct Fixture {
-    /// The plant.
     pub def: PlantDef,
-    /// Samples by tag.
     pub samples: Vec<Sample>,
-    /// Alarms that are shown.
     pub alarms: Vec<ActiveAlarm>,
-    /// Alarms that are suppressed.
     pub suppressed: Vec<SuppressedAlarm>,
     /// The figures of the alarm system.
     pub alarm_metrics: AlarmMetrics,
-    /// The line.
     pub line: LineStatus,
-    /// The devices.
     pub devices: Vec<DeviceStatus>,
     /// The last request for each tag.
     pub source_frames: Vec<Option<Arc<Exchange>>>,
@@ -171,7 +165,6 @@ impl Fixture {
         plant
     }
 
-    /// The id of a tag of the fixture.
     pub fn tag(&self, name: &str) -> TagId {
         self.def.tag_named(name).unwrap_or_else(|| panic!("the fixture has no tag {name}"))
     }
@@ -180,7 +173,6 @@ impl Fixture {
         let tag = self.tag(name);
         self.samples[tag.index()] = Sample::good(value, now() - SignedDuration::from_millis(400));
     }
-    /// The snapshot.
     pub fn snapshot(&self) -> Arc<Snapshot> {
         let decimals = self.def.tags.iter().map(|tag| match tag.decimals {
             Decimals::Fixed(n) => n,

@@ -18,7 +18,6 @@ use crate::{
     t,
 };
 
-/// A key of the whole terminal.
 #[derive(Debug, Clone, Copy)]
 pub struct GlobalKey {
     chord: Chord,
@@ -38,7 +37,6 @@ enum Does {
 /// Where a key of the terminal is heard; each of these includes the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Reach {
-    /// On the tabs.
     Tabs,
     /// In windows that only show something.
     Looking,
@@ -46,7 +44,6 @@ pub enum Reach {
     Small,
     /// Where a form of the login page takes every letter.
     Typed,
-    /// In every window.
     Windows,
 }
 
@@ -61,7 +58,6 @@ enum Rule {
 }
 
 impl GlobalKey {
-    /// A key of the tabs.
     pub const fn new(
         chord: Chord,
         label: &'static str,
@@ -81,7 +77,6 @@ impl GlobalKey {
         GlobalKey { rule: Rule::Unlocked, ..self }
     }
 
-    /// What is pressed.
     pub fn chord(self) -> Chord {
         self.chord
     }
@@ -102,7 +97,6 @@ impl GlobalKey {
         Hint::of(self.chord, self.label, self.help)
     }
 
-    /// Does what it does.
     pub fn press(self, model: &mut Model) -> Vec<UiAction> {
         match (self.rule, self.does) {
             (Rule::OfPresent, _) if model.replay.shown().is_some() => {
@@ -135,7 +129,6 @@ pub const PALETTE: Chord = char(':');
 /// The same while something is typed.
 pub const PALETTE_TOO: Chord = ctrl('p');
 
-/// The other keys of every tab.
 const KEYS: &[GlobalKey] = &[
     GlobalKey::new(code(KeyCode::Tab), "", "next tab", |model| step(model, 1)),
     GlobalKey::new(code(KeyCode::BackTab), "", "previous tab", |model| step(model, -1)),
@@ -261,7 +254,7 @@ fn on_past(model: &mut Model, page: bool) -> Vec<UiAction> {
         return Vec::new();
     }
     if page && model.replay.shown().is_some() {
-        return with_replay(model, Replay::toggle_page).into_iter().map(UiAction::Do).collect();
+        return with_replay(model, Replay::toggle_page);
     }
     let (cx, tab) = (model.cx(), model.tabs.shown());
     match tab.moment(&cx).filter(|_| page) {

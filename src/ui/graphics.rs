@@ -79,7 +79,6 @@ pub struct Picture {
 }
 
 impl NoPicture {
-    /// The reason in one line.
     pub fn words(self) -> &'static str {
         match self {
             NoPicture::Off => t!("Pictures are off in the settings (F2)"),

@@ -115,14 +115,12 @@ enum Part<P: 'static> {
 
 /// Keys that are no rows of a table: of a form that is typed into, of a page with a state of its own, of the plant file.
 pub struct Below<P> {
-    /// For footer and help.
     pub hints: fn(&P, &ViewContext) -> Vec<Hint>,
     /// `None` where it is none of them.
     pub press: fn(&mut P, &ViewContext, KeyEvent) -> Option<Vec<UiAction>>,
 }
 
 impl<P> Keys<P> {
-    /// Those of these tables.
     pub fn of(tables: &[&'static [Key<P>]]) -> Keys<P> {
         Keys(tables.iter().copied().map(Part::Rows).collect())
     }
@@ -130,7 +128,6 @@ impl<P> Keys<P> {
     pub fn below(below: &'static Below<P>) -> Keys<P> {
         Keys(vec![Part::Below(below)])
     }
-    /// These and others.
     pub fn and(mut self, others: Keys<P>) -> Keys<P> {
         self.0.extend(others.0);
         self
@@ -176,7 +173,6 @@ impl<P> Keys<P> {
         None
     }
 
-    /// Is this one of them?
     pub fn has(&self, chord: Chord) -> bool {
         self.rows().any(|key| key.chord == chord)
     }
@@ -195,13 +191,10 @@ impl<P> Keys<P> {
 /// What is pressed: a key, alone or with Ctrl.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Chord {
-    /// The key.
     pub code: KeyCode,
-    /// With Ctrl.
     pub ctrl: bool,
 }
 
-/// The chords of each page of a tab.
 #[cfg(test)]
 pub type PageChords = Vec<(&'static str, Vec<Chord>)>;
 
@@ -251,7 +244,6 @@ impl Hint {
 pub const fn char(c: char) -> Chord {
     Chord { code: KeyCode::Char(c), ctrl: false }
 }
-/// Ctrl with a letter.
 pub const fn ctrl(c: char) -> Chord {
     Chord { code: KeyCode::Char(c), ctrl: true }
 }
@@ -261,7 +253,6 @@ pub const fn code(code: KeyCode) -> Chord {
 }
 
 impl Chord {
-    /// As it is pressed.
     pub fn event(self) -> KeyEvent {
         KeyEvent::new(self.code, if self.ctrl { KeyModifiers::CONTROL } else { KeyModifiers::NONE })
     }
@@ -271,7 +262,6 @@ impl Chord {
             && event.modifiers.contains(KeyModifiers::CONTROL) == self.ctrl
             && !event.modifiers.contains(KeyModifiers::ALT)
     }
-    /// Its name on screen.
     pub fn name(self) -> String {
         let name = match self.code {
             KeyCode::Char(' ') => "space".to_owned(),

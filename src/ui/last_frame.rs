@@ -47,9 +47,7 @@ impl Rows {
 /// What a frame showed, as far as a key may mean it that is pressed before the next one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LastFrame {
-    /// The tab.
     tab: Tab,
-    /// Its list.
     rows: Rows,
     /// The alarm that `a` was for: which, and when it was annunciated.
     alarm: Option<(AlarmId, Timestamp)>,
@@ -60,7 +58,6 @@ pub struct LastFrame {
 }
 
 impl Model {
-    /// A frame was drawn.
     pub(super) fn note_drawn(&mut self) {
         self.last_frame = Some(self.as_drawn());
     }

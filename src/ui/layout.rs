@@ -29,7 +29,6 @@ const LEAST: [(Size, (u16, u16)); 5] = [
 ];
 
 impl Size {
-    /// The size of this screen.
     pub fn of(screen: Rect) -> Size {
         let fits = |(_, (columns, rows)): &&(Size, (u16, u16))| *columns <= screen.width && *rows <= screen.height;
         LEAST.iter().find(fits).map_or(Size::Tiny, |(size, _)| *size)
@@ -61,11 +60,9 @@ pub struct Layout {
     pub body: Rect,
     /// Outcome of the last command.
     pub status: Rect,
-    /// Keys.
     pub footer: Rect,
 }
 
-/// Cuts the screen into its parts.
 pub fn layout(screen: Rect) -> Layout {
     let row = |y: u16| Rect { y: screen.y.saturating_add(y), height: 1, ..screen }.intersection(screen);
     let none = Rect { width: 0, height: 0, ..screen };

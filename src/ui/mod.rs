@@ -365,7 +365,7 @@ fn on_tick(model: &mut Model, silent: Duration) -> Vec<UiAction> {
     let rings = model.preferences.bell == Bell::Repeated
         && bell::rings_again(&model.snapshot, phase.wrapping_sub(model.rang_at));
     let bell = rings.then(|| ring(model));
-    let played = with_replay(model, Replay::on_tick).into_iter().map(UiAction::Do).collect::<Vec<_>>();
+    let played = with_replay(model, Replay::on_tick);
     bell.into_iter().chain(played).chain(with_tabs(model, |tabs, cx| tabs.on_tick(cx))).collect()
 }
 
@@ -382,6 +382,5 @@ fn on_replayed(model: &mut Model, number: u32, answer: Result<Answer, HistoryErr
         visited.note(tabs.shown, home);
         tabs.shown = home;
     }
-    let asked = asked.into_iter().map(UiAction::Do);
-    asked.chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
+    asked.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect()
 }

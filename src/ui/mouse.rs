@@ -8,7 +8,6 @@ use ratatui::{Terminal, backend::TestBackend, layout::Position, style::Modifier}
 
 use super::{Model, UiAction, chrome, context::with_tabs, dispatch::on_key, keys, last_frame, layout};
 
-/// What the mouse did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pointer {
     /// Its left button went down.

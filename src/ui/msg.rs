@@ -245,8 +245,8 @@ impl UiAction {
         }
     }
 
-    /// Queries the history on behalf of a tab.
-    pub fn query(tab: Tab, number: u32, query: Query) -> UiAction {
-        UiAction::Do(Effect::Query(QueryId { tab: Some(tab), number }, query))
+    /// Queries the history on behalf of a tab; `None` is the replay.
+    pub fn query(tab: impl Into<Option<Tab>>, number: u32, query: Query) -> UiAction {
+        UiAction::Do(Effect::Query(QueryId { tab: tab.into(), number }, query))
     }
 }

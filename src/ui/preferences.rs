@@ -112,10 +112,8 @@ impl Bookmark {
     }
 }
 
-/// What a user wants kept.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kept {
-    /// Looks and sounds.
     Preferences(Preferences),
     /// All bookmarks.
     Bookmarks(Vec<Bookmark>),
@@ -232,7 +230,6 @@ impl PreferencesFile {
         file
     }
 
-    /// Its text.
     pub fn text(&self) -> String {
         let users: toml::Table = self.users.iter().map(|(user, chosen)| (user.clone(), section(chosen))).collect();
         let mut body = toml::Table::new();

@@ -12,7 +12,7 @@ use std::{collections::VecDeque, sync::Arc};
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{Effect, QueryId, ViewContext};
+use super::{UiAction, ViewContext};
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::{
@@ -34,7 +34,6 @@ const SPEEDS: [i32; 5] = [0, 1, 10, 60, 600];
 /// Snapshots that are fetched ahead while playing.
 const PREFETCH_MAX: usize = 3;
 
-/// A direction in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
     /// Towards the past.
@@ -46,26 +45,19 @@ pub enum Direction {
 /// A past instant of the plant.
 #[derive(Debug)]
 pub struct Shown {
-    /// The instant.
     pub at: Timestamp,
     /// The plant at it.
     pub snapshot: Arc<Snapshot>,
 }
 
-/// What happened at an instant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
-    /// An alarm event.
     Alarm(AlarmRecord),
-    /// An action of an operator.
     Action(ActionRecord),
     /// A batch began, or it ended.
     Batch {
-        /// When.
         at: Timestamp,
-        /// Its name and number.
         label: String,
-        /// It ended.
         ended: bool,
     },
     /// A value was stored.
@@ -73,7 +65,6 @@ pub enum Event {
 }
 
 impl Event {
-    /// When.
     pub fn at(&self) -> Timestamp {
         match self {
             Event::Alarm(record) => record.at,
@@ -94,7 +85,6 @@ pub struct Replay {
     search: Option<Search>,
     /// The query for the time of a stored value.
     sample: Option<u32>,
-    /// The event that was gone to.
     event: Option<Event>,
     /// Place in [`SPEEDS`].
     speed: usize,
@@ -106,8 +96,6 @@ pub struct Replay {
     page: Option<EventPage>,
     /// Why the last query led nowhere.
     trouble: Option<String>,
-    /// Queries asked so far.
-    asked: u32,
 }
 
 impl Replay {
@@ -132,13 +120,12 @@ impl Replay {
         self.trouble.clone().or_else(|| waits.then(|| t!("reading the history …").to_owned()))
     }
 
-    /// Does it wait for this answer?
-    pub fn awaits(&self, number: u32) -> bool {
+    pub fn awaits(&mut self, number: u32) -> bool {
         self.requested.is_some_and(|(requested, _)| requested == number)
             || self.sample == Some(number)
             || self.search.as_ref().is_some_and(|search| search.queries.contains(&number))
             || self.prefetched.iter().any(|(_, query, shown)| *query == number && shown.is_none())
-            || self.page.as_ref().is_some_and(|page| page.awaits(number))
+            || self.page.as_mut().is_some_and(|page| page.awaits(number))
     }
 
     /// The event page, if it is shown.
@@ -146,26 +133,24 @@ impl Replay {
         self.page.as_ref().filter(|_| self.shown.is_some())
     }
 
-    /// The same, to scroll it.
     pub fn page_mut(&mut self) -> Option<&mut EventPage> {
         self.page.as_mut().filter(|_| self.shown.is_some())
     }
 
     /// Asks for an instant, which is shown on the event page.
-    pub fn open_page(&mut self, at: Timestamp) -> Effect {
+    pub fn open_page(&mut self, at: Timestamp, present: &ViewContext) -> Vec<UiAction> {
         self.page.get_or_insert_default();
-        self.go_to(at)
+        self.go_to(at, present)
     }
 
     /// The event page instead of the tab, or the tab again; does nothing in the present.
-    pub fn toggle_page(&mut self, present: &ViewContext) -> Vec<Effect> {
+    pub fn toggle_page(&mut self, present: &ViewContext) -> Vec<UiAction> {
         if self.page.take().is_none() && self.shown.is_some() {
             self.page = Some(EventPage::default());
         }
         self.ask_page(present)
     }
 
-    /// What is drawn of the instant.
     fn drawn(&self) -> Vec<Pen> {
         let of_page = self.page().map(|page| page.pens().to_vec());
         of_page.or_else(|| self.shown().map(|shown| page::pens(&shown.snapshot, shown.at))).unwrap_or_default()
@@ -177,43 +162,35 @@ impl Replay {
     }
 
     /// Asks for what the event page shows around the instant, if it lacks that.
-    fn ask_page(&mut self, present: &ViewContext) -> Vec<Effect> {
+    fn ask_page(&mut self, present: &ViewContext) -> Vec<UiAction> {
         let (Some(page), Some(shown)) = (&mut self.page, &self.shown) else { return Vec::new() };
-        let asked = &mut self.asked;
-        let ask = |query| {
-            *asked = asked.wrapping_add(1);
-            (*asked, Effect::Query(QueryId { tab: None, number: *asked }, query))
-        };
-        page.follow(shown, present, ask)
+        page.follow(shown, present)
     }
 
-    /// Back to the present.
     pub fn leave(&mut self) {
-        *self = Replay { asked: self.asked, ..Replay::default() };
+        *self = Replay::default();
     }
 
     /// Asks for an instant, which is shown when the answer comes; what is played stops.
-    pub fn go_to(&mut self, at: Timestamp) -> Effect {
+    pub fn go_to(&mut self, at: Timestamp, present: &ViewContext) -> Vec<UiAction> {
         self.pause();
         (self.search, self.sample, self.trouble, self.next) = (None, None, None, None);
-        let effect = self.ask(Query::Past { at });
-        self.requested = Some((self.asked, at));
-        effect
+        let (number, action) = ask(present, Query::Past { at });
+        self.requested = Some((number, at));
+        vec![action]
     }
 
     /// Steps from where it is, or from where it goes: while an instant is on its way it is waited for, so that fast keys
     /// neither outrun the history nor get lost.
-    pub fn step(&mut self, by: SignedDuration, present: Timestamp) -> Option<Effect> {
+    pub fn step(&mut self, by: SignedDuration, present: &ViewContext) -> Vec<UiAction> {
         let on_way = self.requested.map(|(_, at)| self.next.unwrap_or(at));
-        let from = on_way.or(self.shown().map(|shown| shown.at))?;
-        let to = from.checked_add(by).unwrap_or(from).min(present);
-        match on_way {
-            Some(_) => {
-                self.next = Some(to);
-                None
-            }
-            None => Some(self.go_to(to)),
+        let Some(from) = on_way.or(self.shown().map(|shown| shown.at)) else { return Vec::new() };
+        let to = from.checked_add(by).unwrap_or(from).min(present.now);
+        if on_way.is_none() {
+            return self.go_to(to, present);
         }
+        self.next = Some(to);
+        Vec::new()
     }
 
     /// A key was pressed: why the last query led nowhere has been read.
@@ -228,11 +205,6 @@ impl Replay {
         }
     }
 
-    fn ask(&mut self, query: Query) -> Effect {
-        self.asked = self.asked.wrapping_add(1);
-        Effect::Query(QueryId { tab: None, number: self.asked }, query)
-    }
-
     fn pause(&mut self) {
         self.speed = 0;
         self.forget_prefetched();
@@ -244,7 +216,7 @@ impl Replay {
     }
 
     /// Plays, faster with each call, then pauses.
-    fn play(&mut self, present: Timestamp) -> Vec<Effect> {
+    fn play(&mut self, present: &ViewContext) -> Vec<UiAction> {
         self.speed = (self.speed + 1) % SPEEDS.len();
         (self.requested, self.search, self.sample, self.trouble) = (None, None, None, None);
         self.forget_prefetched();
@@ -252,32 +224,32 @@ impl Replay {
     }
 
     /// Half a second has passed: the next instant is shown if it has come. At the present the playing stops.
-    pub fn on_tick(&mut self, cx: &ViewContext) -> Vec<Effect> {
-        let present = cx.present();
+    pub fn on_tick(&mut self, present: &ViewContext) -> Vec<UiAction> {
         if let Some((.., shown @ Some(_))) = self.prefetched.front_mut() {
             self.shown = shown.take();
             self.prefetched.pop_front();
         }
-        let effects = self.prefetch(present);
+        let asked = self.prefetch(present);
         if self.prefetched.is_empty() {
             self.speed = 0;
         }
-        effects.into_iter().chain(self.ask_page(cx)).collect()
+        asked.into_iter().chain(self.ask_page(present)).collect()
     }
 
-    fn prefetch(&mut self, present: Timestamp) -> Vec<Effect> {
+    fn prefetch(&mut self, present: &ViewContext) -> Vec<UiAction> {
         let step = SignedDuration::from_millis(500) * self.speed();
-        let mut effects = Vec::new();
+        let mut asked = Vec::new();
         while step > SignedDuration::ZERO && self.prefetched.len() < PREFETCH_MAX && !self.ends {
             let last = self.prefetched.back().map(|(at, ..)| *at).or_else(|| self.shown().map(|shown| shown.at));
-            let Some(last) = last.filter(|last| *last < present) else { break };
+            let Some(last) = last.filter(|last| *last < present.now) else { break };
             // The last step is as long as there is time: a fast pace would end minutes before the present.
-            let at = last.checked_add(step).unwrap_or(present).min(present);
-            self.ends = at == present;
-            effects.push(self.ask(Query::Past { at }));
-            self.prefetched.push_back((at, self.asked, None));
+            let at = last.checked_add(step).unwrap_or(present.now).min(present.now);
+            self.ends = at == present.now;
+            let (number, action) = ask(present, Query::Past { at });
+            self.prefetched.push_back((at, number, None));
+            asked.push(action);
         }
-        effects
+        asked
     }
 
     /// An answer has come; `present` is the plant now.
@@ -286,12 +258,14 @@ impl Replay {
         number: u32,
         answer: Result<Answer, HistoryError>,
         present: &ViewContext,
-    ) -> Vec<Effect> {
+    ) -> Vec<UiAction> {
         if !self.awaits(number) {
             return Vec::new();
         }
-        if let Some(page) = self.page.as_mut().filter(|page| page.awaits(number)) {
-            page.on_answer(number, answer);
+        if let Some(page) = &mut self.page
+            && page.awaits(number)
+        {
+            page.on_answer(present, number, &answer);
             return Vec::new();
         }
         match answer {
@@ -307,23 +281,29 @@ impl Replay {
                 self.page.take_if(|_| self.shown.is_none());
             }
             Ok(Answer::Past(past)) => return self.on_past(number, &past, present),
-            Ok(answer) => return self.on_found(number, answer),
+            Ok(answer) => return self.on_found(number, answer, present),
         }
         Vec::new()
     }
 
-    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) -> Vec<Effect> {
+    fn on_past(&mut self, number: u32, past: &Past, present: &ViewContext) -> Vec<UiAction> {
         let mut snapshot = past.snapshot(present.snapshot.def.clone());
         // Waiting and refreshing go by the time of the present.
         (snapshot.speed, snapshot.stepped) = (present.snapshot.speed, present.snapshot.stepped);
         let shown = Shown { at: past.at, snapshot: Arc::new(snapshot) };
         if self.requested.is_some_and(|(requested, _)| requested == number) {
             (self.requested, self.shown) = (None, Some(shown));
-            let next = self.next.take().map(|at| self.go_to(at));
-            return self.ask_page(present).into_iter().chain(next).collect();
+            let next = self.next.take().map(|at| self.go_to(at, present));
+            return self.ask_page(present).into_iter().chain(next.into_iter().flatten()).collect();
         } else if let Some((.., place)) = self.prefetched.iter_mut().find(|(_, query, _)| *query == number) {
             *place = Some(shown);
         }
         Vec::new()
     }
+}
+
+/// Asks the history, and under which number.
+fn ask(present: &ViewContext, query: Query) -> (u32, UiAction) {
+    let number = present.numbers.next();
+    (number, UiAction::query(None, number, query))
 }

@@ -16,7 +16,6 @@ pub fn title(role: Role) -> &'static str {
     }
 }
 
-/// What a role may, in words.
 pub fn words(role: Role) -> &'static str {
     match role {
         Role::Viewer => t!("view everything: process, curves, alarms, reports"),

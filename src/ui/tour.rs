@@ -24,7 +24,6 @@ use crate::{
 /// Leaves a task undone.
 pub(super) const SKIP: keys::Chord = keys::ctrl('n');
 
-/// A task of the tour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Task {
     Look,
@@ -38,11 +37,9 @@ enum Task {
 }
 
 impl Task {
-    /// The tasks in their order.
     const ALL: [Task; 8] =
         [Task::Look, Task::Set, Task::Follow, Task::Acknowledge, Task::Guidance, Task::Why, Task::Past, Task::Report];
 
-    /// What to do, with the keys.
     fn message(self) -> &'static str {
         match self {
             Task::Look => "Look at a controller: select TIC-1 with the arrow keys, ⏎",
@@ -84,7 +81,6 @@ impl Task {
         }
     }
 
-    /// Does it need a silent device?
     fn needs_silence(self) -> bool {
         matches!(self, Task::Acknowledge | Task::Guidance | Task::Why)
     }
@@ -124,11 +120,9 @@ pub(super) fn follow(model: &mut Model, event: TourEvent) -> Vec<UiAction> {
 /// What the tour takes notice of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TourEvent {
-    /// A key was pressed.
     Key,
     /// The operator leaves the task out.
     Skip,
-    /// A file was saved.
     Saved,
     /// Anything else.
     Other,

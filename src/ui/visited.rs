@@ -2,7 +2,6 @@
 
 use super::tabs::Tab;
 
-/// Tabs that are remembered.
 const TABS_MAX: usize = 32;
 
 /// What was shown before and behind the shown tab.

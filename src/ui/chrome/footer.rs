@@ -12,7 +12,6 @@ use super::super::{
 use super::past;
 use crate::t;
 
-/// What the footer shows.
 pub(super) struct Footer {
     /// Keys, each with its column.
     keys: Vec<(u16, Hint)>,
@@ -79,7 +78,6 @@ impl Footer {
         Footer { keys, refused }
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         for (x, hint) in &self.keys {
             let x = canvas.text(*x, 0, &hint.key, cx.theme.strong());

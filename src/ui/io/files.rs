@@ -58,7 +58,6 @@ impl Loop {
     }
 }
 
-/// A file of the user.
 pub(super) fn load(path: &Path) -> io::Result<Vec<u8>> {
     regular::read(path, LOAD_MAX)
 }

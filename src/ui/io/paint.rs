@@ -38,7 +38,6 @@ impl Painter {
         self.painted = None;
     }
 
-    /// Begins to encode a picture.
     fn encode(&mut self, graphics: Graphics, picture: Picture) {
         self.encoding = Some(spawn_blocking(move || graphics.encode(&picture)));
     }

@@ -28,7 +28,6 @@ pub(super) fn question() -> Vec<u8> {
     [kitty::QUESTION, b"\x1b[?1;1;0S\x1b[?2;1;0S\x1b[16t\x1b[c"].concat()
 }
 
-/// What came back.
 #[derive(Debug, Default)]
 pub(super) struct Answers {
     kitty: bool,

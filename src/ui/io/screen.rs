@@ -104,7 +104,6 @@ impl Screen {
         self.renew()
     }
 
-    /// Rings the bell of the terminal.
     pub fn ring(&mut self) -> io::Result<()> {
         let wire = self.terminal.backend_mut();
         wire.bytes.push(0x07);

@@ -6,12 +6,11 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{
     Modal, Next,
-    sheet::{Row, Sheet},
+    sheet::{Fact, Sheet},
     window,
 };
 use crate::{plant::record::ActionRecord, ui::ViewContext};
 
-/// The dialog.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AuditEntryDialog(pub ActionRecord);
 
@@ -24,7 +23,7 @@ impl AuditEntryDialog {
     }
 
     /// Name and words of every field that has a value.
-    fn rows(&self, cx: &ViewContext) -> Vec<Row> {
+    fn rows(&self, cx: &ViewContext) -> Vec<Fact> {
         let entry = &self.0;
         let notes = |words: &Option<std::sync::Arc<str>>| words.as_deref().unwrap_or_default().to_owned();
         let at = entry.at.to_zoned(cx.def().time_zone.clone()).strftime("%Y-%m-%d %H:%M:%S %:z").to_string();
@@ -46,7 +45,7 @@ impl AuditEntryDialog {
             (t!("hash"), chain_hash.1),
         ];
         let lines = lines.into_iter().filter(|(_, words)| !words.is_empty());
-        lines.map(|(label, words)| Row::new(label, words, cx.theme.normal())).collect()
+        lines.map(|(label, words)| Fact::new(label, words, cx.theme.normal())).collect()
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {

@@ -20,20 +20,19 @@ use crate::{
     },
 };
 
-/// Rows of a page.
 const PAGE_ROWS: usize = 8;
 
 /// A list to pick from; picking leads to a confirm window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
     title: String,
-    rows: Vec<Row>,
+    rows: Vec<ChoiceRow>,
     selected: usize,
 }
 
 /// A row: its text and the window that it leads to.
 #[derive(Debug, Clone, PartialEq)]
-struct Row {
+struct ChoiceRow {
     text: String,
     tag: TagId,
     next: Confirm,
@@ -49,7 +48,7 @@ impl Choice {
         let choices = || def.enum_labels.iter().filter(|(number, _)| may(Exact::whole(*number)));
         let rows = choices().map(|(number, label)| {
             let next = Confirm::write(cx, tag, Exact::whole(*number));
-            Row { text: format!("{number}  {label}"), tag, next }
+            ChoiceRow { text: format!("{number}  {label}"), tag, next }
         });
         let now = cx.snapshot.sample(tag).exact();
         let selected = choices().position(|(number, _)| Some(Exact::whole(*number)) == now).unwrap_or(0);
@@ -61,9 +60,9 @@ impl Choice {
         let def = cx.def().device(device);
         let rows = def.actions.iter().map(|action| {
             let next = Confirm::action(cx, action.tag, action.value, &action.name, &action.confirm);
-            Row { text: format!("{}  {}", action.name, cx.def().tag(action.tag).label), tag: action.tag, next }
+            ChoiceRow { text: format!("{}  {}", action.name, cx.def().tag(action.tag).label), tag: action.tag, next }
         });
-        let rows: Vec<Row> = rows.collect();
+        let rows: Vec<ChoiceRow> = rows.collect();
         (!rows.is_empty()).then(|| Choice { title: t!("actions of {name}", name = def.name), rows, selected: 0 })
     }
 

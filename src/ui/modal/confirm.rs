@@ -54,9 +54,7 @@ pub struct Confirm {
 /// What a confirmed window does.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ConfirmAction {
-    /// Leave the terminal.
     Quit,
-    /// Give a command.
     Command(CommandKind),
 }
 
@@ -86,7 +84,6 @@ impl Confirm {
         }
     }
 
-    /// Is it the confirmation to leave?
     pub fn is_quit(&self) -> bool {
         self.action == ConfirmAction::Quit
     }
@@ -143,7 +140,6 @@ impl Confirm {
         self
     }
 
-    /// What Enter does.
     pub fn verb(&self) -> &'static str {
         match &self.action {
             ConfirmAction::Quit => t!("quit"),
@@ -191,7 +187,6 @@ impl Confirm {
         if self.wants_y() { "y" } else { "⏎" }
     }
 
-    /// What Esc does.
     pub fn escape(&self) -> &'static str {
         if self.is_quit() { t!("stay") } else { t!("cancel") }
     }

@@ -37,7 +37,6 @@ const AMOUNT: usize = 1;
 const REASON: usize = 2;
 const AMOUNT_CHARS: usize = 64;
 
-/// The window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// Never empty.
@@ -67,7 +66,6 @@ impl Correction {
         CommandKind::CorrectCounter { tag: self.tag(), amount }
     }
 
-    /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
         let change = self.form.is_on_choice().then(|| Hint::in_window("←→", t!("change")));
         let (enter, select) = (Hint::in_window("⏎", t!("correct")), Hint::in_window("↑↓", t!("select")));

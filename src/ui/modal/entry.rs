@@ -41,9 +41,7 @@ fn needs_confirmation(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
 /// A number on its way into a tag.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// Which tag.
     pub tag: TagId,
-    /// What has been typed.
     pub line: Line,
     /// Why the last Enter was not taken.
     pub problem: Option<String>,
@@ -52,7 +50,6 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// An empty entry.
     pub fn new(cx: &ViewContext, tag: TagId) -> Entry {
         Entry { tag, line: Line::default(), problem: None, expected: ConfirmedValue::new(cx, tag) }
     }

@@ -8,7 +8,7 @@ use ratatui::{Frame, layout::Rect};
 use super::{
     Confirm, Modal, Next, Notice, Why,
     confirm::wire_text,
-    sheet::{Row, Sheet},
+    sheet::{Fact, Sheet},
     window,
 };
 use crate::{
@@ -157,7 +157,7 @@ impl Faceplate {
 }
 
 /// What is known about one tag.
-fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
+fn details(cx: &ViewContext, tag: TagId) -> Vec<Fact> {
     let (theme, def, sample) = (cx.theme, cx.def().tag(tag), cx.snapshot.sample(tag));
     let quality = match def.access {
         Access::Write => t!("none: write only").to_owned(),
@@ -221,7 +221,7 @@ fn details(cx: &ViewContext, tag: TagId) -> Vec<Row> {
     if !def.meaning.is_empty() {
         rows.push((t!("meaning"), def.meaning.clone(), theme.normal()));
     }
-    rows.into_iter().map(|(label, text, style)| Row::new(label, text, style)).collect()
+    rows.into_iter().map(|(label, text, style)| Fact::new(label, text, style)).collect()
 }
 
 /// What Enter writes for a tag: itself, or the command of an output that is only read.

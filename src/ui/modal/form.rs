@@ -23,7 +23,6 @@ use field::{Input, SECRET_CHARS};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Form {
     fields: Vec<Field>,
-    /// The selected one.
     at: usize,
     /// Passwords are readable, on request.
     shown: bool,
@@ -38,7 +37,6 @@ pub enum KeyOutcome {
     Taken,
     /// Enter: the form is submitted.
     Submitted,
-    /// Nothing.
     Ignored,
 }
 
@@ -47,7 +45,6 @@ pub enum KeyOutcome {
 pub struct Drawn {
     /// Its place in the form.
     pub field: usize,
-    /// Its row.
     pub y: u16,
     /// The column behind its value.
     pub end: u16,
@@ -66,7 +63,6 @@ impl Form {
         Form { fields, at, shown: false, submits: true }
     }
 
-    /// Rows of it.
     pub fn rows(&self) -> u16 {
         to_u16(self.fields.iter().filter(|field| !field.hidden).count())
     }
@@ -76,12 +72,10 @@ impl Form {
         self.fields.len()
     }
 
-    /// The place of the selected field.
     pub fn selected(&self) -> usize {
         self.at
     }
 
-    /// Selects a field.
     pub fn select(&mut self, n: usize) {
         self.at = n.min(self.fields.len().saturating_sub(1));
     }
@@ -146,7 +140,6 @@ impl Form {
         self.fields[n] = field;
     }
 
-    /// Replaces all fields from this place on.
     pub fn replace_from(&mut self, n: usize, fields: Vec<Field>) {
         self.fields.splice(n.., fields);
         self.select(self.at);
@@ -157,12 +150,10 @@ impl Form {
         self.fields[n].label = label;
     }
 
-    /// Is a field hidden?
     pub fn is_hidden(&self, n: usize) -> bool {
         self.fields[n].hidden
     }
 
-    /// Hides a field, or shows it.
     pub fn hide(&mut self, n: usize, hidden: bool) {
         self.fields[n].hidden = hidden;
     }
@@ -198,7 +189,6 @@ impl Form {
         self.shown = false;
     }
 
-    /// A key.
     pub fn on_key(&mut self, event: KeyEvent) -> KeyOutcome {
         let enter = keys::code(KeyCode::Enter).is(event);
         match event.code {
@@ -241,7 +231,6 @@ impl Form {
         }
     }
 
-    /// Columns that it wants.
     pub fn width(&self) -> u16 {
         self.labels() + 36
     }

@@ -5,7 +5,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{
     Faceplate, Modal, Next, Notice,
-    sheet::{Row, Sheet},
+    sheet::{Fact, Sheet},
     view_keys, window,
 };
 use crate::{
@@ -26,7 +26,6 @@ use crate::{
 /// Least columns of the names at the left.
 const LABELS_MIN: u16 = 9;
 
-/// The window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guidance {
     alarm: AlarmId,
@@ -43,7 +42,6 @@ impl Guidance {
         Guidance { alarm, faceplate, scroll: Scroll::default(), step: 0 }
     }
 
-    /// The keys of the moment.
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let faceplate = self.faceplate.is_some().then(|| Hint::in_window("⏎", t!("faceplate")));
         let ticks = self.tick(cx).is_some_and(|kind| rights::missing(cx, &kind).is_none());
@@ -112,7 +110,7 @@ impl Guidance {
         let selected = self.tick(cx).map(|_| first + self.step);
         let style = |n| if selected == Some(n) { cx.theme.strong() } else { cx.theme.normal() };
         let mark = |n| if selected == Some(n) { cx.theme.pick("▸ ", "> ") } else { "" };
-        let row = |(n, (label, text)): (usize, (_, String))| Row::new(label, format!("{}{text}", mark(n)), style(n));
+        let row = |(n, (label, text)): (usize, (_, String))| Fact::new(label, format!("{}{text}", mark(n)), style(n));
         let rows = rows.into_iter().enumerate().map(row).collect();
         Sheet::new(rows, columns(body), LABELS_MIN)
     }
@@ -131,7 +129,6 @@ impl Guidance {
     }
 }
 
-/// Columns of the window.
 fn columns(body: Rect) -> u16 {
     body.width.saturating_sub(8).clamp(LABELS_MIN + 1, 76)
 }

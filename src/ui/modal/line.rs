@@ -31,7 +31,6 @@ impl Default for Line {
 }
 
 impl Line {
-    /// Any text.
     pub fn new(text: &str) -> Line {
         Line::long(text, CHARS_MAX)
     }
@@ -44,7 +43,6 @@ impl Line {
     pub fn offered(text: &str) -> Line {
         Line { is_offered: !text.is_empty(), ..Line::new(text) }
     }
-    /// What has been entered.
     pub fn text(&self) -> String {
         self.text.iter().collect()
     }

@@ -28,9 +28,8 @@ use crate::{
         widgets::text::{fit, fit_words, wrap},
     },
 };
-use draft::{Draft, Row};
+use draft::{Draft, Setting};
 
-/// The form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LineSettings {
     line: LineId,
@@ -101,8 +100,8 @@ impl LineSettings {
     fn on_change(&mut self, event: KeyEvent) -> Result<(), String> {
         let is_choice = matches!(event.code, KeyCode::Left | KeyCode::Right | KeyCode::Char(' '));
         match self.draft.form.selected() {
-            n if is_choice && n == Row::Mode as usize => self.draft.on_mode(),
-            n if is_choice && n == Row::DataBits as usize && !self.draft.has_data_bits() => {
+            n if is_choice && n == Setting::Mode as usize => self.draft.on_mode(),
+            n if is_choice && n == Setting::DataBits as usize && !self.draft.has_data_bits() => {
                 return Err(t!("Modbus RTU always has 8 data bits; 7 are for ASCII").to_owned());
             }
             _ => {}
@@ -136,7 +135,7 @@ impl LineSettings {
         for Drawn { field, y, end } in form.view(cx, &mut canvas, new_at, 1..to_u16(1 + shown)) {
             let before = old.words(field);
             canvas.text(used_at, y, &fit(&before, new_at.saturating_sub(used_at + 2)), theme.dim());
-            canvas.text(end + 1, y, Row::unit(field), theme.dim());
+            canvas.text(end + 1, y, Setting::unit(field), theme.dim());
             if before != self.draft.words(field) {
                 canvas.text_right(canvas.width(), y, t!("◂ changed"), theme.strong());
             }

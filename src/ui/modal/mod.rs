@@ -52,16 +52,12 @@ use crate::plant::{
     number::{Number, to_u16},
 };
 
-/// A window.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Modal {
     /// All keys; the number is the first row shown.
     Help(usize),
-    /// Do it or not.
     Confirm(Confirm),
-    /// A number for a tag.
     Entry(Entry),
-    /// One of a few.
     Choice(Choice),
     /// Go to anything by its name.
     Palette(Box<Palette>),
@@ -69,7 +65,6 @@ pub enum Modal {
     Prompt(Prompt),
     /// An action with a reason or a note.
     Reason(Box<Reason>),
-    /// The correction of a counter.
     Correction(Box<Correction>),
     /// What there is to know about an item of the mimic.
     Faceplate(Faceplate),
@@ -77,15 +72,11 @@ pub enum Modal {
     Notice(Notice),
     /// What to do about an alarm.
     Guidance(Box<Guidance>),
-    /// Why a value is what it is.
     Why(Why),
-    /// How a line communicates.
     LineSettings(Box<LineSettings>),
     /// A frame, a block, a test of the bus tab.
     Bus(Box<bus::Window>),
-    /// A form about users.
     UserForm(Box<UserForm>),
-    /// One audit entry.
     AuditEntry(Box<AuditEntryDialog>),
     /// Theme, characters, pictures, motion, bell, mouse and language.
     TerminalSettings(TerminalSettings),
@@ -94,9 +85,7 @@ pub enum Modal {
 /// What a key did to a window.
 #[derive(Debug)]
 pub enum Next {
-    /// It stays.
     Stay(Modal),
-    /// It is gone.
     Close,
     /// It is gone, and this is to be done.
     Do(Vec<UiAction>),
@@ -119,7 +108,6 @@ impl Modal {
         }
     }
 
-    /// A key.
     pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Esc).is(event) {
             let back = match self {
@@ -243,7 +231,6 @@ impl Modal {
         }
     }
 
-    /// The keys of the moment.
     pub fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
         let mut hints = match self {
             Modal::Help(_) => vec![

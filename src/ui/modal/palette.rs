@@ -42,12 +42,9 @@ const EXACT: u32 = 1_000;
 /// Columns of the window, where there are as many.
 const WIDTH: u16 = 76;
 
-/// What a row leads to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Target {
-    /// A tab.
     Tab(Tab),
-    /// All devices at a glance.
     Overview,
     /// A device, on the controllers tab.
     Device(DeviceId),
@@ -55,13 +52,11 @@ pub enum Target {
     Procedure(ProcedureId),
     /// The faceplate of a tag.
     Tag(TagId),
-    /// The curve of a tag.
     Trend(TagId),
     /// What to do about an alarm.
     Alarm(AlarmId),
     /// What a key of the shown tab does.
     Key(Chord),
-    /// A past instant.
     Instant(Timestamp),
     /// One that was kept under a name.
     Bookmark(Timestamp),
@@ -81,9 +76,8 @@ impl Target {
     }
 }
 
-/// A row.
 #[derive(Debug, Clone, PartialEq)]
-struct Row {
+struct Found {
     target: Target,
     kind: &'static str,
     name: String,
@@ -94,8 +88,8 @@ struct Row {
     parts: (usize, std::ops::Range<usize>),
 }
 
-impl Row {
-    fn new(target: Target, kind: &'static str, name: &str, text: &str) -> Row {
+impl Found {
+    fn new(target: Target, kind: &'static str, name: &str, text: &str) -> Found {
         let mut words = searchable(name);
         let end = words.len();
         words.push(' ');
@@ -103,7 +97,7 @@ impl Row {
         let parts = (end, end + 1..words.len());
         words.push(' ');
         words.push_str(&searchable(kind));
-        Row { target, kind, name: name.to_owned(), text: text.to_owned(), words, parts }
+        Found { target, kind, name: name.to_owned(), text: text.to_owned(), words, parts }
     }
 
     fn name_words(&self) -> &str {
@@ -119,11 +113,11 @@ impl Row {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Palette {
     line: Line,
-    rows: Vec<Row>,
+    rows: Vec<Found>,
     /// Places of the rows that fit, the best first.
     found: Vec<usize>,
     /// The instant that was typed, before all of them.
-    instant: Option<Row>,
+    instant: Option<Found>,
     selected: usize,
 }
 
@@ -132,7 +126,7 @@ impl Palette {
     pub fn new(cx: &ViewContext, tab: &dyn TabView, bookmarks: &[Bookmark], recent: &[Target]) -> Palette {
         let mut rows = rows(cx, tab);
         rows.extend(bookmark_rows(cx, bookmarks));
-        let place = |row: &Row| recent.iter().position(|target| *target == row.target).unwrap_or(recent.len());
+        let place = |row: &Found| recent.iter().position(|target| *target == row.target).unwrap_or(recent.len());
         rows.sort_by_key(place);
         let mut palette = Palette { line: Line::default(), rows, found: Vec::new(), instant: None, selected: 0 };
         palette.find(cx);
@@ -176,7 +170,7 @@ impl Palette {
         let mut matcher = Matcher::new(Config::DEFAULT);
         let mut buffer = Vec::new();
         let mut fits = |text: &str| pattern.score(Utf32Str::new(text, &mut buffer), &mut matcher);
-        let mut score = |row: &Row| {
+        let mut score = |row: &Found| {
             let all = fits(&row.words)?;
             // What is called so stands before what only mentions it, above all as a whole word at the end of its name.
             let is_last =
@@ -192,7 +186,7 @@ impl Palette {
         self.found = found.into_iter().take(FOUND_MAX).map(|(.., place)| place).collect();
     }
 
-    fn listed(&self) -> Vec<&Row> {
+    fn listed(&self) -> Vec<&Found> {
         self.instant.iter().chain(self.found.iter().filter_map(|place| self.rows.get(*place))).collect()
     }
 
@@ -256,26 +250,27 @@ fn room(body: Rect) -> usize {
     usize::from(body.height.saturating_sub(5)).clamp(1, 16)
 }
 
-fn instant(cx: &ViewContext, text: &str) -> Option<Row> {
+fn instant(cx: &ViewContext, text: &str) -> Option<Found> {
     // A bench has no history, the smallest screen no row that says that a past is shown.
     let has_past = !cx.def().is_bench() && Size::Compact < cx.size;
     let at = (has_past && text.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
         .then(|| replay::instant(cx, text).ok())??;
-    Some(Row::new(Target::Instant(at), t!("time"), &replay::stamp(cx, at), t!("replay")))
+    Some(Found::new(Target::Instant(at), t!("time"), &replay::stamp(cx, at), t!("replay")))
 }
 
-fn bookmark_rows<'a>(cx: &'a ViewContext, bookmarks: &'a [Bookmark]) -> impl DoubleEndedIterator<Item = Row> + 'a {
-    let row =
-        |mark: &Bookmark| Row::new(Target::Bookmark(mark.at), t!("bookmark"), &mark.name, &replay::stamp(cx, mark.at));
+fn bookmark_rows<'a>(cx: &'a ViewContext, bookmarks: &'a [Bookmark]) -> impl DoubleEndedIterator<Item = Found> + 'a {
+    let row = |mark: &Bookmark| {
+        Found::new(Target::Bookmark(mark.at), t!("bookmark"), &mark.name, &replay::stamp(cx, mark.at))
+    };
     bookmarks.iter().map(row)
 }
 
-fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
+fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Found> {
     let def = cx.def();
     let tabs = Tab::offered(cx).into_iter();
-    let tabs = tabs.map(|tab| Row::new(Target::Tab(tab), t!("tab"), translate(tab.title()), translate(tab.help())));
+    let tabs = tabs.map(|tab| Found::new(Target::Tab(tab), t!("tab"), translate(tab.title()), translate(tab.help())));
     let alarm = |id: AlarmId, state: &str| {
-        Row::new(
+        Found::new(
             Target::Alarm(id),
             t!("alarm"),
             &subject(cx, id),
@@ -290,18 +285,19 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Row> {
     let global = global.map(GlobalKey::hint);
     let keys = tab.hints(cx).into_iter().chain(global).filter_map(|hint| {
         let help = if hint.help.is_empty() { &hint.label } else { &hint.help };
-        Some(Row::new(Target::Key(hint.chord?), t!("key"), &hint.key, help))
+        Some(Found::new(Target::Key(hint.chord?), t!("key"), &hint.key, help))
     });
     let devices = def.devices.iter().filter(|_| !def.is_bench());
-    let devices = devices.map(|device| Row::new(Target::Device(device.id), t!("device"), &device.name, &device.title));
-    let tags = def.tags.iter().map(|tag| Row::new(Target::Tag(tag.id), t!("tag"), &tag.name, &tag.label));
+    let devices =
+        devices.map(|device| Found::new(Target::Device(device.id), t!("device"), &device.name, &device.title));
+    let tags = def.tags.iter().map(|tag| Found::new(Target::Tag(tag.id), t!("tag"), &tag.name, &tag.label));
     let stored = def.tags.iter().filter(|tag| tag.is_stored());
-    let trends = stored.map(|tag| Row::new(Target::Trend(tag.id), t!("trend"), &tag.name, &tag.label));
-    let overview = Row::new(Target::Overview, t!("page"), t!("overview"), t!("all devices at a glance"));
+    let trends = stored.map(|tag| Found::new(Target::Trend(tag.id), t!("trend"), &tag.name, &tag.label));
+    let overview = Found::new(Target::Overview, t!("page"), t!("overview"), t!("all devices at a glance"));
     let overview = Some(overview).filter(|_| !def.is_bench());
     let procedures = def.procedures.iter().enumerate().filter(|_| !cx.is_past());
     let procedures = procedures.map(|(place, def)| {
-        Row::new(Target::Procedure(ProcedureId(to_u16(place))), t!("procedure"), &def.name, &def.about)
+        Found::new(Target::Procedure(ProcedureId(to_u16(place))), t!("procedure"), &def.name, &def.about)
     });
     let devices = devices.chain(procedures);
     tabs.chain(overview).chain(active).chain(devices).chain(tags).chain(trends).chain(keys).chain(others).collect()

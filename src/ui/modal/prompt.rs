@@ -18,21 +18,17 @@ use crate::ui::{
 /// A prompt with one line for the answer; the shown tab's `on_text` takes it, its list while it is typed, or the replay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prompt {
-    /// What is asked.
     pub title: String,
     /// The form that is expected, with an example.
     pub hint: String,
-    /// What has been typed.
     pub line: Line,
     /// Why the last Enter was not taken.
     pub problem: Option<String>,
     taker: Taker,
 }
 
-/// Who takes what is typed.
 #[derive(Debug, Clone, PartialEq)]
 enum Taker {
-    /// The tab.
     Tab,
     /// The replay: it is an instant.
     Replay(replay::Asked),

@@ -21,13 +21,12 @@ use crate::{
     ui::{UiAction, ViewContext, keys::Hint, rights, widgets::text::wrap},
 };
 
-/// The window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reason {
     title: String,
     /// What it is about.
     notes: Vec<String>,
-    action: Action,
+    action: Intent,
     /// The words are its last field.
     form: Form,
     /// Nothing is done without words.
@@ -37,9 +36,8 @@ pub struct Reason {
     problem: Option<String>,
 }
 
-/// What is done.
 #[derive(Debug, Clone, PartialEq)]
-enum Action {
+enum Intent {
     Command(CommandKind),
     /// These alarms are shelved for one of these times, or any up to the longest that the plant allows.
     Shelve(Arc<[AlarmId]>, Vec<Duration>, Duration),
@@ -54,7 +52,7 @@ impl Reason {
     /// An action with a text, which is required if `needed`.
     pub fn new(title: &str, verb: &'static str, notes: Vec<String>, kind: CommandKind, needed: bool) -> Reason {
         let words = words(needed);
-        Reason::with(title, verb, notes, Action::Command(kind), needed, Form::submitting(vec![words], 0))
+        Reason::with(title, verb, notes, Intent::Command(kind), needed, Form::submitting(vec![words], 0))
     }
 
     /// Shelve alarms for one of these times, each with its words, or for any other up to `max`.
@@ -65,24 +63,23 @@ impl Reason {
         let range = t!("45 min, 1.5 h, 1:30; at most {spelled}", spelled = spelled(max));
         let typed = Field::text(t!("other time"), "", TIME_CHARS).within(range);
         let form = Form::submitting(vec![Field::choice(t!("time"), options, 0), typed, words(true)], first);
-        let action = Action::Shelve(alarms.into(), times, max);
+        let action = Intent::Shelve(alarms.into(), times, max);
         let mut reason = Reason::with(t!("shelve an alarm"), t!("shelve"), notes, action, true, form);
         reason.fit();
         reason
     }
 
-    fn with(title: &str, verb: &'static str, notes: Vec<String>, action: Action, needed: bool, form: Form) -> Reason {
+    fn with(title: &str, verb: &'static str, notes: Vec<String>, action: Intent, needed: bool, form: Form) -> Reason {
         Reason { title: title.to_owned(), notes, action, form, needed, verb, problem: None }
     }
 
     /// A time is typed only where none of the others is chosen.
     fn fit(&mut self) {
-        if let Action::Shelve(_, times, _) = &self.action {
+        if let Intent::Shelve(_, times, _) = &self.action {
             self.form.hide(TYPED_TIME, self.form.chosen(TIME) < times.len());
         }
     }
 
-    /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
         let select = (1 < self.form.rows()).then(|| Hint::in_window("↑↓", t!("select")));
         let change = self.form.is_on_choice().then(|| Hint::in_window("←→", t!("change")));
@@ -105,8 +102,8 @@ impl Reason {
     /// What is done, once a time that is typed is one.
     fn command_kind(&self) -> Result<CommandKind, String> {
         match &self.action {
-            Action::Command(kind) => Ok(kind.clone()),
-            Action::Shelve(alarms, times, max) => {
+            Intent::Command(kind) => Ok(kind.clone()),
+            Intent::Shelve(alarms, times, max) => {
                 let chosen = times.get(self.form.chosen(TIME));
                 let lasts = chosen.map_or_else(|| typed_time(&self.form.text(TYPED_TIME), *max), |lasts| Ok(*lasts))?;
                 Ok(CommandKind::Alarm(AlarmCommand::Shelve { alarms: alarms.clone(), lasts }))
@@ -140,7 +137,7 @@ impl Reason {
                 self.form.select(last);
                 Some(t!("a reason is required").to_owned())
             }
-            Ok(_) if matches!(&self.action, Action::Shelve(.., max) if typed_time(&words, *max).is_ok()) => {
+            Ok(_) if matches!(&self.action, Intent::Shelve(.., max) if typed_time(&words, *max).is_ok()) => {
                 // Typed for the time, while another one was selected.
                 Some(t!("a time is not a reason: select \"another time\" to enter a time").to_owned())
             }

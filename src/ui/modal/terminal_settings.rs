@@ -35,13 +35,12 @@ pub struct TerminalSettings {
     pub chosen: Preferences,
     /// Whose they are, and where they are kept, or why not.
     kept: Result<String, String>,
-    /// The selected row.
     row: usize,
 }
 
 /// The fields of the form, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Row {
+enum Setting {
     Theme,
     Characters,
     Pictures,
@@ -51,7 +50,15 @@ enum Row {
     Language,
 }
 
-const ROWS: [Row; 7] = [Row::Theme, Row::Characters, Row::Pictures, Row::Motion, Row::Bell, Row::Mouse, Row::Language];
+const ROWS: [Setting; 7] = [
+    Setting::Theme,
+    Setting::Characters,
+    Setting::Pictures,
+    Setting::Motion,
+    Setting::Bell,
+    Setting::Mouse,
+    Setting::Language,
+];
 
 impl TerminalSettings {
     /// What is in use, to be changed.
@@ -103,49 +110,49 @@ impl TerminalSettings {
             KeyOutcome::Ignored if event.code == KeyCode::Char('q') => return Next::Close,
             KeyOutcome::Ignored | KeyOutcome::Taken => {}
         }
-        let chosen = |row: Row| form.chosen(row as usize);
+        let chosen = |row: Setting| form.chosen(row as usize);
         self.row = form.selected();
         self.chosen = Preferences {
-            theme: ThemeName::ALL[chosen(Row::Theme)],
-            characters: Characters::ALL[chosen(Row::Characters)],
-            pictures: Pictures::ALL[chosen(Row::Pictures)],
-            motion: chosen(Row::Motion) == 0,
-            bell: Bell::ALL[chosen(Row::Bell)],
-            mouse: chosen(Row::Mouse) == 0,
-            language: languages()[chosen(Row::Language)],
+            theme: ThemeName::ALL[chosen(Setting::Theme)],
+            characters: Characters::ALL[chosen(Setting::Characters)],
+            pictures: Pictures::ALL[chosen(Setting::Pictures)],
+            motion: chosen(Setting::Motion) == 0,
+            bell: Bell::ALL[chosen(Setting::Bell)],
+            mouse: chosen(Setting::Mouse) == 0,
+            language: languages()[chosen(Setting::Language)],
         };
         Next::Stay(Modal::TerminalSettings(self))
     }
 
     /// What the choice means.
-    fn note(&self, cx: &ViewContext, row: Row) -> &'static str {
+    fn note(&self, cx: &ViewContext, row: Setting) -> &'static str {
         match row {
-            Row::Theme if cx.theme.colours == Colours::None => t!("no colours here"),
-            Row::Theme => match self.chosen.theme {
+            Setting::Theme if cx.theme.colours == Colours::None => t!("no colours here"),
+            Setting::Theme => match self.chosen.theme {
                 ThemeName::Grey => t!("abnormal in colour"),
                 ThemeName::Dark => t!("more colour on black"),
                 ThemeName::Light => t!("for bright rooms"),
                 ThemeName::HighContrast => t!("bright on black"),
                 ThemeName::Mono => t!("without hue"),
             },
-            Row::Characters => match cx.theme.glyphs {
+            Setting::Characters => match cx.theme.glyphs {
                 Glyphs::Braille => t!("as braille dots"),
                 Glyphs::Block => t!("as blocks"),
                 Glyphs::Ascii => t!("as ASCII characters"),
             },
-            Row::Pictures => match cx.theme.graphics.protocol(self.chosen.pictures) {
+            Setting::Pictures => match cx.theme.graphics.protocol(self.chosen.pictures) {
                 Ok((Protocol::Kitty, _)) => t!("i in Trends: Kitty"),
                 Ok((Protocol::Sixel, _)) => t!("i in Trends: Sixel"),
                 Err(_) => t!("characters only"),
             },
-            Row::Motion => t!("agitators and arrows"),
-            Row::Bell => match self.chosen.bell {
+            Setting::Motion => t!("agitators and arrows"),
+            Setting::Bell => match self.chosen.bell {
                 Bell::Off => t!("alarms make no sound"),
                 Bell::Once | Bell::Repeated => t!("Ctrl-S silences"),
             },
-            Row::Mouse if self.chosen.mouse => t!("Shift selects text"),
-            Row::Mouse => t!("selects text"),
-            Row::Language => "",
+            Setting::Mouse if self.chosen.mouse => t!("Shift selects text"),
+            Setting::Mouse => t!("selects text"),
+            Setting::Language => "",
         }
     }
 

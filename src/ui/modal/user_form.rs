@@ -28,33 +28,27 @@ use crate::{
     },
 };
 
-/// What a form is for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Purpose {
     /// The first Supervisor of a plant without users.
     First,
-    /// Log in.
     Login,
     /// A password of one's own; the present one is asked for unless it has just been given.
     Change(Option<Secret>),
     /// The one who locked the terminal is back.
     Unlock(Arc<str>),
-    /// Add a user.
     Add,
     /// A new first password.
     Reset(Arc<str>),
-    /// Another role.
     Role(Arc<str>),
     /// Disable, or enable.
     Disable(Arc<str>, bool),
-    /// Removed.
     Delete(Arc<str>),
 }
 
 /// A form and how its request stands.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UserForm {
-    /// What for.
     pub purpose: Purpose,
     form: Form,
     /// The request is on its way.
@@ -68,7 +62,6 @@ pub struct UserForm {
 }
 
 impl UserForm {
-    /// An empty form.
     pub fn new(purpose: Purpose) -> UserForm {
         let twice = || [Field::secret(t!("password")), Field::secret(t!("repeat password"))];
         let fields = match &purpose {
@@ -105,12 +98,10 @@ impl UserForm {
         UserForm { below: below.map(Box::new), ..UserForm::new(Purpose::Unlock(user)) }
     }
 
-    /// The window below.
     pub fn below(self) -> Option<Modal> {
         self.below.map(|below| *below)
     }
 
-    /// Is an answer waited for?
     pub fn is_waiting(&self) -> bool {
         self.waiting
     }
@@ -229,7 +220,6 @@ impl UserForm {
         }
     }
 
-    /// Pasted text.
     pub fn paste(&mut self, text: &str) {
         if !self.waiting {
             self.form.paste(text);
@@ -281,7 +271,6 @@ impl UserForm {
     }
 }
 
-/// A role to choose.
 fn role_field(role: Role) -> Field {
     Field::one_of(t!("role"), &Role::ALL, role, |role| translate(role.word()))
 }

@@ -143,6 +143,8 @@ fn what_is_selected_is_copied_with_unit_quality_and_time() {
     let alarm = "high\tTIC-1.PV\ttemperature high\tUNACK\t72.1 °C\t2026-11-21T14:01:50+07:00";
     assert_eq!(copied(type_keys(&mut model, "3y")).as_deref(), Some(alarm));
     assert!(screen(&mut model, 80, 24).contains("Copied: high  TIC-1.PV  temperature high"));
+    let both = copied(type_keys(&mut model, " ↓ y")).unwrap_or_default();
+    assert!(both.lines().count() == 2 && both.contains(alarm), "the marked ones: {both}");
     let value = copied(type_keys(&mut model, "4⏎y")).unwrap_or_default();
     assert!(value.ends_with("\tgood\t2026-11-21T14:02:30+07:00"), "{value}");
 }

@@ -28,9 +28,7 @@ pub struct Asked {
 /// Where an instant is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// On the tab.
     Tab,
-    /// On the event page.
     Page,
     /// Nowhere: the text is the name of the instant that is shown.
     Bookmark,
@@ -82,7 +80,6 @@ fn name(cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
     }
 }
 
-/// Asks for the name of the instant that is shown.
 pub fn ask_name(cx: &ViewContext) -> Modal {
     let asked = Asked { selected: None, place: Place::Bookmark };
     Modal::Prompt(Prompt::new(t!("Bookmark: a name for this time"), stamp(cx, cx.now), "").for_replay(asked))

@@ -9,7 +9,9 @@ use super::{
     search::Searched,
 };
 use crate::ui::{
-    Effect, Model, UiAction, dispatch,
+    Model, UiAction, ViewContext,
+    context::with_replay,
+    dispatch,
     global::{self, GlobalKey, Reach},
     keys::{char, code},
 };
@@ -49,10 +51,9 @@ pub const KEYS: &[GlobalKey] = &[
 ];
 
 /// Acts from the shown instant on; nothing is later than the present.
-fn act(model: &mut Model, act: fn(&mut Replay, Timestamp, Timestamp) -> Vec<Effect>) -> Vec<UiAction> {
-    let present = model.present_cx().now;
+fn act(model: &mut Model, act: fn(&mut Replay, Timestamp, &ViewContext) -> Vec<UiAction>) -> Vec<UiAction> {
     let Some(at) = model.replay.shown().map(|shown| shown.at) else { return Vec::new() };
-    act(&mut model.replay, at, present).into_iter().map(UiAction::Do).collect()
+    with_replay(model, |replay, present| act(replay, at, present))
 }
 
 fn step(seconds: i64) -> Vec<UiAction> {

@@ -16,8 +16,9 @@ use crate::{
         snapshot::Snapshot,
     },
     ui::{
-        Effect, ViewContext, rights,
+        UiAction, ViewContext, rights,
         tabs::{
+            Answered, Queries,
             alarms::{action_text, event_text},
             draw::local,
             trends::span::View,
@@ -41,38 +42,25 @@ const PENS_MAX: usize = 3;
 /// Rows of a page when the list is scrolled.
 const PAGE: usize = 10;
 
-/// What a query is for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
-    Curves,
-    Alarms,
-    Actions,
-    Logins,
-    Detached,
-}
-
 /// What the history knows around the instant.
 #[derive(Debug, Default)]
 pub struct EventPage {
     /// The instant that was asked about.
     centre: Option<Timestamp>,
-    /// Queries on their way.
-    queries: Vec<(u32, Part)>,
     pens: Vec<Pen>,
-    curves: Vec<Series>,
-    alarms: Option<Vec<AlarmRecord>>,
-    actions: Option<Vec<ActionRecord>>,
-    /// Logins and logouts of the day before, and terminals that were closed; `None` where the user may not see them.
-    logins: Option<Vec<ActionRecord>>,
-    detached: Option<Vec<ActionRecord>>,
-    trouble: Option<String>,
+    curves: Answered<Vec<Series>>,
+    alarms: Answered<Vec<AlarmRecord>>,
+    actions: Answered<Vec<ActionRecord>>,
+    /// Logins and logouts of the day before, and terminals that were closed; not asked where the user may not see them.
+    logins: Answered<Vec<ActionRecord>>,
+    detached: Answered<Vec<ActionRecord>>,
     /// Rows that the journal is scrolled away from the instant.
     scroll: isize,
 }
 
 /// An event of the journal.
 #[derive(Debug, Clone, PartialEq)]
-struct Entry {
+struct NearbyEvent {
     at: Timestamp,
     text: String,
     style: ratatui::style::Style,
@@ -80,19 +68,18 @@ struct Entry {
 
 impl EventPage {
     /// Is the answer to this query waited for?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.queries.iter().any(|(query, _)| *query == number)
+    pub fn awaits(&mut self, number: u32) -> bool {
+        self.queries().iter().any(|asked| asked.query().awaits(number))
+    }
+
+    fn queries(&mut self) -> Queries<'_> {
+        vec![&mut self.curves, &mut self.alarms, &mut self.actions, &mut self.logins, &mut self.detached]
     }
 
     /// Asks for what is around an instant, unless it is known or on its way already.
-    pub fn follow(
-        &mut self,
-        shown: &Shown,
-        present: &ViewContext,
-        mut ask: impl FnMut(Query) -> (u32, Effect),
-    ) -> Vec<Effect> {
+    pub fn follow(&mut self, shown: &Shown, present: &ViewContext) -> Vec<UiAction> {
         let near = |centre: Timestamp| shown.at.duration_since(centre).abs() <= CURVES / 2;
-        if self.centre.is_some_and(near) || !self.queries.is_empty() && self.centre.is_some() {
+        if self.centre.is_some_and(near) || self.queries().iter().any(|asked| asked.query().is_on_way()) {
             return Vec::new();
         }
         let (at, now) = (shown.at, present.present());
@@ -109,46 +96,44 @@ impl EventPage {
             Query::Audit { from: day, to: at, words, by, action, limit }
         };
         let tags = self.pens.iter().map(|pen| pen.tag).collect();
-        let mut queries = vec![
-            (Part::Curves, Query::Series { tags, from: view.from, to: view.to, buckets: view.columns }),
-            (Part::Alarms, Query::Journal { from, to, limit }),
-            (Part::Actions, Query::Actions { from, to, limit }),
+        let curves = Query::Series { tags, from: view.from, to: view.to, buckets: view.columns };
+        let mut asked = vec![
+            self.curves.ask_once(present, curves),
+            self.alarms.ask_once(present, Query::Journal { from, to, limit }),
+            self.actions.ask_once(present, Query::Actions { from, to, limit }),
         ];
         if rights::lacks(present, needs_for_query(&audit(""))).is_none() {
-            queries.extend([(Part::Logins, audit("log")), (Part::Detached, audit("detach"))]);
+            asked.extend([
+                self.logins.ask_once(present, audit("log")),
+                self.detached.ask_once(present, audit("detach")),
+            ]);
         }
-        let asked = queries.into_iter().map(|(part, query)| {
-            let (number, effect) = ask(query);
-            self.queries.push((number, part));
-            effect
-        });
-        asked.collect()
+        asked
     }
 
-    /// The history has answered.
-    pub fn on_answer(&mut self, number: u32, answer: Result<Answer, HistoryError>) {
-        let Some(place) = self.queries.iter().position(|(query, _)| *query == number) else { return };
-        let (_, part) = self.queries.swap_remove(place);
-        match (part, answer) {
-            (_, Err(error)) => self.trouble = Some(error.to_string()),
-            (Part::Curves, Ok(Answer::Series(series))) => self.curves = series,
-            (Part::Alarms, Ok(Answer::Journal(rows))) => self.alarms = Some(rows),
-            (Part::Actions, Ok(Answer::Actions(rows))) => self.actions = Some(rows),
-            (Part::Logins, Ok(Answer::Actions(rows))) => self.logins = Some(rows),
-            (Part::Detached, Ok(Answer::Actions(rows))) => self.detached = Some(rows),
-            (Part::Curves | Part::Alarms | Part::Actions | Part::Logins | Part::Detached, Ok(_)) => {}
-        }
+    pub fn on_answer(&mut self, present: &ViewContext, number: u32, answer: &Result<Answer, HistoryError>) {
+        self.queries().into_iter().for_each(|asked| asked.on_answer(present, number, answer));
     }
 
-    /// Its curves.
+    /// Why something could not be read.
+    fn trouble(&self) -> Option<&str> {
+        let alarms = self.curves.trouble.as_ref().or(self.alarms.trouble.as_ref());
+        let of_people = self.logins.trouble.as_ref().or(self.detached.trouble.as_ref());
+        alarms.or(self.actions.trouble.as_ref()).or(of_people).map(String::as_str)
+    }
+
+    /// The rows of the journal that were read.
+    fn journal_rows(&self) -> [usize; 2] {
+        [self.alarms.value.as_ref().map_or(0, Vec::len), self.actions.value.as_ref().map_or(0, Vec::len)]
+    }
+
     pub fn pens(&self) -> &[Pen] {
         &self.pens
     }
 
     /// Scrolls the journal away from the instant; the first and the last row are those at the instant again.
     pub fn scroll(&mut self, motion: Motion) {
-        let most = self.alarms.as_ref().map_or(0, Vec::len) + self.actions.as_ref().map_or(0, Vec::len);
-        let most = most.cast_signed();
+        let most = self.journal_rows().iter().sum::<usize>().cast_signed();
         self.scroll = match motion {
             Motion::Rows(by) => self.scroll + by,
             Motion::Pages(by) => self.scroll + by * PAGE.cast_signed(),
@@ -170,31 +155,30 @@ impl EventPage {
     }
 
     /// Alarm events and actions, oldest first.
-    fn entries(&self, cx: &ViewContext) -> Vec<Entry> {
-        let alarms = self.alarms.iter().flatten().map(|row| Entry {
+    fn entries(&self, cx: &ViewContext) -> Vec<NearbyEvent> {
+        let alarms = self.alarms.value.iter().flatten().map(|row| NearbyEvent {
             at: row.at,
             text: event_text(cx, row),
             style: cx.theme.normal(),
         });
-        let actions = self.actions.iter().flatten().map(|row| Entry {
+        let actions = self.actions.value.iter().flatten().map(|row| NearbyEvent {
             at: row.at,
             text: action_text(cx, row).split_whitespace().collect::<Vec<_>>().join(" "),
             style: cx.theme.strong(),
         });
-        let mut entries: Vec<Entry> = alarms.chain(actions).collect();
+        let mut entries: Vec<NearbyEvent> = alarms.chain(actions).collect();
         entries.sort_by_key(|entry| entry.at);
         entries
     }
 
     /// Are older events missing, because there were too many?
     fn is_cut(&self) -> bool {
-        let full = |rows: usize| EVENTS_MAX <= rows;
-        full(self.alarms.as_ref().map_or(0, Vec::len)) || full(self.actions.as_ref().map_or(0, Vec::len))
+        self.journal_rows().iter().any(|rows| EVENTS_MAX <= *rows)
     }
 
     /// Who was logged in at the instant, and where from; `None` until it is known, or where it may not be.
     fn logged_in(&self) -> Option<Vec<(String, String)>> {
-        let (logins, detached) = (self.logins.as_ref()?, self.detached.as_ref()?);
+        let (logins, detached) = (self.logins.value.as_ref()?, self.detached.value.as_ref()?);
         let mut entries: Vec<&ActionRecord> =
             logins.iter().chain(detached).filter(|row| &*row.outcome == "done" || &*row.action == "logout").collect();
         entries.sort_by_key(|row| row.at);
@@ -217,7 +201,7 @@ impl EventPage {
         let Some(centre) = self.centre else { return Vec::new() };
         let near = |row: &&ActionRecord| row.at.duration_since(centre).abs() <= CURVES && !row.by.is_empty();
         let mut people: Vec<(String, usize)> = Vec::new();
-        for row in self.actions.iter().flatten().filter(near) {
+        for row in self.actions.value.iter().flatten().filter(near) {
             match people.iter_mut().find(|(name, _)| *name == *row.by) {
                 Some((_, count)) => *count += 1,
                 None => people.push((row.by.to_string(), 1)),

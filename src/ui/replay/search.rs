@@ -2,12 +2,12 @@
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{Direction, Event, Replay};
+use super::{Direction, Event, Replay, ask};
 use crate::{
     history::{Answer, Query},
     plant::{batch::Batch, def::TagId},
     t,
-    ui::Effect,
+    ui::{UiAction, ViewContext},
 };
 
 /// An event is searched for in spans that grow: 1 h, a day, a month, a year.
@@ -29,7 +29,6 @@ struct Span {
     present: Timestamp,
 }
 
-/// What is searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Searched {
     /// Alarm events and actions of operators.
@@ -49,7 +48,6 @@ impl Searched {
     }
 }
 
-/// A search for the next event.
 #[derive(Debug)]
 pub(super) struct Search {
     what: Searched,
@@ -107,15 +105,21 @@ impl Replay {
         what: Searched,
         direction: Direction,
         at: Timestamp,
-        present: Timestamp,
-    ) -> Vec<Effect> {
+        present: &ViewContext,
+    ) -> Vec<UiAction> {
         self.pause();
         (self.requested, self.trouble) = (None, None);
-        let span = Span::new(direction, at, 0, present);
-        self.search_in(what, Some(span).filter(|span| span.from < span.to), direction)
+        let span = Span::new(direction, at, 0, present.now);
+        self.search_in(what, Some(span).filter(|span| span.from < span.to), direction, present)
     }
 
-    fn search_in(&mut self, what: Searched, span: Option<Span>, direction: Direction) -> Vec<Effect> {
+    fn search_in(
+        &mut self,
+        what: Searched,
+        span: Option<Span>,
+        direction: Direction,
+        present: &ViewContext,
+    ) -> Vec<UiAction> {
         let Some(span @ Span { from, to, .. }) = span else {
             self.trouble = Some(match (what, direction) {
                 (Searched::Events, Direction::Earlier) => t!("no earlier event within a year").to_owned(),
@@ -130,38 +134,38 @@ impl Replay {
             Searched::Events => vec![Query::Journal { from, to, limit }, Query::Actions { from, to, limit }],
             Searched::Batches => vec![Query::Batches { from, to, limit }],
         };
-        let mut queries = Vec::new();
-        let ask = |query| {
-            let effect = self.ask(query);
-            queries.push(self.asked);
-            effect
-        };
-        let effects = asked.into_iter().map(ask).collect();
+        let (queries, actions) = asked.into_iter().map(|query| ask(present, query)).unzip();
         self.search = Some(Search { what, span, queries, found: Vec::new(), cut: false });
-        effects
+        actions
     }
 
     /// Asks when the next value of what is drawn was stored, or the previous one.
-    pub(super) fn search_sample(&mut self, direction: Direction, at: Timestamp, present: Timestamp) -> Vec<Effect> {
+    pub(super) fn search_sample(
+        &mut self,
+        direction: Direction,
+        at: Timestamp,
+        present: &ViewContext,
+    ) -> Vec<UiAction> {
         self.pause();
         (self.requested, self.search, self.trouble) = (None, None, None);
         let tags: Vec<TagId> = self.drawn().iter().map(|pen| pen.tag).collect();
         let (from, to) = match direction {
             Direction::Earlier => (at.checked_sub(SAMPLES).unwrap_or(Timestamp::MIN), at),
-            Direction::Later => (after(at), at.checked_add(SAMPLES).unwrap_or(present).min(after(present))),
+            Direction::Later => (after(at), at.checked_add(SAMPLES).unwrap_or(present.now).min(after(present.now))),
         };
         if tags.is_empty() || to <= from {
             return Vec::new();
         }
-        let effect = self.ask(Query::SampleTime { tags, from, to, latest: direction == Direction::Earlier });
-        self.sample = Some(self.asked);
-        vec![effect]
+        let query = Query::SampleTime { tags, from, to, latest: direction == Direction::Earlier };
+        let (number, action) = ask(present, query);
+        self.sample = Some(number);
+        vec![action]
     }
 
     /// An answer of a search: goes to the nearest event once all have come, or searches on.
-    pub(super) fn on_found(&mut self, number: u32, answer: Answer) -> Vec<Effect> {
+    pub(super) fn on_found(&mut self, number: u32, answer: Answer, present: &ViewContext) -> Vec<UiAction> {
         if self.sample.take_if(|sample| *sample == number).is_some() {
-            return self.on_sample(answer);
+            return self.on_sample(answer, present);
         }
         let Some(search) = &mut self.search else { return Vec::new() };
         search.queries.retain(|query| *query != number);
@@ -199,26 +203,25 @@ impl Replay {
             Direction::Later => {
                 let half = span.half(span.from, span.to);
                 if cut && half.overfull.is_some() {
-                    return self.search_in(what, Some(half), span.direction);
+                    return self.search_in(what, Some(half), span.direction, present);
                 }
                 events.min_by_key(Event::at)
             }
         };
-        let Some(event) = nearest else { return self.search_in(what, span.next(), span.direction) };
-        let effect = self.go_to(event.at());
+        let Some(event) = nearest else { return self.search_in(what, span.next(), span.direction, present) };
+        let asked = self.go_to(event.at(), present);
         self.event = Some(event);
-        vec![effect]
+        asked
     }
 
-    fn on_sample(&mut self, answer: Answer) -> Vec<Effect> {
+    fn on_sample(&mut self, answer: Answer, present: &ViewContext) -> Vec<UiAction> {
         let Answer::SampleTime(found) = answer else { return Vec::new() };
         let Some(at) = found else {
             self.trouble = Some(t!("no other stored value within an hour").to_owned());
             return Vec::new();
         };
-        let effect = self.go_to(at);
         self.event = Some(Event::Sample(at));
-        vec![effect]
+        self.go_to(at, present)
     }
 }
 

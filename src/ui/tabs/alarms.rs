@@ -43,7 +43,6 @@ use metrics::Metrics;
 use recent::Recent;
 use suppressed::Suppressed;
 
-/// A view of the tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Page {
     /// Alarms of the process, and the urgent ones of the system.
@@ -53,9 +52,7 @@ pub enum Page {
     Suppressed,
     /// Alarms of what watches the process.
     System,
-    /// What was.
     Journal,
-    /// Metrics of the alarm system.
     Metrics,
     /// What the next shift must know.
     Handover,
@@ -66,7 +63,6 @@ impl Page {
     pub const ALL: [Page; 6] =
         [Page::Active, Page::Suppressed, Page::System, Page::Journal, Page::Metrics, Page::Handover];
 
-    /// Its heading.
     pub fn title(self) -> &'static str {
         match self {
             Page::Active => t!("active"),
@@ -79,7 +75,6 @@ impl Page {
     }
 }
 
-/// State of this tab.
 #[derive(Debug, Default)]
 pub struct Alarms {
     page: Page,
@@ -195,12 +190,11 @@ impl Alarms {
 }
 
 impl Alarms {
-    /// The alarms that the page is about.
     fn of_page<'a>(&self, cx: &ViewContext<'a>) -> impl Iterator<Item = &'a ActiveAlarm> {
         on_page(cx, self.page)
     }
 
-    fn rows<'a>(&self, cx: &ViewContext<'a>) -> Vec<list::Row<'a>> {
+    fn rows<'a>(&self, cx: &ViewContext<'a>) -> Vec<list::AlarmRow<'a>> {
         let listed = self.listed(cx).unwrap_or_default().into_iter();
         match self.sort {
             // A wide screen shows the tree of a first-out group until it is folded.
@@ -208,11 +202,11 @@ impl Alarms {
                 let chosen = |began| self.folds.iter().find(|(of, _)| *of == began).map(|(_, folded)| *folded);
                 list::rows(cx.def(), listed, |began| chosen(began).unwrap_or(cx.size < Size::Wide))
             }
-            Sort::Time | Sort::Name => listed.map(list::Row::plain).collect(),
+            Sort::Time | Sort::Name => listed.map(list::AlarmRow::plain).collect(),
         }
     }
 
-    fn place(&self, rows: &[list::Row]) -> usize {
+    fn place(&self, rows: &[list::AlarmRow]) -> usize {
         self.selected.place(rows.iter().map(|row| row.alarm.id))
     }
 
@@ -271,7 +265,9 @@ impl ListPage for Alarms {
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        self.selected(cx).map(|alarm| actions::line(cx, alarm)).into_iter().collect()
+        let meant = self.meant(cx);
+        let alarms = cx.snapshot.alarms.iter().filter(|alarm| meant.contains(&alarm.id));
+        alarms.map(|alarm| actions::line(cx, alarm)).collect()
     }
 
     fn filter(&self) -> String {
@@ -288,7 +284,7 @@ impl ListPage for Alarms {
 
     fn fingerprint(&self, cx: &ViewContext) -> Rows {
         let rows = self.rows(cx);
-        let seen = |row: &list::Row| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
+        let seen = |row: &list::AlarmRow| (row.alarm.id, row.alarm.annunciated_at, row.alarm.state);
         Rows::of(rows.iter().map(seen), self.place(&rows))
     }
 

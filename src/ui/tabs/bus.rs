@@ -40,12 +40,10 @@ use test::TestKind;
 /// The day of a line grows by the minute.
 const ASK_EVERY: SignedDuration = SignedDuration::from_secs(60);
 const TIMEOUT: SignedDuration = SignedDuration::from_secs(10);
-/// Rows of the day.
 const DAY_HEIGHT: u16 = 3;
 /// Least rows of the recent frames below them.
 const FRAMES_MIN: u16 = 4;
 
-/// What is shown of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Page {
     /// Settings, load, counters, devices.
@@ -54,7 +52,6 @@ pub enum Page {
     Plan,
     /// What went over the line.
     Frames,
-    /// Tests of the line.
     Test,
     /// The registers of a device, live; on a bench a tab of its own.
     Registers,
@@ -63,7 +60,6 @@ pub enum Page {
 impl Page {
     const ALL: [Page; 5] = [Page::Line, Page::Plan, Page::Frames, Page::Test, Page::Registers];
 
-    /// Those that there are here.
     fn offered(cx: &ViewContext) -> &'static [Page] {
         // Of the past only what the history has of a line.
         match (cx.is_past(), cx.def().is_bench()) {
@@ -84,7 +80,6 @@ impl Page {
     }
 }
 
-/// State of this tab.
 #[derive(Debug)]
 pub struct Bus {
     line: LineId,
@@ -93,7 +88,6 @@ pub struct Bus {
     scroll: Scroll,
     plan: plan::Plan,
     frames: frames::Ring,
-    /// The bench of tests.
     pub(super) test: test::Bench,
     /// How the line did over the last day, and the query for it.
     minutes: Answered<Vec<LineMinute>>,
@@ -129,6 +123,13 @@ impl TabView for Bus {
             Page::Registers => self.registers.list_mut(cx),
             Page::Line | Page::Frames | Page::Test => None,
         }
+    }
+
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        if self.page(cx) == Page::Registers {
+            return self.registers.copied(&below(cx));
+        }
+        self.list(cx).map_or(Vec::new(), |list| list.copied(cx))
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
@@ -297,9 +298,7 @@ impl Bus {
 /// A line and all that is known of it.
 #[derive(Debug, Clone, Copy)]
 pub struct LineView<'a> {
-    /// Which.
     id: LineId,
-    /// Its state and totals.
     status: &'a LineStatus,
     /// In use now.
     settings: &'a LineDef,

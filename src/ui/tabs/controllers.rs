@@ -28,7 +28,7 @@ use self::{
     program::Cell,
     runs::{ControlRuns, Runs},
     sets::{Sets, SetsOf},
-    table::Table,
+    table::ParameterTable,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{history::Series, plant::parameter_set, ui::layout::Size};
@@ -38,40 +38,32 @@ const TREND_EVERY: SignedDuration = SignedDuration::from_secs(10);
 const TIMEOUT: SignedDuration = SignedDuration::from_secs(30);
 /// Columns of the small trend to ask for: two dots a cell, and some to spare.
 const TREND_BUCKETS: usize = 80;
-/// What is shown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Page {
-    /// All devices.
     List,
-    /// One device.
     Device,
-    /// Its bits as lamps.
     Lamps,
-    /// Its ramp/soak program.
     Program,
-    /// Its parameter sets.
     Sets,
     /// A set against it.
     Compare(Compare),
-    /// Its control runs.
     Runs,
-    /// The procedures of the plant.
     Procedures,
-    /// Some runs over each other, and the page to go back to.
-    Overlay(Box<Page>),
-    /// Words to read, and the page to go back to.
-    Guide(usize, Box<Page>),
+    /// Some runs over each other.
+    Overlay,
+    /// A page of words to read.
+    Guide(usize),
 }
 
-/// State of this tab.
 #[derive(Debug)]
 pub struct Controllers {
-    page: Page,
+    /// Over each other: the last one is shown, and Esc leads to the one before it.
+    pages: Vec<Page>,
     /// The device that is shown or selected.
     device: DeviceId,
     /// Only devices with these words are listed.
     found: Words,
-    table: Table,
+    table: ParameterTable,
     cell: Cell,
     /// The devices as faceplates or as a table; `None` as there is room.
     wall: Option<bool>,
@@ -90,86 +82,72 @@ impl TabView for Controllers {
         if let Some(list) = self.list(cx) {
             return list.copied(cx);
         }
-        let cell = self.device(cx).filter(|_| self.page == Page::Program).and_then(|device| self.cell_tag(device));
+        let cell = self.device(cx).filter(|_| *self.page() == Page::Program).and_then(|device| self.cell_tag(device));
         cell.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
 
     fn new(snapshot: &Snapshot) -> Controllers {
         let page = if snapshot.def.devices.len() == 1 { Page::Device } else { Page::List };
-        Controllers::on_page(page, DeviceId(0), Table::default())
+        Controllers::on_pages(vec![page], DeviceId(0), ParameterTable::default())
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
         if self.list_mut(cx).is_some_and(|list| list.back(cx)) {
             return true;
         }
-        let page = std::mem::replace(&mut self.page, Page::List);
-        let alone = cx.def().devices.len() <= 1;
-        self.page = match page {
-            Page::Device if !alone => {
+        let popped = if 1 < self.pages.len() { self.pages.pop() } else { None };
+        match popped {
+            Some(Page::Device) => {
                 self.trend = Answered::default();
-                self.table = Table { defaults: self.table.defaults, ..Table::default() };
-                Page::List
+                self.table = ParameterTable { defaults: self.table.defaults, ..ParameterTable::default() };
             }
-            Page::Lamps | Page::Program | Page::Sets | Page::Runs => Page::Device,
-            Page::Procedures if alone => Page::Device,
-            Page::Procedures => Page::List,
-            Page::Overlay(before) => {
-                self.runs.overlay = None;
-                *before
-            }
-            Page::Compare(_) => Page::Sets,
-            Page::Guide(_, before) => *before,
-            page @ (Page::List | Page::Device) => {
-                self.page = page;
-                return false;
-            }
-        };
+            Some(Page::Overlay) => self.runs.overlay = None,
+            Some(_) => {}
+            None => return false,
+        }
         true
     }
 
     fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
-        match self.page {
+        match self.page() {
             Page::Sets => Some(&self.sets),
             Page::Runs => self.runs.shown(),
             Page::Procedures => Some(&self.procedures),
             Page::List | Page::Device => Some(self),
-            Page::Lamps | Page::Program | Page::Compare(_) => None,
-            Page::Overlay(_) | Page::Guide(..) => None,
+            Page::Lamps | Page::Program | Page::Compare(_) | Page::Overlay | Page::Guide(_) => None,
         }
     }
 
     fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
-        match self.page {
+        match self.page() {
             Page::Sets => Some(&mut self.sets),
             Page::Runs => self.runs.shown_mut(),
             Page::Procedures => Some(&mut self.procedures),
             Page::List | Page::Device => Some(self),
-            Page::Lamps | Page::Program | Page::Compare(_) => None,
-            Page::Overlay(_) | Page::Guide(..) => None,
+            Page::Lamps | Page::Program | Page::Compare(_) | Page::Overlay | Page::Guide(_) => None,
         }
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        if cx.is_past() && matches!(self.page, Page::Sets | Page::Compare(_) | Page::Procedures) {
-            self.page = Page::Device;
+        while cx.is_past() && matches!(self.page(), Page::Sets | Page::Compare(_) | Page::Procedures) {
+            self.pages.pop();
         }
         let device = cx.def().devices.get(self.device.index());
-        match (&self.page, device) {
-            (Page::Runs | Page::Overlay(_), _) => return self.runs.ask(cx, Tab::Controllers),
+        match (self.page(), device) {
+            (Page::Runs | Page::Overlay, _) => return self.runs.ask(cx, Tab::Controllers),
             (Page::Lamps, Some(device)) => return self.lamps.ask(cx, device),
             (Page::Procedures, _) => return self.procedures.ask(cx, Tab::Controllers).into_iter().collect(),
             _ => {}
         }
         let faceplate = device.and_then(|device| device.faceplate.as_ref());
-        let tags = match &self.page {
+        let tags = match self.page() {
             Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
             Page::List if self.is_wall(cx) => {
                 let listed = self.listed(cx);
                 wall::tags(cx, &listed, self.place(&listed))
             }
             Page::List | Page::Program | Page::Sets | Page::Compare(_) => Vec::new(),
-            Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay(_) | Page::Guide(..) => Vec::new(),
+            Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay | Page::Guide(_) => Vec::new(),
         };
         if tags.is_empty() {
             return Vec::new();
@@ -205,7 +183,7 @@ impl TabView for Controllers {
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        if let (Page::Overlay(_), Some(overlay)) = (&self.page, &self.runs.overlay) {
+        if let (Page::Overlay, Some(overlay)) = (self.page(), &self.runs.overlay) {
             return overlay.view(cx, frame, area);
         }
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
@@ -213,7 +191,7 @@ impl TabView for Controllers {
             canvas.text(1, 1, t!("this plant has no devices"), cx.theme.normal());
             return;
         };
-        match (&self.page, &device.program) {
+        match (self.page(), &device.program) {
             (Page::List, _) => {
                 let (listed, found) = (self.listed(cx), self.found.to_string());
                 let place = self.place(&listed);
@@ -229,20 +207,20 @@ impl TabView for Controllers {
                 device::view(cx, &mut canvas, device, &self.table, trend)
             }
             (Page::Procedures, _) => self.procedures.view(cx, &mut canvas),
-            (Page::Runs | Page::Overlay(_), _) => self.runs.list.view(cx, &mut canvas),
+            (Page::Runs | Page::Overlay, _) => self.runs.list.view(cx, &mut canvas),
             (Page::Sets, _) => self.sets.view(cx, &mut canvas),
             (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
-            (Page::Guide(page, _), _) => guide::view(cx, &mut canvas, *page),
+            (Page::Guide(page), _) => guide::view(cx, &mut canvas, *page),
         }
     }
 }
 
 impl Controllers {
-    fn on_page(page: Page, device: DeviceId, table: Table) -> Controllers {
+    fn on_pages(pages: Vec<Page>, device: DeviceId, table: ParameterTable) -> Controllers {
         let (cell, trend) = (Cell::default(), Answered::default());
         let runs = Runs::new(ControlRuns { device });
         Controllers {
-            page,
+            pages,
             device,
             found: Words::default(),
             table,
@@ -255,6 +233,11 @@ impl Controllers {
             trend,
             curves: Vec::new(),
         }
+    }
+
+    /// The page that is shown.
+    fn page(&self) -> &Page {
+        self.pages.last().unwrap_or(&Page::List)
     }
 
     /// The devices that the filter lets through.
@@ -286,16 +269,17 @@ impl Controllers {
         }
     }
 
-    /// Shows a device.
     pub fn show(&mut self, device: DeviceId) {
-        let table = Table { defaults: self.table.defaults, ..Table::default() };
+        let table = ParameterTable { defaults: self.table.defaults, ..ParameterTable::default() };
         let found = std::mem::take(&mut self.found);
-        *self = Controllers { wall: self.wall, found, ..Controllers::on_page(Page::Device, device, table) };
+        let pages = self.pages.iter().take(1).filter(|first| **first != Page::Device).cloned();
+        let pages = pages.chain([Page::Device]).collect();
+        *self = Controllers { wall: self.wall, found, ..Controllers::on_pages(pages, device, table) };
     }
 
-    /// Shows a procedure.
     pub fn show_procedure(&mut self, id: ProcedureId) {
-        self.page = Page::Procedures;
+        self.pages.truncate(1);
+        self.pages.push(Page::Procedures);
         self.procedures.select(id);
     }
 
@@ -322,7 +306,7 @@ impl ListPage for Controllers {
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        let tag = match self.page {
+        let tag = match self.page() {
             Page::Device => self.table.tag(cx, self.device).map(|tag| tag.id),
             _ => self.device(cx).and_then(|device| device.faceplate.as_ref()).map(|faceplate| faceplate.pv),
         };
@@ -330,12 +314,12 @@ impl ListPage for Controllers {
     }
 
     fn filter(&self) -> String {
-        if self.page == Page::Device { &self.table.filter } else { &self.found }.to_string()
+        if *self.page() == Page::Device { &self.table.filter } else { &self.found }.to_string()
     }
 
     fn set_filter(&mut self, cx: &ViewContext, text: &str) {
         let words = Words::parse(text);
-        if self.page == Page::Device {
+        if *self.page() == Page::Device {
             (self.table.filter, self.table.selected) = (words, 0);
             self.table.selected = if self.table.filter.is_empty() { 0 } else { self.table.best(cx, self.device) };
             return;

@@ -21,7 +21,6 @@ use crate::{
     },
 };
 
-/// State of the tab.
 #[derive(Debug, Default)]
 pub struct Faults {
     /// Which row is selected; headings are not counted.
@@ -32,10 +31,8 @@ pub struct Faults {
     verdict: bool,
 }
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Faults>;
 
-/// Keys of this tab.
 const KEYS: &[Key] = &[
     Key::change(code(KeyCode::Up), "", "select the fault above", |faults, cx| faults.step(cx, -1)),
     Key::change(code(KeyCode::Down), "select", "select the fault below", |faults, cx| faults.step(cx, 1)),
@@ -113,7 +110,6 @@ impl Faults {
         if changes { send(SimCommand::Inject(target, other)) } else { Vec::new() }
     }
 
-    /// The selected fault and its target.
     fn selected<'a>(&self, cx: &ViewContext<'a>) -> Option<(&'a Status, FaultTarget, InjectedFault)> {
         let status = open(cx)?;
         let rows = rows(status);

@@ -21,7 +21,6 @@ const TIMEOUT_S: f64 = 20.0;
 pub trait Listing: Debug + 'static {
     /// What the history answers; `()` for a list of what the snapshot or the session holds.
     type Answer: FromAnswer + Debug + 'static;
-    /// A row.
     type Row: ToOwned + ?Sized + 'static;
     /// What a row stays selected and marked by.
     type Id: Clone + PartialEq + Hash + Debug + 'static;
@@ -190,7 +189,6 @@ pub trait ListPage {
 pub enum Can {
     /// Several rows can be marked.
     Mark,
-    /// It can be sorted.
     Sort,
     /// Its rows have trends.
     Trend,
@@ -199,9 +197,7 @@ pub enum Can {
 /// The list of a page: what it shows, and what its operator looks at.
 #[derive(Debug)]
 pub struct List<L: Listing> {
-    /// What it shows.
     pub of: L,
-    /// What the history has answered.
     pub answered: Answered<L::Answer>,
     /// `None`: the first one, whichever that is.
     selected: Option<L::Id>,
@@ -219,7 +215,6 @@ impl<L: Listing + Default> Default for List<L> {
 }
 
 impl<L: Listing> List<L> {
-    /// A list as it is at first.
     pub fn new(of: L) -> List<L> {
         let (answered, filter) = (Answered::default(), Words::default());
         List { of, answered, selected: None, marked: Vec::new(), filter, order: None, reversed: false }
@@ -252,7 +247,6 @@ impl<L: Listing> List<L> {
         self.of.columns(cx, cx.area.width)
     }
 
-    /// The texts of a row.
     fn cells(&self, cx: &ViewContext, row: &L::Row) -> Vec<String> {
         let cells = self.columns(cx).iter().map(|column| column.text(cx, row, u16::MAX)).collect();
         self.of.words(cx, row).map_or(cells, |words| vec![words])
@@ -263,19 +257,16 @@ impl<L: Listing> List<L> {
         id.and_then(|id| rows.iter().position(|row| L::holds(row, id))).unwrap_or(0)
     }
 
-    /// The selected row.
     pub fn selected<'a>(&'a self, cx: &ViewContext<'a>) -> Option<Cow<'a, L::Row>> {
         let mut rows = self.rows(cx);
         let place = self.place(&rows);
         (place < rows.len()).then(|| rows.swap_remove(place))
     }
 
-    /// Selects this row.
     pub fn select(&mut self, id: L::Id) {
         self.selected = Some(id);
     }
 
-    /// Is a row marked?
     pub fn is_marked(&self, row: &L::Row) -> bool {
         self.marked.contains(&L::id(row))
     }
@@ -286,7 +277,6 @@ impl<L: Listing> List<L> {
         self.answered.ask(cx, tab, real(cx, EVERY_S), real(cx, TIMEOUT_S), query)
     }
 
-    /// Is there a filter?
     pub fn is_filtered(&self) -> bool {
         !self.filter.is_empty()
     }

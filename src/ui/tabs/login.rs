@@ -11,7 +11,6 @@ use crate::{
     ui::modal::user_form::{Purpose, UserForm},
 };
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Login>;
 
 /// Keys of this tab while a user is logged in.
@@ -32,10 +31,8 @@ const LEAVE: &[Key] = &[
     Key::elsewhere(keys::ctrl('c'), "quit", ""),
 ];
 
-/// State of this tab.
 #[derive(Debug, Default)]
 pub struct Login {
-    /// The form that is filled in.
     form: Option<UserForm>,
     /// The password of the last login, kept while it may have to be changed.
     given: Option<Secret>,
@@ -114,7 +111,6 @@ impl Login {
         vec![UiAction::SessionRequest(Tab::Login, request)]
     }
 
-    /// A key of the form.
     fn on_typed(&mut self, cx: &ViewContext, event: KeyEvent) -> Option<Vec<UiAction>> {
         let Some(request) = self.form.as_mut()?.press(cx, event) else { return Some(Vec::new()) };
         if let SessionRequest::Login { password, .. } = &request {
@@ -141,7 +137,6 @@ impl Login {
         typing
     }
 
-    /// The session has changed.
     pub fn on_session_status(&mut self, cx: &ViewContext) {
         let session = cx.session;
         let user = session.who.as_ref().map(|who| &who.user);
@@ -172,7 +167,6 @@ impl Login {
     }
 }
 
-/// Is this the key that leaves a form?
 pub fn is_leave(event: KeyEvent) -> bool {
     keys::code(KeyCode::Esc).is(event)
 }

@@ -40,10 +40,8 @@ use crate::{
 const EVERY_S: f64 = 10.0;
 const TIMEOUT_S: f64 = 30.0;
 
-/// State of this tab.
 #[derive(Debug, Default)]
 pub struct Mimic {
-    /// The page that is shown.
     page: usize,
     /// The selected item, by its place in the picture.
     selected: Option<usize>,
@@ -169,7 +167,6 @@ impl Mimic {
         cx.def().mimic.pages.is_empty() || self.at_a_glance && Size::Normal <= cx.size
     }
 
-    /// Shows the overview.
     pub fn show_overview(&mut self) {
         self.at_a_glance = true;
     }

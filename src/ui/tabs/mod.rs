@@ -27,7 +27,7 @@ use ratatui::{
 };
 
 pub use listing::ListPage;
-use periodic_query::Queries;
+pub use periodic_query::{Answered, Queries};
 
 use super::{
     Effect, UiAction, ViewContext,
@@ -53,12 +53,10 @@ struct Outgoing {
 }
 
 impl Outgoing {
-    /// Asks for it.
     fn export_request(&self) -> UiAction {
         let file = self.path.display().to_string();
         UiAction::SessionRequest(self.tab, SessionRequest::Exported { file, sha256: sha256(&self.bytes) })
     }
-    /// Writes it.
     fn write(self) -> UiAction {
         UiAction::Do(Effect::SaveReport { tab: Some(self.tab), path: self.path, bytes: self.bytes, new: self.new })
     }
@@ -79,7 +77,6 @@ pub trait TabView: Keyed {
         !session_lock::is_closed(cx.session)
     }
 
-    /// Draws it.
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect);
 
     /// The list that is shown, if the page is one.
@@ -218,7 +215,6 @@ fn all_keys<T: KeyTable>(page: &T, cx: &ViewContext) -> Keys<T> {
 /// The table of tabs, in the order of their number keys from 0: name, field, state, title, help.
 macro_rules! tabs {
     ($($tab:ident $field:ident $state:ty: $title:literal, $help:literal;)+) => {
-        /// A tab.
         #[allow(missing_docs)]
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum Tab {
@@ -229,7 +225,6 @@ macro_rules! tabs {
             /// Every tab, in the order of its number key.
             pub const ALL: [Tab; [$(Tab::$tab),+].len()] = [$(Tab::$tab),+];
 
-            /// Its heading.
             pub fn title(self) -> &'static str {
                 match self { $(Tab::$tab => $title),+ }
             }
@@ -240,31 +235,26 @@ macro_rules! tabs {
             fn is_offered(self, cx: &ViewContext) -> bool {
                 match self { $(Tab::$tab => <$state>::is_offered(cx)),+ }
             }
-            /// The chords of each of its pages.
             #[cfg(test)]
             pub fn chords(self) -> keys::PageChords {
                 match self { $(Tab::$tab => <$state as KeyTable>::chords()),+ }
             }
         }
 
-        /// The state of all tabs.
         #[allow(missing_docs)]
         #[derive(Debug)]
         pub struct Tabs {
-            /// Which one is shown.
             pub shown: Tab,
             $(pub $field: $state),+
         }
 
         impl Tabs {
-            /// All tabs as they are at the start.
             pub fn new(snapshot: &Snapshot) -> Tabs {
                                 Tabs { shown: Tab::home(&snapshot.def), $($field: <$state>::new(snapshot)),+ }
             }
             fn of(&self, tab: Tab) -> &dyn TabView {
                 match tab { $(Tab::$tab => &self.$field),+ }
             }
-            /// The tab that a message is for.
             pub fn of_mut(&mut self, tab: Tab) -> &mut dyn TabView {
                 match tab { $(Tab::$tab => &mut self.$field),+ }
             }
@@ -286,7 +276,6 @@ tabs! {
 }
 
 impl Tab {
-    /// Those that there are here.
     pub fn offered(cx: &ViewContext) -> Vec<Tab> {
         Tab::ALL
             .into_iter()
@@ -335,11 +324,9 @@ impl Tab {
 }
 
 impl Tabs {
-    /// The shown tab.
     pub fn shown(&self) -> &dyn TabView {
         self.of(self.shown)
     }
-    /// The shown tab, to change it.
     pub fn shown_mut(&mut self) -> &mut dyn TabView {
         self.of_mut(self.shown)
     }

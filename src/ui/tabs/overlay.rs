@@ -42,7 +42,6 @@ impl Laid {
         Laid { label, from, to, figures: None, is_whole: false }
     }
 
-    /// A control run with its figures.
     pub fn of_run(run: &ControlRun, figures: [String; 5]) -> Laid {
         let to = (!run.is_running()).then_some(run.until);
         // What a procedure has measured has its name.
@@ -65,7 +64,6 @@ pub enum Kind {
     Batches,
     /// Control runs of one controller.
     Runs,
-    /// Periods.
     Periods,
 }
 
@@ -79,7 +77,6 @@ impl Kind {
     }
 }
 
-/// State of the page.
 #[derive(Debug)]
 pub struct Overlay {
     kind: Kind,
@@ -119,7 +116,6 @@ impl Overlay {
         }
     }
 
-    /// Shows another tag.
     pub fn next_tag(&mut self, by: isize) {
         self.tag = around(self.tag, by, self.tags.len());
         for (laid, curve) in &mut self.curves {
@@ -158,7 +154,6 @@ impl Overlay {
         self.curves.iter_mut().map(|(_, curve)| curve as &mut dyn Asked)
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let (theme, tag) = (cx.theme, self.tags[self.tag]);
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
@@ -208,14 +203,12 @@ impl Overlay {
         chart.render(canvas.area(), canvas.buffer());
     }
 
-    /// A row of the legend.
     fn columns(&self, cells: [&str; 7]) -> String {
         // A period has a date where a batch has a number.
         let (label, begin) = if self.kind == Kind::Periods { (7, 20) } else { (15, 12) };
         draw::columns([label, begin, -7, -9, -9, -9, -8], cells)
     }
 
-    /// The figures of one of them.
     fn row(&self, cx: &ViewContext, tag: TagId, laid: &Laid, curve: &Answered<Vec<Series>>) -> String {
         let begin = match self.kind {
             Kind::Batches | Kind::Runs => moment(laid.from, cx.now, &cx.def().time_zone),
@@ -264,7 +257,6 @@ pub trait Laying: Listing {
 /// A list whose marked rows lie over each other on request.
 #[derive(Debug)]
 pub struct Overlaid<L: Laying> {
-    /// The list.
     pub list: List<L>,
     /// Some of it over each other, in place of the list.
     pub overlay: Option<Overlay>,
@@ -298,7 +290,6 @@ impl<L: Laying> Overlaid<L> {
         self.overlay = Overlay::new(kind, laid, (tags, 0));
     }
 
-    /// The curves of another tag.
     pub fn next_tag(&mut self, by: isize) {
         self.overlay.iter_mut().for_each(|overlay| overlay.next_tag(by));
     }

@@ -60,7 +60,7 @@ impl PeriodicQuery {
     pub fn ask(
         &mut self,
         cx: &ViewContext,
-        tab: Tab,
+        tab: impl Into<Option<Tab>>,
         every: SignedDuration,
         timeout: SignedDuration,
         query: Query,
@@ -132,6 +132,10 @@ impl PeriodicQuery {
         self.on_way.is_some_and(|(on_way, _)| on_way == number)
     }
 
+    pub fn is_on_way(&self) -> bool {
+        self.on_way.is_some()
+    }
+
     /// Has what is shown changed since the last query went out?
     pub fn is_wanted(&self) -> bool {
         self.wanted
@@ -146,7 +150,6 @@ impl PeriodicQuery {
 /// What the history answered last to a periodic query, or why it could not.
 #[derive(Debug)]
 pub struct Answered<T> {
-    /// The query.
     pub query: PeriodicQuery,
     /// The last good answer.
     pub value: Option<T>,
@@ -165,7 +168,7 @@ impl<T: FromAnswer> Answered<T> {
     pub fn ask(
         &mut self,
         cx: &ViewContext,
-        tab: Tab,
+        tab: impl Into<Option<Tab>>,
         every: SignedDuration,
         timeout: SignedDuration,
         query: Query,
@@ -175,11 +178,17 @@ impl<T: FromAnswer> Answered<T> {
         }
         self.query.ask(cx, tab, every, timeout, query)
     }
+
+    /// Asks for the replay, what is on its way or not.
+    pub fn ask_once(&mut self, cx: &ViewContext, query: Query) -> UiAction {
+        let number = cx.numbers.next();
+        self.query.asked(number, cx.monotonic_now());
+        UiAction::query(None, number, query)
+    }
 }
 
 /// A query of a tab, and who takes its answer.
 pub trait Asked {
-    /// The query.
     fn query(&self) -> &PeriodicQuery;
 
     /// Takes the answer to query `number` if it is waited for.

@@ -35,7 +35,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         address::{AddressBase, TABLES},
-        live::{AddressSpan, LiveReading, ReplyTimes},
+        live::{AddressSpan, LiveRead, LiveReading, ReplyTimes},
         tag::{ByteOrder, Table},
     },
     profile::OwnProfiles,
@@ -45,7 +45,6 @@ use crate::{
 
 /// An answer that is not there after so long is asked for again: the line has dropped it.
 const LOST_AFTER: SignedDuration = SignedDuration::from_secs(15);
-/// State of this tab.
 #[derive(Debug)]
 pub struct Registers {
     /// Where it is shown: what it asks is answered there.
@@ -76,16 +75,13 @@ pub struct Registers {
     /// What is to be chosen from a list, and what is read for it.
     picking: Option<lists::Picking>,
     listed_spans: Vec<AddressSpan>,
-    /// The read of a map of addresses, and the number that is looked for in it.
-    value_search: Option<(u32, String)>,
     /// What came of a log, said with the next snapshot.
     said: Option<UiAction>,
     /// A list that was loaded and is not taken yet.
     preview: Option<preview::Preview>,
     /// A list that was pasted, which is read with the next snapshot.
     pasted: Option<String>,
-    /// Number and steady time of the read on its way, and what it reads.
-    on_way: Option<(u32, Timestamp, AddressSpan)>,
+    sent: Vec<SentRead>,
     relearn: bool,
     last: Option<LiveReading>,
     replies: ReplyTimes,
@@ -97,8 +93,27 @@ pub struct Registers {
     writing: writing::Writing,
     watch: watch::WatchList,
     comparison: Option<compare::Comparison>,
-    /// What the open prompt asks for.
     asking: Asking,
+}
+
+/// A read on its way.
+#[derive(Debug)]
+struct SentRead {
+    number: u32,
+    /// Steady time.
+    at: Timestamp,
+    what: ReadFor,
+}
+
+/// What a read is for; there is one of each at most.
+#[derive(Debug, PartialEq)]
+enum ReadFor {
+    Window(AddressSpan),
+    /// The window of another unit.
+    Comparison(AddressSpan),
+    Recognition,
+    /// What a map of addresses has found, in which this number is looked for.
+    Search(String),
 }
 
 /// What a text that was entered means.
@@ -141,11 +156,10 @@ impl TabView for Registers {
             profiles: OwnProfiles::default(),
             picking: None,
             listed_spans: Vec::new(),
-            value_search: None,
             said: None,
             preview: None,
             pasted: None,
-            on_way: None,
+            sent: Vec::new(),
             relearn: false,
             last: None,
             replies: ReplyTimes::default(),
@@ -165,7 +179,7 @@ impl TabView for Registers {
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        view::copied(self, cx)
+        self.list(cx).map_or_else(|| view::copied(self, cx), |list| list.copied(cx))
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
@@ -200,71 +214,42 @@ impl TabView for Registers {
         self.name_by_plant(cx.snapshot);
         let mut actions = self.watch_time(cx);
         self.follow_graph(cx);
-        let now = cx.monotonic_now();
-        let wanted = self
-            .on_way
-            .is_some_and(|(_, at, span)| span != self.span(cx) || (LOST_AFTER + self.period) < now.duration_since(at));
         actions.extend(self.recognise(cx));
         // A window closes when a session begins.
         actions.extend(self.said.take_if(|_| cx.session.who.is_some()));
         if let Some(text) = self.pasted.take_if(|_| cx.session.who.is_some()) {
             actions.extend(self.load_list(cx, text.as_bytes()));
         }
-        if !self.paused && (self.on_way.is_none() || wanted) {
+        if !self.paused && !self.is_on_way(cx, &ReadFor::Window(self.span(cx))) {
             actions.extend(self.ask(cx, None));
         }
         actions
     }
 
     fn awaits(&mut self, number: u32) -> bool {
-        self.on_way.is_some_and(|(on_way, ..)| on_way == number)
-            || self.value_search.as_ref().is_some_and(|(search, _)| *search == number)
-            || self.recognition.awaits(number)
-            || self.comparison.as_ref().is_some_and(|comparison| comparison.awaits(number))
+        self.sent.iter().any(|sent| sent.number == number)
     }
 
     fn on_answer(&mut self, cx: &ViewContext, number: u32, answer: Result<Answer, HistoryError>) -> Vec<UiAction> {
-        if let Some((_, text)) = self.value_search.take_if(|(search, _)| *search == number) {
-            reading_of(answer).iter().for_each(|reading| self.cells.on_reading(reading));
-            return self.list_of(cx, lists::What::Hits(text));
-        }
-        if self.recognition.awaits(number) {
-            return self.on_probed(cx, reading_of(answer));
-        }
-        if self.comparison.as_ref().is_some_and(|comparison| comparison.awaits(number)) {
-            self.on_compared(reading_of(answer));
-            return Vec::new();
-        }
-        if self.on_way.take_if(|(on_way, ..)| *on_way == number).is_none() {
-            return Vec::new();
-        }
-        let reading = match answer {
-            Ok(Answer::Registers(reading)) => reading,
-            Ok(_) => return Vec::new(),
-            Err(error) => {
-                self.trouble = Some(error.to_string());
-                return Vec::new();
+        let Some(sent) = self.sent.iter().position(|sent| sent.number == number) else { return Vec::new() };
+        let what = self.sent.swap_remove(sent).what;
+        let reading = answer.map(|answer| LiveReading::from_answer(&answer));
+        match (what, reading) {
+            (ReadFor::Search(text), reading) => {
+                reading.ok().flatten().iter().for_each(|reading| self.cells.on_reading(reading));
+                self.list_of(cx, lists::PicksOf::Hits(text))
             }
-        };
-        self.trouble = None;
-        self.reads += 1;
-        reading.response_time.into_iter().for_each(|reply| self.replies.see(reply));
-        self.cells.on_reading(&reading);
-        self.name_by_profile();
-        self.follow_list(cx);
-        let began = reading.began;
-        let early = self.due.filter(|due| began + self.period / 2 < *due && *due <= began + self.period);
-        let mut actions = self.watch_reading(&reading, early.is_none());
-        self.took = cx.monotonic_now().duration_since(began);
-        self.last = Some(reading);
-        if self.paused {
-            return actions;
+            (ReadFor::Recognition, reading) => self.on_probed(cx, reading.ok().flatten()),
+            (ReadFor::Comparison(_), reading) => {
+                self.on_compared(reading.ok().flatten());
+                Vec::new()
+            }
+            (ReadFor::Window(_), Ok(reading)) => reading.map_or(Vec::new(), |reading| self.on_window(cx, reading)),
+            (ReadFor::Window(_), Err(error)) => {
+                self.trouble = Some(error.to_string());
+                Vec::new()
+            }
         }
-        actions.extend(self.read_compared(cx));
-        actions.extend(self.recognise(cx));
-        self.due = early.or_else(|| began.checked_add(self.period).ok());
-        actions.extend(self.ask(cx, self.due));
-        actions
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
@@ -313,14 +298,24 @@ impl TabView for Registers {
 }
 
 impl Registers {
+    /// Reads, in place of an earlier read for the same.
+    fn send(&mut self, cx: &ViewContext, what: ReadFor, read: LiveRead) -> UiAction {
+        let (number, at) = (cx.numbers.next(), cx.monotonic_now());
+        self.sent.retain(|sent| std::mem::discriminant(&sent.what) != std::mem::discriminant(&what));
+        self.sent.push(SentRead { number, at, what });
+        UiAction::query(self.tab, number, Query::Registers(read))
+    }
+
+    /// Is this very read on its way, and not lost?
+    fn is_on_way(&self, cx: &ViewContext, what: &ReadFor) -> bool {
+        let lost = LOST_AFTER + self.period;
+        self.sent.iter().any(|sent| sent.what == *what && cx.monotonic_now().duration_since(sent.at) <= lost)
+    }
+
     fn ask_text(&mut self, asking: Asking, title: &str, hint: &str) -> Vec<UiAction> {
         self.asking = asking;
         vec![UiAction::Open(Modal::Prompt(Prompt::new(title, hint, "")))]
     }
-}
-
-fn reading_of(answer: Result<Answer, HistoryError>) -> Option<LiveReading> {
-    answer.ok().and_then(|answer| if let Answer::Registers(read) = answer { Some(read) } else { None })
 }
 
 fn next<T: PartialEq + Copy>(all: &[T], now: T) -> T {

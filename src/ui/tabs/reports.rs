@@ -17,7 +17,7 @@ use self::{
     batches::{BatchReports, Batches},
     export::Export,
     made::AutomaticReportsPage,
-    rows::Rows,
+    rows::RecordRows,
 };
 use super::Outgoing;
 use crate::ui::tabs::prelude::*;
@@ -31,10 +31,8 @@ use crate::{
     ui::{tabs::trends::span::View, widgets::chart},
 };
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Reports>;
 
-/// Keys of this tab.
 const KEYS: &[Key] = &[
     Key::change(code(KeyCode::Left), "earlier", "previous shift", |reports, cx| reports.step(cx, -1)),
     Key::change(code(KeyCode::Right), "later", "next shift", |reports, cx| reports.step(cx, 1)),
@@ -55,13 +53,13 @@ const KEYS: &[Key] = &[
         reports.set_preview(cx);
     }),
     Key::change(char('n'), "rows", "date, time, SV, PV and ER, row by row", |reports, _| {
-        (reports.rows.shown, reports.export) = (true, Export::Not);
+        (reports.page, reports.export) = (Page::Rows, Export::Not);
     }),
     Key::change(char(';'), "", "CSV with , and . or with ; and ,", |reports, cx| {
         (reports.dialect, reports.export) = (reports.dialect.toggled(cx.def().report.csv), Export::Not);
     }),
     Key::change(char('r'), "automatic", "the reports that the station makes by itself", |reports, _| {
-        (reports.made.shown, reports.export) = (true, Export::Not);
+        (reports.page, reports.export) = (Page::Made, Export::Not);
         reports.made.list.answered.query.want();
     }),
     Key::change(char('t'), "tag", "chart of the next tag (110 columns or more)", |reports, _| reports.next_tag(1)),
@@ -81,7 +79,7 @@ const KEYS: &[Key] = &[
 
 /// The key of a plant that makes batches.
 const BATCHES: &[Key] = &[Key::change(char('b'), "batches", "the list of batches", |reports, _| {
-    (reports.batches_shown, reports.export) = (true, Export::Not);
+    (reports.page, reports.export) = (Page::Batches, Export::Not);
     reports.batches.list.answered.query.want();
 })
 .when(|_, cx| Offer::only_if(!cx.def().batches.is_empty()))];
@@ -92,9 +90,22 @@ const EVERY_S: f64 = 30.0;
 /// A report over weeks may take its time.
 const TIMEOUT_S: f64 = 60.0;
 
-/// State of this tab.
+/// What is shown.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Page {
+    /// The report of a period: its figures, or the text that it is written as.
+    #[default]
+    Report,
+    /// The rows of its record.
+    Rows,
+    Batches,
+    /// The reports that the station makes by itself.
+    Made,
+}
+
 #[derive(Debug)]
 pub struct Reports {
+    page: Page,
     /// The period shown; `None` only at the very ends of the calendar.
     period: Option<Period>,
     /// No period is chosen: the running shift is shown.
@@ -104,11 +115,9 @@ pub struct Reports {
     /// The row whose tag has the chart, and its curve.
     charted: usize,
     curve: Answered<Vec<Series>>,
-    /// The batches, while they are shown in place of a report.
     batches: Batches,
-    batches_shown: bool,
     made: AutomaticReportsPage,
-    rows: Rows,
+    rows: RecordRows,
     dialect: CsvDialect,
     format: &'static dyn ReportFormat,
     /// The report as text, while that is shown.
@@ -126,15 +135,15 @@ pub struct Reports {
 impl TabView for Reports {
     fn new(snapshot: &Snapshot) -> Reports {
         Reports {
+            page: Page::Report,
             period: period::at(&snapshot.def, snapshot.at),
             follow: true,
             report: Answered::default(),
             charted: 0,
             curve: Answered::default(),
             batches: Batches::new(BatchReports),
-            batches_shown: false,
             made: AutomaticReportsPage::default(),
-            rows: Rows::default(),
+            rows: RecordRows::default(),
             dialect: snapshot.def.report.csv,
             format: report::FORMATS[0],
             preview: None,
@@ -180,7 +189,7 @@ impl TabView for Reports {
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        if self.rows.shown {
+        if self.page == Page::Rows {
             self.rows.on_text(cx, self.report.value.as_deref(), text)?;
             return Ok(Vec::new());
         }
@@ -195,31 +204,27 @@ impl TabView for Reports {
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
-        if self.made.shown {
-            return self.made.view(cx, frame, area);
-        }
-        if self.rows.shown {
-            return view::draw_rows(self, cx, frame, area);
-        }
-        match self.batches_shown {
-            true => self.batches.view(cx, frame, area, view::export_words(self, cx, &self.batches_path(cx))),
-            false => view::draw(self, cx, frame, area),
+        match self.page {
+            Page::Report => view::draw(self, cx, frame, area),
+            Page::Rows => view::draw_rows(self, cx, frame, area),
+            Page::Batches => self.batches.view(cx, frame, area, view::export_words(self, cx, &self.batches_path(cx))),
+            Page::Made => self.made.view(cx, frame, area),
         }
     }
 
     fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
-        match (self.made.shown, self.batches_shown && !self.rows.shown) {
-            (true, _) => self.made.list(),
-            (false, true) => self.batches.shown(),
-            (false, false) => None,
+        match self.page {
+            Page::Report | Page::Rows => None,
+            Page::Batches => self.batches.shown(),
+            Page::Made => self.made.list(),
         }
     }
 
     fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
-        match (self.made.shown, self.batches_shown && !self.rows.shown) {
-            (true, _) => self.made.list_mut(),
-            (false, true) => self.batches.shown_mut(),
-            (false, false) => None,
+        match self.page {
+            Page::Report | Page::Rows => None,
+            Page::Batches => self.batches.shown_mut(),
+            Page::Made => self.made.list_mut(),
         }
     }
 
@@ -227,30 +232,26 @@ impl TabView for Reports {
         if self.list_mut(cx).is_some_and(|list| list.back(cx)) {
             return true;
         }
-        if self.made.shown {
-            self.made.shown = self.made.open.take().is_some();
-            return true;
+        match self.page {
+            Page::Report => self.preview.take().is_some() || self.report.query.cancel(cx),
+            Page::Batches if self.batches.overlay.take().is_some() => true,
+            Page::Made if self.made.open.take().is_some() => true,
+            Page::Rows | Page::Batches | Page::Made => {
+                self.page = Page::Report;
+                true
+            }
         }
-        if self.batches_shown {
-            self.batches_shown = self.batches.overlay.take().is_some();
-            return true;
-        }
-        std::mem::take(&mut self.rows.shown) || self.preview.take().is_some() || self.report.query.cancel(cx)
     }
 }
 
 impl KeyTable for Reports {
     fn keys(&self, _cx: &ViewContext) -> Keys<Reports> {
-        let tables: &[&'static [Key]] = if self.made.shown {
-            self.made.keys()
-        } else if self.rows.shown {
-            rows::KEYS
-        } else if self.batches_shown {
-            self.batches.keys()
-        } else {
-            &[KEYS, BATCHES, counters::KEYS, &SCROLL]
-        };
-        Keys::of(tables)
+        Keys::of(match self.page {
+            Page::Report => &[KEYS, BATCHES, counters::KEYS, &SCROLL],
+            Page::Rows => rows::KEYS,
+            Page::Batches => self.batches.keys(),
+            Page::Made => self.made.keys(),
+        })
     }
 
     fn before_key(&mut self) {
@@ -303,7 +304,7 @@ impl Reports {
 
     /// The tag that has the chart, and the part of the period that is over, where there is room for it.
     fn chart(&self, cx: &ViewContext) -> Option<(Pen, View)> {
-        let free = !self.batches_shown && !self.made.shown && !self.rows.shown && self.preview.is_none();
+        let free = self.page == Page::Report && self.preview.is_none();
         let room = view::chart_columns(cx).filter(|_| free)?;
         let rows = &self.report.value.as_ref()?.tags;
         let tag = cx.def().tag_named(&rows.get(self.charted)?.tag)?;
@@ -331,11 +332,10 @@ impl Reports {
         // The past stays as it is; but a report that was read while its shift still ran is not the last word.
         let closed = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
         let every = if closed && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
-        if self.made.shown {
-            return self.made.ask(cx);
-        }
-        if self.batches_shown {
-            return self.batches.ask(cx, Tab::Reports);
+        match self.page {
+            Page::Report | Page::Rows => {}
+            Page::Batches => return self.batches.ask(cx, Tab::Reports),
+            Page::Made => return self.made.ask(cx),
         }
         let Some(period) = self.period.clone() else { return Vec::new() };
         let query = self.report.ask(cx, Tab::Reports, every, real(cx, TIMEOUT_S), Query::Report { period });

@@ -62,7 +62,6 @@ const COMMIT_LAG_S: f64 = 3.0;
 /// Columns of the last hour, a minute each.
 const HOUR_COLUMNS: usize = 60;
 
-/// State of this tab.
 #[derive(Debug, Default)]
 pub struct Trends {
     /// Groups of the plant, and behind them the tags that were picked in the list of values.
@@ -98,7 +97,6 @@ pub struct Trends {
     end: Option<Timestamp>,
     /// Earlier and later windows, to go back to.
     visited: Visited,
-    /// Cursor A.
     cursor: Option<Timestamp>,
     /// Cursor B, and what lies between both.
     between: Between,
@@ -106,7 +104,6 @@ pub struct Trends {
     replayed: Option<Timestamp>,
     /// The list of values instead of the curves: first row shown, row selected.
     values: Option<(usize, usize)>,
-    /// Those that are listed.
     filter: Words,
     /// When the tab last got a snapshot.
     seen: Option<Timestamp>,
@@ -124,15 +121,10 @@ pub struct Trends {
     ended: bool,
 }
 
-/// What a typed text is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum Asking {
-    /// A time to go to.
     #[default]
     Time,
-    /// The values that are listed.
-    Filter,
-    /// The scale of a pen.
     Scale(TagId),
     /// The periods that lie over each other.
     Overlay,
@@ -144,6 +136,14 @@ impl TabView for Trends {
     fn new(_snapshot: &Snapshot) -> Trends {
         let window = WINDOWS.iter().position(|window| *window == 600).unwrap_or(0);
         Trends { window, rate: 1, ..Trends::default() }
+    }
+
+    fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
+        self.values.map(|_| self as &dyn ListPage)
+    }
+
+    fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
+        self.values.map(|_| self as &mut dyn ListPage)
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
@@ -206,11 +206,11 @@ impl TabView for Trends {
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
-        if self.overlay.take().is_some() {
+        if self.overlay.take().is_some() || self.list_mut(cx).is_some_and(|list| list.back(cx)) {
             return true;
         }
         let cancelled = [&mut self.curves, &mut self.hours.query].map(|query| query.cancel(cx));
-        cancelled.contains(&true) || self.values.is_some() && self.leave_values()
+        cancelled.contains(&true) || self.values.take().is_some()
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
@@ -228,7 +228,6 @@ impl TabView for Trends {
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         match self.asking {
             Asking::Time => self.go_to(cx, text)?,
-            Asking::Filter => self.filter_values(text),
             Asking::Scale(tag) => self.set_scale(tag, text)?,
             Asking::Overlay => self.lay_over(cx, text)?,
         }

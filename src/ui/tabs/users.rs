@@ -15,10 +15,8 @@ use crate::{
     },
 };
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Users>;
 
-/// Keys of the list of users.
 const LIST: &[Key] = &[
     Key::new(char('n'), "new", "add a user", Users::add)
         .when(|_, cx| if cx.session.users.is_empty() { Offer::Unlisted } else { Offer::Footer }),
@@ -43,7 +41,6 @@ fn has_users(_: &Users, cx: &ViewContext) -> Offer {
     Offer::only_if(!cx.session.users.is_empty())
 }
 
-/// State of this tab.
 #[derive(Debug, Default)]
 pub struct Users {
     list: List<UserList>,
@@ -143,7 +140,6 @@ impl Users {
     }
 }
 
-/// The users of the station.
 #[derive(Debug, Default)]
 struct UserList;
 

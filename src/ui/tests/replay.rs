@@ -40,7 +40,6 @@ fn past(at: Timestamp, pv: f64) -> Answer {
     Answer::Past(Box::new(Past { at, samples, events: Vec::new(), minutes: vec![None] }))
 }
 
-/// The queries of the replay.
 fn asked(effects: &[Effect]) -> Vec<(u32, Query)> {
     let of_replay = |effect: &Effect| match effect {
         Effect::Query(QueryId { tab: None, number }, query) => Some((*number, query.clone())),

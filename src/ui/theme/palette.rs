@@ -17,11 +17,9 @@ pub(super) enum Role {
     Strong,
     /// Liquid in a vessel.
     Liquid,
-    /// Setpoints.
     SetValue,
     /// Trouble of the program itself.
     Trouble,
-    /// Uncertain values.
     Uncertain,
     /// Alarms of the first priority.
     Critical,

@@ -32,7 +32,6 @@ const MARK_CELLS: i64 = 24;
 
 /// What is drawn. Nothing appears before `from`, from `to` on or after `now`.
 pub struct Chart<'a> {
-    /// Looks.
     pub theme: &'a Theme,
     /// The local time of the labels; `None` counts from the left edge.
     pub zone: Option<&'a TimeZone>,
@@ -72,7 +71,6 @@ pub struct Limit {
 /// One pen.
 #[derive(Debug, Clone, Copy)]
 pub struct Curve<'a> {
-    /// Its data.
     pub trace: &'a Trace,
     /// Its number in the group: picks mark and colour, and stays the same when others are switched off.
     pub pen: usize,
@@ -86,7 +84,6 @@ pub struct Curve<'a> {
     pub clipped: bool,
     /// The value of the last digit shown.
     pub resolution: f64,
-    /// How it is drawn.
     pub stroke: Stroke,
     /// A broken line: a written value, not a measured one.
     pub dashed: bool,

@@ -35,7 +35,7 @@ pub fn query(line: LineId, now: Timestamp) -> Query {
 
 /// One column of bars: the worst share of failures in it, the mean share of busy time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Column {
+pub struct TrendColumn {
     /// 0–1; `None` if nothing was asked.
     pub failed: Option<f64>,
     /// 0–1.
@@ -43,7 +43,7 @@ pub struct Column {
 }
 
 /// The minutes of the span that ends `now`, in so many columns; `None` where the station did not run.
-pub fn columns(minutes: &[LineMinute], now: Timestamp, count: usize) -> Vec<Option<Column>> {
+pub fn columns(minutes: &[LineMinute], now: Timestamp, count: usize) -> Vec<Option<TrendColumn>> {
     let span = SPAN.as_secs_f64();
     let mut columns: Vec<Vec<&LineMinute>> = vec![Vec::new(); count];
     for minute in minutes {
@@ -58,7 +58,7 @@ pub fn columns(minutes: &[LineMinute], now: Timestamp, count: usize) -> Vec<Opti
     let column = |minutes: Vec<&LineMinute>| {
         let busy = minutes.iter().map(|minute| f64::from(minute.utilisation)).sum::<f64>() / minutes.len() as f64;
         let failed = minutes.iter().filter_map(|minute| minute.failed()).reduce(f64::max);
-        (!minutes.is_empty()).then_some(Column { failed, busy })
+        (!minutes.is_empty()).then_some(TrendColumn { failed, busy })
     };
     columns.into_iter().map(column).collect()
 }

@@ -4,16 +4,13 @@ use crossterm::event::{KeyCode, KeyEvent};
 
 use crate::{plant::number::to_u16, text::searchable, ui::keys};
 
-/// A movement in a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Motion {
     /// So many rows down.
     Rows(isize),
     /// So many screens down.
     Pages(isize),
-    /// To the first row.
     First,
-    /// To the last row.
     Last,
 }
 
@@ -102,11 +99,9 @@ impl<K> Default for Selected<K> {
 }
 
 impl<K: PartialEq> Selected<K> {
-    /// Its place.
     pub fn place(&self, rows: impl IntoIterator<Item = K>) -> usize {
         rows.into_iter().position(|row| self.0.as_ref() == Some(&row)).unwrap_or(0)
     }
-    /// Selects another row.
     pub fn on(&mut self, motion: Motion, rows: impl IntoIterator<Item = K>, room: usize) {
         let mut rows: Vec<K> = rows.into_iter().collect();
         let place = rows.iter().position(|row| self.0.as_ref() == Some(row)).unwrap_or(0);
@@ -128,7 +123,6 @@ impl Words {
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
-    /// Does it let this text through?
     pub fn fit(&self, text: &str) -> bool {
         self.is_empty() || {
             let text = searchable(text).to_lowercase();

@@ -80,7 +80,6 @@ impl<'a> Canvas<'a> {
     pub(crate) fn text_centred(&mut self, y: impl Number, text: &str, style: Style) {
         self.text(self.width().saturating_sub(width(text)) / 2, y, text, style);
     }
-    /// One character.
     pub(crate) fn glyph(&mut self, x: impl Number, y: impl Number, glyph: char, style: Style) {
         if let Some(cell) = self.cell(to_u16(x), to_u16(y)) {
             cell.set_char(glyph).set_style(style);

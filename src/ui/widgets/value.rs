@@ -26,7 +26,6 @@ pub struct Shown {
     pub note: String,
     /// A number, which is shown whole or not at all; words may be cut with a mark.
     pub number: bool,
-    /// Look of the text.
     pub style: Style,
 }
 
@@ -66,7 +65,6 @@ pub fn line(cx: &ViewContext, tag: TagId) -> String {
     [def.name.clone(), shown.text, shown.unit, quality, text::stamp(sample.at, &cx.def().time_zone)].join("\t")
 }
 
-/// The value in words.
 fn words(cx: &ViewContext, tag: TagId) -> Option<String> {
     let def = cx.def().tag(tag);
     if def.is_text() {

@@ -62,7 +62,6 @@ impl Field {
         let chosen = all.iter().position(|one| *one == now).unwrap_or(0);
         Field::choice(label, all.iter().map(|one| words(*one)), chosen)
     }
-    /// With what may be typed.
     pub fn within(self, range: impl Into<String>) -> Field {
         Field { range: range.into(), ..self }
     }

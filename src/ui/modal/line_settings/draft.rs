@@ -14,7 +14,7 @@ use crate::{
 
 /// The fields of the form, in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Row {
+pub(super) enum Setting {
     Mode,
     Port,
     Baud,
@@ -27,12 +27,12 @@ pub(super) enum Row {
     Gap,
 }
 
-impl Row {
+impl Setting {
     /// The unit of the field in this place.
     pub fn unit(n: usize) -> &'static str {
         match n {
-            n if n == Row::Timeout as usize || n == Row::Gap as usize => "ms",
-            n if n == Row::Baud as usize => "bit/s",
+            n if n == Setting::Timeout as usize || n == Setting::Gap as usize => "ms",
+            n if n == Setting::Baud as usize => "bit/s",
             _ => "",
         }
     }
@@ -89,7 +89,7 @@ impl Draft {
             Field::digits(t!("timeout"), settings.timeout.as_millis()),
             Field::digits(t!("gap"), settings.gap.as_millis()),
         ];
-        let first = if is_serial { Row::Baud } else { Row::NetworkPort };
+        let first = if is_serial { Setting::Baud } else { Setting::NetworkPort };
         let form = Form::submitting(fields, first as usize);
         let mut draft = Draft { base: settings.clone(), rs485, bauds, form };
         draft.fit();
@@ -97,7 +97,7 @@ impl Draft {
     }
 
     fn mode(&self) -> (Option<Protocol>, Framing) {
-        MODES[self.form.chosen(Row::Mode as usize)]
+        MODES[self.form.chosen(Setting::Mode as usize)]
     }
 
     /// Are data bits a choice? Modbus RTU always has 8.
@@ -108,19 +108,19 @@ impl Draft {
     /// Another mode has other fields, and other data bits are usual there.
     pub fn on_mode(&mut self) {
         let framing = self.mode().1;
-        self.form.replace(Row::DataBits as usize, data_bits(framing, usual_data_bits(framing == Framing::Ascii)));
+        self.form.replace(Setting::DataBits as usize, data_bits(framing, usual_data_bits(framing == Framing::Ascii)));
         self.fit();
     }
 
     fn fit(&mut self) {
         let protocol = self.mode().0;
         let port = if protocol == Some(Protocol::Udp) { t!("UDP port") } else { t!("TCP port") };
-        self.form.label_with(Row::NetworkPort as usize, port);
+        self.form.label_with(Setting::NetworkPort as usize, port);
         let is_serial = protocol.is_none();
-        for row in [Row::Port, Row::Baud, Row::DataBits, Row::Parity, Row::StopBits] {
+        for row in [Setting::Port, Setting::Baud, Setting::DataBits, Setting::Parity, Setting::StopBits] {
             self.form.hide(row as usize, !is_serial);
         }
-        for row in [Row::Host, Row::NetworkPort] {
+        for row in [Setting::Host, Setting::NetworkPort] {
             self.form.hide(row as usize, is_serial);
         }
     }
@@ -132,8 +132,8 @@ impl Draft {
         }
         let settings = LineDef {
             transport: self.transport()?,
-            timeout: self.millis(Row::Timeout)?,
-            gap: self.millis(Row::Gap)?,
+            timeout: self.millis(Setting::Timeout)?,
+            gap: self.millis(Setting::Gap)?,
             ..self.base.clone()
         };
         match check_settings(&settings).into_iter().next() {
@@ -143,23 +143,24 @@ impl Draft {
     }
 
     fn transport(&self) -> Result<Transport, String> {
-        let (text, chosen) = (|row: Row| self.form.text(row as usize), |row: Row| self.form.chosen(row as usize));
+        let (text, chosen) =
+            (|row: Setting| self.form.text(row as usize), |row: Setting| self.form.chosen(row as usize));
         let (protocol, framing) = self.mode();
         let Some(protocol) = protocol else {
             let serial = Serial {
-                baud: self.bauds[chosen(Row::Baud)],
-                data_bits: text(Row::DataBits).parse().unwrap_or_else(|_| usual_data_bits(false)),
-                parity: Parity::ALL[chosen(Row::Parity)],
-                stop_bits: STOP_BITS[chosen(Row::StopBits)],
+                baud: self.bauds[chosen(Setting::Baud)],
+                data_bits: text(Setting::DataBits).parse().unwrap_or_else(|_| usual_data_bits(false)),
+                parity: Parity::ALL[chosen(Setting::Parity)],
+                stop_bits: STOP_BITS[chosen(Setting::StopBits)],
             };
-            return Ok(Transport::Serial { port: text(Row::Port), serial, framing, rs485: self.rs485 });
+            return Ok(Transport::Serial { port: text(Setting::Port), serial, framing, rs485: self.rs485 });
         };
-        let port = text(Row::NetworkPort);
+        let port = text(Setting::NetworkPort);
         let port = port.parse().map_err(|_| t!("\"{text}\" is not a port, expected 1 to 65535", text = port))?;
-        Ok(Transport::Network { protocol, host: text(Row::Host), port, framing })
+        Ok(Transport::Network { protocol, host: text(Setting::Host), port, framing })
     }
 
-    fn millis(&self, row: Row) -> Result<Duration, String> {
+    fn millis(&self, row: Setting) -> Result<Duration, String> {
         let (name, text) = (self.form.label(row as usize), self.form.text(row as usize));
         let number =
             text.parse().map_err(|_| t!("{name} \"{text}\" is not a whole number of milliseconds", name, text));

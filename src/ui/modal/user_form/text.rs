@@ -35,7 +35,6 @@ impl UserForm {
         hints
     }
 
-    /// Its heading.
     pub fn title(&self) -> String {
         match &self.purpose {
             Purpose::First => t!("the first Supervisor").to_owned(),

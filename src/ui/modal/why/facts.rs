@@ -4,7 +4,7 @@ use crate::t;
 use std::time::Duration;
 
 use super::{service, value, wire};
-use crate::ui::modal::sheet::Row;
+use crate::ui::modal::sheet::Fact;
 use crate::{
     bus::source_frame,
     plant::{
@@ -14,8 +14,7 @@ use crate::{
     ui::ViewContext,
 };
 
-/// All rows about a tag.
-pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
+pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Fact> {
     let def = cx.def().tag(tag);
     let device = cx.def().device(def.device);
     let exchange = cx.snapshot.source_frames[tag.index()].as_deref();
@@ -26,12 +25,12 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
         return rows;
     }
     let label = if def.is_text() { t!("text") } else { t!("number") };
-    rows.push(Row::new(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
-    rows.push(Row::new(t!("address"), wire::place(cx, def, device), cx.theme.normal()));
-    rows.push(Row::new("", wire::point(def), cx.theme.normal()));
+    rows.push(Fact::new(label, value::number(cx, def, exchange, found.as_ref()), cx.theme.normal()));
+    rows.push(Fact::new(t!("address"), wire::place(cx, def, device), cx.theme.normal()));
+    rows.push(Fact::new("", wire::point(def), cx.theme.normal()));
     let dissection = exchange.map(|exchange| wire::exchange_rows(cx, def, exchange, found.as_ref(), room, &mut rows));
     if exchange.is_none() {
-        rows.push(Row::new(t!("request"), wire::never_asked(cx, def).to_owned(), cx.theme.normal()));
+        rows.push(Fact::new(t!("request"), wire::never_asked(cx, def).to_owned(), cx.theme.normal()));
     }
     rows.extend(service::device_rows(cx, def, device, exchange));
     rows.extend(service::poll_rows(cx, def));
@@ -42,8 +41,8 @@ pub(super) fn rows(cx: &ViewContext, tag: TagId, room: u16) -> Vec<Row> {
 }
 
 /// What it is calculated from: the expression, and each input as it is now.
-fn calculation_rows(cx: &ViewContext, calculation: &Calculation) -> Vec<Row> {
-    let mut rows = vec![Row::new(t!("expression"), calculation.text.clone(), cx.theme.normal())];
+fn calculation_rows(cx: &ViewContext, calculation: &Calculation) -> Vec<Fact> {
+    let mut rows = vec![Fact::new(t!("expression"), calculation.text.clone(), cx.theme.normal())];
     for (n, input) in calculation.inputs().into_iter().enumerate() {
         let (def, sample) = (cx.def().tag(input), cx.snapshot.sample(input));
         let value = match sample.exact() {
@@ -53,7 +52,7 @@ fn calculation_rows(cx: &ViewContext, calculation: &Calculation) -> Vec<Row> {
         };
         let style = if sample.quality.is_good() { cx.theme.normal() } else { cx.theme.trouble() };
         let label = if n == 0 { t!("inputs") } else { "" };
-        rows.push(Row::new(label, format!("{}  {value}{}", def.name, sample.quality), style));
+        rows.push(Fact::new(label, format!("{}  {value}{}", def.name, sample.quality), style));
     }
     rows
 }

@@ -4,7 +4,7 @@ use crate::t;
 use std::time::Duration;
 
 use super::facts::span;
-use crate::ui::modal::sheet::Row;
+use crate::ui::modal::sheet::Fact;
 use crate::{
     plant::{
         def::DeviceDef,
@@ -23,7 +23,12 @@ use crate::{
 };
 
 /// How the device stands, how fast it answers, what went wrong last; and its line, if that is not well.
-pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, exchange: Option<&Exchange>) -> Vec<Row> {
+pub(super) fn device_rows(
+    cx: &ViewContext,
+    def: &TagDef,
+    device: &DeviceDef,
+    exchange: Option<&Exchange>,
+) -> Vec<Fact> {
     let theme = cx.theme;
     let status = cx.snapshot.device(device.id);
     let line = cx.snapshot.line(device.line);
@@ -36,30 +41,38 @@ pub(super) fn device_rows(cx: &ViewContext, def: &TagDef, device: &DeviceDef, ex
         text += &t!(", {failed} of the last {of} failed", failed, of);
     }
     let well = matches!(status.state, DeviceState::Responding | DeviceState::Unknown);
-    let mut rows = vec![Row::new(t!("device"), text, if well { theme.normal() } else { theme.trouble() })];
+    let mut rows = vec![Fact::new(t!("device"), text, if well { theme.normal() } else { theme.trouble() })];
     rows.extend(status.diagnosis.map(|reason| {
         let signal = reason.signal();
-        Row::new("", format!("{} {}: {reason}", signal.word(), crate::text::translate(signal.label())), theme.trouble())
+        Fact::new(
+            "",
+            format!("{} {}: {reason}", signal.word(), crate::text::translate(signal.label())),
+            theme.trouble(),
+        )
     }));
     // What stands above already is not said again.
     let notes = cx.snapshot.sample(def.id).quality.cause() == Some(Cause::NotConnected);
     rows.extend(
-        line_words(cx, &line.state).filter(|_| !notes).map(|words| Row::new(t!("line"), words, theme.trouble())),
+        line_words(cx, &line.state).filter(|_| !notes).map(|words| Fact::new(t!("line"), words, theme.trouble())),
     );
     let verdict = exchange.and_then(|exchange| exchange.outcome.err());
     if let Some((at, fault)) = status.last_fault.filter(|(_, fault)| Some(*fault) != verdict) {
         let ago = age(elapsed(at, cx.now));
-        rows.push(Row::new("", t!("last fault {ago} ago: {fault}", ago, fault), theme.dim()));
+        rows.push(Fact::new("", t!("last fault {ago} ago: {fault}", ago, fault), theme.dim()));
     }
     rows
 }
 
 /// When it is read, with whom, and whether that works out.
-pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
+pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Fact> {
     let line = cx.snapshot.line(cx.def().device(def.device).line);
     let Some(report) = &line.report else { return Vec::new() };
     if report.refused.contains(&def.id) {
-        return vec![Row::new(t!("poll"), t!("no longer polled: the device refuses this address"), cx.theme.trouble())];
+        return vec![Fact::new(
+            t!("poll"),
+            t!("no longer polled: the device refuses this address"),
+            cx.theme.trouble(),
+        )];
     }
     let Some(poll) = report.poll_of(def.id) else { return Vec::new() };
     let period = match poll.poll {
@@ -87,7 +100,7 @@ pub(super) fn poll_rows(cx: &ViewContext, def: &TagDef) -> Vec<Row> {
         text += &t!(", jitter {span}", span = span(p99));
     }
     text += &t!(", takes {span}", span = span(poll.cost));
-    vec![Row::new(
+    vec![Fact::new(
         t!("poll"),
         text,
         if poll.stats.missed == 0 && busy.is_empty() { cx.theme.normal() } else { cx.theme.trouble() },

@@ -3,7 +3,7 @@
 use super::{facts::span, service::line_words};
 use crate::t;
 use crate::text::translate;
-use crate::ui::modal::sheet::Row;
+use crate::ui::modal::sheet::Fact;
 use crate::{
     bus::{
         codec,
@@ -32,7 +32,7 @@ pub(super) fn value_rows(
     def: &TagDef,
     exchange: Option<&Exchange>,
     found: Option<&TagBytes>,
-) -> Vec<Row> {
+) -> Vec<Fact> {
     let sample = cx.snapshot.sample(def.id);
     let shown = value::show(cx, def.id);
     let at = clock(sample.at, &cx.def().time_zone);
@@ -50,13 +50,13 @@ pub(super) fn value_rows(
         }
         Quality::Bad(cause) => t!("bad: {cause}, since {at}", cause = translate(cause.word()), at),
     };
-    let mut rows = vec![Row::new(t!("value"), format!("{}  {quality}", shown.with_unit()), shown.style)];
+    let mut rows = vec![Fact::new(t!("value"), format!("{}  {quality}", shown.with_unit()), shown.style)];
     let Some(cause) = sample.quality.cause().filter(|_| def.access != Access::Write) else { return rows };
     if let Some(because) = because(cx, def, cause, exchange, found) {
-        rows.push(Row::new(t!("cause"), because, cx.theme.normal()));
+        rows.push(Fact::new(t!("cause"), because, cx.theme.normal()));
     }
     if let Some(advice) = advice(cx, def, cause, exchange) {
-        rows.push(Row::new(t!("action"), advice, cx.theme.strong()));
+        rows.push(Fact::new(t!("action"), advice, cx.theme.strong()));
     }
     rows
 }

@@ -5,7 +5,7 @@ use super::{
     facts::{settings, span},
 };
 use crate::t;
-use crate::ui::modal::sheet::Row;
+use crate::ui::modal::sheet::Fact;
 use crate::{
     bus::{
         dissect::{self, Direction, Dissection},
@@ -31,7 +31,7 @@ pub(super) fn exchange_rows(
     exchange: &Exchange,
     found: Option<&TagBytes>,
     room: u16,
-    rows: &mut Vec<Row>,
+    rows: &mut Vec<Fact>,
 ) -> (Dissection, Dissection) {
     let theme = cx.theme;
     let framing = exchange.framing;
@@ -41,14 +41,14 @@ pub(super) fn exchange_rows(
     let frame = |bytes: &[u8], marked: Option<&std::ops::Range<usize>>| {
         bytes::abridged(bytes::rows(bytes, framing, marked, room.saturating_sub(2)), theme.ellipsis())
     };
-    let hex = |label, text: String, style| Row { label, text: text.trim_start().to_owned(), style, wraps: false };
+    let hex = |label, text: String, style| Fact { label, text: text.trim_start().to_owned(), style, wraps: false };
     for (n, text) in frame(&exchange.request, None).into_iter().enumerate() {
         rows.push(hex(if n == 0 { t!("request") } else { "" }, text, theme.normal()));
     }
     let at = clock(exchange.at, &cx.def().time_zone);
     // What was good then says nothing of now.
     let old = !cx.snapshot.sample(def.id).quality.is_good() && exchange.outcome.is_ok();
-    rows.push(Row::new("", t!("{summary}, at {at}", summary = request.summary, at), theme.dim()));
+    rows.push(Fact::new("", t!("{summary}, at {at}", summary = request.summary, at), theme.dim()));
     if exchange.answer.is_empty() {
         let line = settings(cx, def);
         // How long the other master waits is not known.
@@ -57,12 +57,12 @@ pub(super) fn exchange_rows(
         } else {
             t!("none within {span}", span = span(line.timeout))
         };
-        rows.push(Row::new(t!("response"), none, theme.trouble()));
+        rows.push(Fact::new(t!("response"), none, theme.trouble()));
     } else {
         for (n, text) in frame(&exchange.answer, found.map(|found| &found.range)).into_iter().enumerate() {
             rows.push(hex(if n == 0 { t!("response") } else { "" }, text, theme.normal()));
         }
-        rows.push(Row { wraps: false, ..Row::new("", answer.summary.clone(), theme.dim()) });
+        rows.push(Fact { wraps: false, ..Fact::new("", answer.summary.clone(), theme.dim()) });
     }
     let reply = exchange.response_time.map(|reply| t!(", after {span}", span = span(reply))).unwrap_or_default();
     let tries = if settings(cx, def).listens {
@@ -80,7 +80,7 @@ pub(super) fn exchange_rows(
         Ok(()) => (t!("ok").to_owned(), theme.normal()),
         Err(fault) => (fault.to_string(), theme.trouble()),
     };
-    rows.push(Row::new(t!("result"), format!("{verdict}{reply}{tries}"), style));
+    rows.push(Fact::new(t!("result"), format!("{verdict}{reply}{tries}"), style));
     (request, answer)
 }
 
@@ -91,19 +91,19 @@ pub(super) fn every_byte(
     (request, answer): &(Dissection, Dissection),
     found: Option<&TagBytes>,
     room: u16,
-) -> Vec<Row> {
+) -> Vec<Fact> {
     let mut rows = Vec::new();
     let frames = [(t!("request"), request, None), (t!("response"), answer, found.map(|found| &found.range))];
     for (label, dissection, marked) in frames.into_iter().take(if exchange.answer.is_empty() { 1 } else { 2 }) {
         let heading = t!("{label}, byte by byte", label);
-        rows.push(Row { label: "", text: heading, style: cx.theme.strong(), wraps: false });
+        rows.push(Fact { label: "", text: heading, style: cx.theme.strong(), wraps: false });
         for field in &dissection.fields {
             let own = marked.is_some_and(|marked| field.range.start < marked.end && marked.start < field.range.end);
             let mark = if own { "▸" } else { " " };
             let text = format!("{mark} {} {} {}", pad(&field.hex, 12), pad(&field.name, 16), field.words);
             let style = if own { cx.theme.strong() } else { cx.theme.normal() };
             // Long fields (a text) are cut: the frame itself stands above.
-            rows.push(Row { label: "", text: fit(&text, room), style, wraps: false });
+            rows.push(Fact { label: "", text: fit(&text, room), style, wraps: false });
         }
     }
     rows

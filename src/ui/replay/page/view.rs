@@ -102,7 +102,14 @@ impl EventPage {
             return;
         }
         let view = self.window(cx, canvas.width());
-        draw::curves(cx, canvas, t!("curves"), (view, Some(cx.now)), &self.pens, &self.curves);
+        draw::curves(
+            cx,
+            canvas,
+            t!("curves"),
+            (view, Some(cx.now)),
+            &self.pens,
+            self.curves.value.as_deref().unwrap_or_default(),
+        );
     }
 
     /// The values then and now.
@@ -139,15 +146,15 @@ impl EventPage {
     /// The journal around the instant, the last event until then marked.
     fn journal(&self, cx: &ViewContext, canvas: &mut Canvas) {
         heading(cx, canvas, t!("journal, one hour around"));
-        let note = match (&self.trouble, self.is_cut()) {
-            (Some(trouble), _) => trouble.as_str(),
+        let note = match (self.trouble(), self.is_cut()) {
+            (Some(trouble), _) => trouble,
             (None, true) => t!("too many events: the oldest are missing"),
             (None, false) => "",
         };
         canvas.text_right(canvas.width().saturating_sub(1), 0, note, cx.theme.trouble());
         let entries = self.entries(cx);
         let room = usize::from(canvas.height().saturating_sub(1));
-        if self.alarms.is_none() || self.actions.is_none() {
+        if self.alarms.value.is_none() || self.actions.value.is_none() {
             canvas.text(1, 1, t!("collecting data"), cx.theme.dim());
             return;
         }
@@ -174,14 +181,14 @@ impl EventPage {
         let acted = self.acted().into_iter().map(|(name, count)| format!("{name} ({count})"));
         let acted = acted.collect::<Vec<_>>().join(", ");
         let acted = if acted.is_empty() { "–".to_owned() } else { acted };
-        let logged_in = match (self.logged_in(), self.queries.is_empty()) {
+        let logged_in = match (self.logged_in(), self.logins.query.is_on_way() || self.detached.query.is_on_way()) {
             (Some(sessions), _) if sessions.is_empty() => "–".to_owned(),
             (Some(sessions), _) => {
                 let name = |(user, from): &(String, String)| format!("{user} {from}").trim().to_owned();
                 sessions.iter().map(name).collect::<Vec<_>>().join(", ")
             }
-            (None, true) => t!("the audit log is for a Supervisor").to_owned(),
-            (None, false) => t!("collecting data").to_owned(),
+            (None, true) => t!("collecting data").to_owned(),
+            (None, false) => t!("the audit log is for a Supervisor").to_owned(),
         };
         let mut y = 0;
         if canvas.height() > 2 {

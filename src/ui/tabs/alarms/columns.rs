@@ -1,6 +1,6 @@
 //! The columns of the list of alarms: on a narrow screen what counts most, on a wide one also the last hour of each.
 
-use super::{Alarms, guidance, list::Row};
+use super::{Alarms, guidance, list::AlarmRow};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{def::Subject, snapshot::ActiveAlarm},
@@ -19,7 +19,7 @@ const RIBBON: (u16, u16) = (10, 30);
 const RESPOND: u16 = 6;
 
 /// The width of each column; 0 where there is no room for it.
-pub struct Columns {
+pub struct AlarmColumns {
     time: u16,
     tag: u16,
     what: u16,
@@ -31,9 +31,9 @@ pub struct Columns {
     by: u16,
 }
 
-impl Columns {
+impl AlarmColumns {
     /// For the rows that are seen: those columns that there is room for, the most wanted first.
-    pub fn new(rows: &[Row], cx: &ViewContext, room: usize, width: u16) -> Columns {
+    pub fn new(rows: &[AlarmRow], cx: &ViewContext, room: usize, width: u16) -> AlarmColumns {
         let wide = Size::Wide <= cx.size;
         let text = if width < WIDE { TEXT.0 } else { TEXT.1 };
         let mut free = width.saturating_sub(MARKS + text);
@@ -54,7 +54,7 @@ impl Columns {
         let what = left.saturating_sub(tag + 1);
         // What the messages leave is for values in words.
         let seen = || rows.iter().take(room);
-        let message = |row: &Row| match row.first || row.under || row.folded {
+        let message = |row: &AlarmRow| match row.first || row.under || row.folded {
             true => u16::MAX,
             false => self::width(translate(&cx.def().alarm(row.alarm.id).message)),
         };
@@ -62,10 +62,9 @@ impl Columns {
         let values = seen().filter_map(|row| Some(self::width(&value_text(cx, row.alarm)?.whole()))).max();
         let moved = what.saturating_sub(texts).min(values.unwrap_or(0).saturating_sub(value));
         let (what, value) = if value > 0 { (what - moved, value + moved) } else { (what, 0) };
-        Columns { time, tag, what, value, ribbon: ribbon + more, respond, state, since, by }
+        AlarmColumns { time, tag, what, value, ribbon: ribbon + more, respond, state, since, by }
     }
 
-    /// The headings.
     pub fn headings(&self) -> String {
         let hour = if self.ribbon < 16 { t!("last hour") } else { t!("last 60 minutes") };
         let names = ["", t!("time"), t!("tag"), t!("what"), t!("value"), hour, t!("respond"), t!("state"), t!("for")];
@@ -91,7 +90,7 @@ impl Columns {
     }
 
     /// A row of the list: what stands before the bars, the bars, and what stands behind them.
-    pub fn cells(&self, tab: &Alarms, cx: &ViewContext, row: &Row) -> [String; 3] {
+    pub fn cells(&self, tab: &Alarms, cx: &ViewContext, row: &AlarmRow) -> [String; 3] {
         let alarm: &ActiveAlarm = row.alarm;
         let def = cx.def().alarm(alarm.id);
         let now = value_text(cx, alarm).map_or("–".to_owned(), |shown| shown.within(self.value));
@@ -123,7 +122,7 @@ fn value_text(cx: &ViewContext, alarm: &ActiveAlarm) -> Option<value::Shown> {
 
 /// `First-out temperature high > 72.0 +14 more, 3 unack`: how many are folded under it, and an acknowledgement that is not on
 /// disk, are never cut off.
-fn what_text(cx: &ViewContext, row: &Row, room: u16) -> String {
+fn what_text(cx: &ViewContext, row: &AlarmRow, room: u16) -> String {
     let mark = match (row.first, row.under) {
         (true, _) => t!("First-out "),
         (false, true) if row.last => cx.theme.pick("└ ", "` "),

@@ -23,7 +23,6 @@ pub struct Filter {
     words: Words,
 }
 
-/// The order of the list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Sort {
     /// By priority, unacknowledged first; first-out groups stand together.
@@ -36,7 +35,6 @@ pub enum Sort {
 }
 
 impl Sort {
-    /// The next order.
     pub fn next(self) -> Sort {
         match self {
             Sort::Urgency => Sort::Time,
@@ -78,7 +76,6 @@ impl Filter {
     pub fn type_words(&mut self, text: &str) {
         self.words = Words::parse(text);
     }
-    /// The words, as they were typed.
     pub fn typed(&self) -> String {
         self.words.to_string()
     }
@@ -101,7 +98,6 @@ impl Filter {
         self.area = area_after(def, self.area.as_ref());
     }
 
-    /// Does it let this alarm through?
     pub fn holds(&self, cx: &ViewContext, alarm: &ActiveAlarm) -> bool {
         if self.is_off() {
             return true;
@@ -125,7 +121,6 @@ impl Filter {
     }
 }
 
-/// The areas of the plant that have alarms.
 pub fn areas(def: &PlantDef) -> Vec<String> {
     let mut areas: Vec<String> = def.alarms.iter().map(|alarm| alarm.area.clone()).collect();
     areas.retain(|area| !area.is_empty());

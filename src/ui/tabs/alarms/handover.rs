@@ -34,7 +34,6 @@ pub(in crate::ui) const NO_CHANGE: [&str; 11] = [
     TAKE_OVER,
 ];
 
-/// State of the page.
 #[derive(Debug, Default)]
 pub struct Handover {
     /// The chosen shift; `None` is the running one.
@@ -51,7 +50,6 @@ impl Handover {
         *self = Handover { period: chosen.filter(|chosen| chosen.to <= cx.now), ..Handover::default() };
     }
 
-    /// Scrolls.
     pub fn step(&mut self, cx: &ViewContext, motion: Motion, room: usize) {
         self.scroll.on(motion, self.lines(cx, cx.area.width).len(), room);
     }
@@ -75,7 +73,6 @@ impl Handover {
         span::ask(cx, &mut self.actions, EVERY_S, Some(&shown), query)
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());

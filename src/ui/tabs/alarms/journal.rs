@@ -24,10 +24,8 @@ const EVERY_S: f64 = 5.0;
 /// What may be typed, for the entry window.
 pub const FORMS: &str = "words of tag, message, user; a time or a day:  TIC-1 anna   06:00-14:00   2026-11-20";
 
-/// The page.
 pub type Journal = List<Events>;
 
-/// What is listed.
 #[derive(Debug, Default)]
 pub struct Events {
     pub alarms: Answered<Vec<AlarmRecord>>,
@@ -44,7 +42,7 @@ pub struct Events {
 
 /// An alarm event or an action in words.
 #[derive(Debug, Clone)]
-pub struct Entry {
+pub struct JournalEntry {
     at: Timestamp,
     text: String,
     /// What is searched beside the text: what is cut off is found too.
@@ -56,7 +54,7 @@ pub struct Entry {
 
 impl Listing for Events {
     type Answer = ();
-    type Row = Entry;
+    type Row = JournalEntry;
     type Id = (Timestamp, String);
 
     const MARKS: bool = true;
@@ -88,32 +86,32 @@ impl Listing for Events {
     }
 
     /// Alarms and operator actions in one list, newest first.
-    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, Entry>> {
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, JournalEntry>> {
         let mut rows = self.entries(cx);
         rows.retain(|row| self.quiet || !row.is_quiet);
         rows.into_iter().map(Cow::Owned).collect()
     }
 
-    fn id(row: &Entry) -> (Timestamp, String) {
+    fn id(row: &JournalEntry) -> (Timestamp, String) {
         (row.at, row.text.clone())
     }
 
-    fn holds(row: &Entry, (at, text): &(Timestamp, String)) -> bool {
+    fn holds(row: &JournalEntry, (at, text): &(Timestamp, String)) -> bool {
         row.at == *at && row.text == *text
     }
 
-    fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<Entry>> {
+    fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<JournalEntry>> {
         vec![
-            left(9, "", |cx, row: &Entry| moment(row.at, cx.now, &cx.def().time_zone)).dim(),
+            left(9, "", |cx, row: &JournalEntry| moment(row.at, cx.now, &cx.def().time_zone)).dim(),
             rest(0, "", |_, row, room| fit_words(&row.text, room.saturating_sub(1))),
         ]
     }
 
-    fn searched(&self, row: &Entry) -> Option<String> {
+    fn searched(&self, row: &JournalEntry) -> Option<String> {
         Some(row.whole.clone())
     }
 
-    fn style(&self, cx: &ViewContext, row: &Entry) -> Style {
+    fn style(&self, cx: &ViewContext, row: &JournalEntry) -> Style {
         if row.is_action { cx.theme.strong() } else { cx.theme.normal() }
     }
 
@@ -121,26 +119,26 @@ impl Listing for Events {
         view::body(cx)
     }
 
-    fn moment(&self, row: &Entry) -> Option<Timestamp> {
+    fn moment(&self, row: &JournalEntry) -> Option<Timestamp> {
         Some(row.at)
     }
 }
 
 impl Events {
-    fn entries(&self, cx: &ViewContext) -> Vec<Entry> {
+    fn entries(&self, cx: &ViewContext) -> Vec<JournalEntry> {
         let area = self.area.as_ref().map(|area| InArea::new(cx.def(), area));
         let alarms = self.alarms.value.iter().flatten();
         let alarms = alarms.filter(|row| area.as_ref().is_none_or(|area| area.has_alarm(row))).map(|row| {
             let text = alarm_text(cx, row);
             let whole = format!("{text} {} {}", row.subject, translate(&row.message));
-            Entry { at: row.at, text, whole, is_action: false, is_quiet: row.event.is_quiet() }
+            JournalEntry { at: row.at, text, whole, is_action: false, is_quiet: row.event.is_quiet() }
         });
         let actions = self.actions.value.iter().flatten();
         let actions = actions.filter(|row| area.as_ref().is_none_or(|area| area.has_action(row))).map(|row| {
             let text = action_text(cx, row);
-            Entry { at: row.at, whole: text.clone(), text, is_action: true, is_quiet: false }
+            JournalEntry { at: row.at, whole: text.clone(), text, is_action: true, is_quiet: false }
         });
-        let mut rows: Vec<Entry> = alarms.chain(actions).collect();
+        let mut rows: Vec<JournalEntry> = alarms.chain(actions).collect();
         rows.sort_by_key(|row| std::cmp::Reverse(row.at));
         rows
     }
@@ -210,7 +208,6 @@ impl Journal {
     }
 }
 
-/// What belongs to an area.
 struct InArea<'a> {
     def: &'a PlantDef,
     alarms: Vec<&'a AlarmDef>,

@@ -3,7 +3,6 @@
 use super::{Alarms, Page, actions, filter};
 use crate::{plant::alarm::AlarmState, ui::tabs::prelude::*};
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Alarms>;
 
 const MOVE: [Key; 6] = motions!("select", Alarms::step);

@@ -10,10 +10,8 @@ use crate::plant::{
     snapshot::ActiveAlarm,
 };
 
-/// A row of the list.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Row<'a> {
-    /// The alarm that stands there.
+pub struct AlarmRow<'a> {
     pub alarm: &'a ActiveAlarm,
     /// It is the first-out alarm, and others of its group are in the list.
     pub first: bool,
@@ -25,14 +23,13 @@ pub struct Row<'a> {
     pub more: usize,
     /// So many of those wait for an acknowledgement.
     pub more_waiting: usize,
-    /// They are folded away.
     pub folded: bool,
 }
 
-impl<'a> Row<'a> {
+impl<'a> AlarmRow<'a> {
     /// A row of an alarm that stands for itself.
-    pub fn plain(alarm: &'a ActiveAlarm) -> Row<'a> {
-        Row { alarm, first: false, under: false, last: false, more: 0, more_waiting: 0, folded: false }
+    pub fn plain(alarm: &'a ActiveAlarm) -> AlarmRow<'a> {
+        AlarmRow { alarm, first: false, under: false, last: false, more: 0, more_waiting: 0, folded: false }
     }
 }
 
@@ -54,7 +51,7 @@ pub fn rows<'a>(
     def: &PlantDef,
     alarms: impl Iterator<Item = &'a ActiveAlarm>,
     is_folded: impl Fn(Timestamp) -> bool,
-) -> Vec<Row<'a>> {
+) -> Vec<AlarmRow<'a>> {
     let alarms: Vec<&ActiveAlarm> = alarms.collect();
     let root = |alarm: &&ActiveAlarm| alarm.first_out.filter(|group| group.rank == 1).map(|group| group.began);
     let roots: HashMap<Timestamp, &ActiveAlarm> =
@@ -77,22 +74,28 @@ pub fn rows<'a>(
     for alarm in &alarms {
         let group = alarm.first_out.and_then(|first_out| Some((first_out.began, groups.get_mut(&first_out.began)?)));
         let Some((began, group)) = group.filter(|(_, group)| 1 < group.count && group.rank == 1) else {
-            rows.push(Row::plain(alarm));
+            rows.push(AlarmRow::plain(alarm));
             continue;
         };
         if !std::mem::replace(&mut group.listed, true) {
             let below: Vec<_> = group.below.iter().filter(|other| other.id != group.leader.id).copied().collect();
             let more_waiting = below.iter().filter(|other| other.state.needs_acknowledgement()).count();
             let folded = !below.is_empty() && is_folded(began);
-            rows.push(Row { first: true, more: below.len(), more_waiting, folded, ..Row::plain(group.leader) });
+            rows.push(AlarmRow {
+                first: true,
+                more: below.len(),
+                more_waiting,
+                folded,
+                ..AlarmRow::plain(group.leader)
+            });
             if !folded {
                 let last = below.len().saturating_sub(1);
-                let under = |(n, alarm)| Row { under: true, last: n == last, ..Row::plain(alarm) };
+                let under = |(n, alarm)| AlarmRow { under: true, last: n == last, ..AlarmRow::plain(alarm) };
                 rows.extend(below.into_iter().enumerate().map(under));
             }
         }
         if alarm.id != group.leader.id && !may_fold(def, group.leader, alarm) {
-            rows.push(Row::plain(alarm));
+            rows.push(AlarmRow::plain(alarm));
         }
     }
     rows
@@ -138,7 +141,7 @@ mod tests {
         (def, alarms)
     }
 
-    fn ids(rows: &[Row]) -> Vec<u16> {
+    fn ids(rows: &[AlarmRow]) -> Vec<u16> {
         rows.iter().map(|row| row.alarm.id.0).collect()
     }
 

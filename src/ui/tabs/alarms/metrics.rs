@@ -21,12 +21,10 @@ const STALE: Duration = Duration::from_secs(24 * 3_600);
 /// Columns of the table; where there are more than twice as many the bad actors stand beside it.
 const TABLE: u16 = 80;
 
-/// State of the page.
 #[derive(Debug, Default)]
 pub struct Metrics {
     /// The chosen shift; `None` is now: the last 24 hours, from the snapshot.
     period: Option<Period>,
-    /// Its figures.
     pub figures: Answered<Box<PeriodMetrics>>,
     scroll: Scroll,
 }
@@ -38,7 +36,6 @@ impl Metrics {
         *self = Metrics { period: period::step(cx, self.period.as_ref(), by), ..Metrics::default() };
     }
 
-    /// Scrolls.
     pub fn step(&mut self, cx: &ViewContext, motion: Motion, room: usize) {
         self.scroll.on(motion, self.lines(cx, cx.area.width).len(), room);
     }
@@ -65,7 +62,6 @@ impl Metrics {
         }
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let theme = cx.theme;
         let (width, height) = (canvas.width(), canvas.height());

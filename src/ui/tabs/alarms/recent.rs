@@ -47,7 +47,6 @@ enum Stood {
 /// An earlier time that an alarm was active.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Occurrence {
-    /// When it was raised.
     pub raised_at: Timestamp,
     /// How long it was active; `None` where its end is not on record.
     pub lasted: Option<Duration>,

@@ -23,9 +23,8 @@ pub fn columns(width: u16) -> u16 {
 }
 
 /// A row: its name at the left, its words.
-type Row = (&'static str, String, Style);
+type LabelledRow = (&'static str, String, Style);
 
-/// Draws it.
 pub fn view(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     for y in 0..canvas.height() {
         canvas.text(0, y, cx.theme.pick("┊", "|"), cx.theme.dim());
@@ -67,7 +66,7 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
         let style = if guidance::is_of_action(label) { theme.strong() } else { theme.normal() };
         (label, text, style)
     });
-    let rows: Vec<Row> = guide.chain(before(tab, cx, alarm)).collect();
+    let rows: Vec<LabelledRow> = guide.chain(before(tab, cx, alarm)).collect();
     let go = wrap(&guidance::go_text(cx, def, Some(alarm)), width.saturating_sub(indent));
     let last = canvas.height().saturating_sub(to_u16(go.len()));
     for (label, text, style) in rows {
@@ -92,7 +91,7 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
 }
 
 /// How often it was raised before, and what was done the last times.
-fn before(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<Row> {
+fn before(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<LabelledRow> {
     let (def, normal) = (cx.def().alarm(alarm.id), cx.theme.normal());
     let since = |at| draw::local(cx, at, "%m-%d %H:%M");
     let [searched, actions] = tab.recent.searched_since();

@@ -6,10 +6,8 @@ use crate::{
     ui::tabs::prelude::*,
 };
 
-/// The page.
 pub type Suppressed = List<SuppressedAlarms>;
 
-/// The suppressed alarms of the plant.
 #[derive(Debug, Default)]
 pub struct SuppressedAlarms;
 

@@ -2,7 +2,7 @@
 
 use ratatui::style::Modifier;
 
-use super::{Alarms, Page, columns::Columns, guidance, handover::suppressed_words, list::Row, on_page, side};
+use super::{Alarms, Page, columns::AlarmColumns, guidance, handover::suppressed_words, list::AlarmRow, on_page, side};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{def::AlarmId, snapshot::ActiveAlarm},
@@ -12,7 +12,6 @@ use crate::{
 /// Rows above the list: views, filter, headings.
 const HEAD: u16 = 3;
 
-/// Draws the tab.
 pub(super) fn draw(tab: &Alarms, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let top = history_trouble(cx, &mut canvas);
@@ -129,7 +128,7 @@ fn list_alone(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     let room = usize::from(height.saturating_sub(HEAD - 1 + below)).max(1);
     let first = first(place, rows.len(), room);
     filter_line(tab, cx, (&rows, all, first, room), canvas);
-    let columns = Columns::new(&rows[first.min(rows.len())..], cx, room, width);
+    let columns = AlarmColumns::new(&rows[first.min(rows.len())..], cx, room, width);
     canvas.text(1, 1, &columns.headings(), theme.dim());
     if rows.is_empty() {
         let words = match all {
@@ -191,7 +190,7 @@ fn guidance_below(
 fn filter_line(
     tab: &Alarms,
     cx: &ViewContext,
-    (rows, all, first, room): (&[Row], usize, usize, usize),
+    (rows, all, first, room): (&[AlarmRow], usize, usize, usize),
     canvas: &mut Canvas,
 ) {
     let theme = cx.theme;

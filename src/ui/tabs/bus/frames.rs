@@ -21,7 +21,6 @@ use crate::{
 /// The page takes in what is new every this many half seconds: reading needs time, and slow lines have few bytes a second.
 const EVERY: u32 = 4;
 
-/// The frames as they are shown.
 #[derive(Debug, Default)]
 pub struct Ring {
     /// Takes in nothing new.
@@ -103,13 +102,11 @@ impl Ring {
         Some(Window::Text(TextWindow::new(shown)).open())
     }
 
-    /// Asks for the filter.
     pub fn ask_filter(&self) -> UiAction {
         let hint = t!("unit 1   fc 3   tx   rx   error   03EA (bytes); all must match; empty: all frames");
         UiAction::Open(Modal::Prompt(Prompt::new(t!("filter frames"), hint, &self.filter.to_string())))
     }
 
-    /// Takes a filter that was typed.
     pub fn set_filter(&mut self, text: &str) -> Result<(), String> {
         self.filter = Filter::parse(text).map_err(|error| error.to_string())?;
         Ok(())
@@ -154,7 +151,6 @@ impl Ring {
         self.saved.push(result);
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
         let theme = cx.theme;
         // Before the first message has come the page is drawn from the report itself.

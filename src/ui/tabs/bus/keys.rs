@@ -3,7 +3,6 @@
 use super::*;
 use crate::ui::modal::LineSettings;
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Bus>;
 
 const MOVE: [Key; 6] = motions!("select", Bus::scroll);
@@ -12,7 +11,6 @@ const TURN: [Key; 2] = [
     Key::change(code(KeyCode::Left), "", "previous page", |bus, cx| bus.turn(cx, -1)),
     Key::change(code(KeyCode::Right), "page", "next page", |bus, cx| bus.turn(cx, 1)),
 ];
-/// Keys of every page.
 const PAGES: [Key; 5] = [
     Key::change(char('l'), "", "page Line", |bus, cx| bus.show(cx, Page::Line)),
     Key::change(char('B'), "", "page Plan: the blocks that are read", |bus, cx| bus.show(cx, Page::Plan)),
@@ -127,7 +125,6 @@ fn table(page: Page) -> Keys<Bus> {
 }
 
 impl Bus {
-    /// Acts on the line that is shown.
     fn on_line(&mut self, cx: &ViewContext, act: impl FnOnce(&mut Bus, &LineView) -> Vec<UiAction>) -> Vec<UiAction> {
         LineView::new(cx, self.line).map_or_else(Vec::new, |at| act(self, &at))
     }
@@ -138,7 +135,6 @@ impl Bus {
         self.show(cx, pages[around(self.page(cx) as usize, by, pages.len())]);
     }
 
-    /// Prepares a test.
     fn try_out(&mut self, cx: &ViewContext, kind: TestKind) -> Vec<UiAction> {
         self.on_line(cx, |bus, at| bus.test.open(cx, at, kind))
     }

@@ -6,7 +6,7 @@ use worries::worries;
 
 use super::{
     LineView, lines,
-    rows::{self, Row, flow, number, plain, words},
+    rows::{self, Spans, flow, number, plain, words},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -22,8 +22,7 @@ use crate::{
 /// A reply that takes this share of the timeout is near it.
 const NEAR: f64 = 0.8;
 
-/// All rows of the page.
-pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
+pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Spans> {
     if cx.is_past() {
         return past(cx, at);
     }
@@ -35,9 +34,9 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
         return rows;
     };
     rows.extend(load(cx, report, width));
-    rows.push(Row::new());
+    rows.push(Spans::new());
     rows.extend(devices(cx, at, report, width));
-    rows.push(Row::new());
+    rows.push(Spans::new());
     if !at.settings.listens {
         rows.extend(cycle(cx, report, width));
     }
@@ -59,7 +58,7 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
 }
 
 /// What the history has of a line: the minute in which the instant lies.
-fn past(cx: &ViewContext, at: &LineView) -> Vec<Row> {
+fn past(cx: &ViewContext, at: &LineView) -> Vec<Spans> {
     let counters = &at.status.counters;
     let words = match counters.requests {
         0 => t!("no request is on record for this minute").to_owned(),
@@ -77,12 +76,12 @@ fn past(cx: &ViewContext, at: &LineView) -> Vec<Row> {
 }
 
 /// `! what is wrong`, over as many rows as it needs.
-fn sentence(cx: &ViewContext, words: &str, width: u16) -> Vec<Row> {
+fn sentence(cx: &ViewContext, words: &str, width: u16) -> Vec<Spans> {
     let lines = wrap(words, width.saturating_sub(5)).into_iter().enumerate();
     lines.map(|(n, line)| plain(format!("{} {line}", if n == 0 { "!" } else { " " }), cx.theme.trouble())).collect()
 }
 
-fn settings(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
+fn settings(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Spans> {
     let (theme, line) = (cx.theme, at.settings);
     let mut parts = vec![plain(line.transport.to_string(), theme.strong())];
     parts.push(match line.listens {
@@ -109,7 +108,7 @@ fn settings(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
     flow(t!("settings"), theme.dim(), width, parts)
 }
 
-fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
+fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Spans> {
     let (theme, counters) = (cx.theme, &report.counters);
     let (now, minute) = (f64::from(counters.utilisation), f64::from(counters.utilisation_minute));
     let (style, mark) = if now < 0.9 { (theme.normal(), "") } else { (theme.trouble(), "! ") };
@@ -122,7 +121,7 @@ fn load(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
     flow(t!("load"), theme.dim(), width, [part])
 }
 
-fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Row> {
+fn cycle(cx: &ViewContext, report: &LineReport, width: u16) -> Vec<Spans> {
     let plan = report.scan();
     let measured = plan.measured.map_or(t!("not yet").to_owned(), ms);
     let parts = [
@@ -139,7 +138,7 @@ fn missed_lately(report: &LineReport) -> bool {
     0.9 <= report.counters.utilisation && 0 < report.counters.missed
 }
 
-fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> Vec<Row> {
+fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> Vec<Spans> {
     let (dim, counters) = (cx.theme.dim(), &report.counters);
     let (sum, listens) = (DeviceStats::new(report), at.settings.listens);
     let count = |name: &str, times| count(cx, name, times, sum.lately);
@@ -227,7 +226,7 @@ impl DeviceStats {
     }
 }
 
-fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> Vec<Row> {
+fn devices(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) -> Vec<Spans> {
     let columns = [
         words("", 0),
         words(t!("device"), 0),
@@ -301,12 +300,12 @@ fn near(stats: &RequestStats, timeout: Duration) -> Option<Duration> {
     stats.response_time.p99().filter(|p99| timeout.mul_f64(NEAR) <= *p99)
 }
 
-fn value(cx: &ViewContext, label: &str, text: &str) -> Row {
+fn value(cx: &ViewContext, label: &str, text: &str) -> Spans {
     vec![(format!("{label} "), cx.theme.dim()), (text.to_owned(), cx.theme.normal())]
 }
 
 /// A count of what should not happen: quiet at zero and when it is long ago.
-fn count(cx: &ViewContext, label: &str, times: u64, lately: bool) -> Row {
+fn count(cx: &ViewContext, label: &str, times: u64, lately: bool) -> Spans {
     match (times, lately) {
         (0, _) | (_, false) => value(cx, label, &grouped(times)),
         (_, true) => plain(format!("!{label} {}", grouped(times)), cx.theme.trouble()),

@@ -2,7 +2,7 @@
 
 use super::{
     LineView,
-    rows::{Row, plain},
+    rows::{Spans, plain},
 };
 use crate::{
     plant::event::LineState,
@@ -36,7 +36,7 @@ fn down(cx: &ViewContext, line: LineId) -> usize {
 }
 
 /// Each with its state, to choose one; nothing where there is only one.
-pub fn rows(cx: &ViewContext, at: &LineView) -> Vec<Row> {
+pub fn rows(cx: &ViewContext, at: &LineView) -> Vec<Spans> {
     let (order, theme) = (order(cx), cx.theme);
     if order.len() < 2 {
         return Vec::new();
@@ -57,7 +57,7 @@ pub fn rows(cx: &ViewContext, at: &LineView) -> Vec<Row> {
     let trouble = cx.def().lines.iter().filter(|line| !is_well(cx, line)).count();
     let count = t!("  {hidden} more ▼▲; of {count} lines {trouble} failed", hidden, count = order.len(), trouble);
     let count = (0 < hidden).then(|| plain(count, if trouble == 0 { theme.dim() } else { theme.trouble() }));
-    shown.chain(count).chain([Row::new()]).collect()
+    shown.chain(count).chain([Spans::new()]).collect()
 }
 
 /// `connected since 13:02:11`, `DOWN 00:12: No such file or directory, next try in 4s`.
@@ -103,7 +103,7 @@ mod tests {
             assert_eq!(order(cx)[..4], [17, 40, 0, 1].map(LineId));
             assert_eq!([next(cx, LineId(17), 1), next(cx, LineId(17), -1)], [40, 63].map(LineId));
             let at = LineView::new(cx, LineId(17)).expect("the line is there");
-            let text = |row: &Row| row.iter().map(|(words, _)| words.as_str()).collect::<String>();
+            let text = |row: &Spans| row.iter().map(|(words, _)| words.as_str()).collect::<String>();
             let shown: Vec<String> = rows(cx, &at).iter().map(text).collect();
             assert_eq!(shown.len(), ROWS_MAX + 2, "{shown:?}");
             assert!(shown[0].starts_with("▸ L18 ") && shown[1].ends_with("! 1 not responding"), "{shown:?}");

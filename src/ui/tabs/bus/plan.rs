@@ -15,13 +15,11 @@ use crate::{
     },
 };
 
-/// The page.
 pub type Plan = List<Blocks>;
 
 /// The blocks of the read plan of a line.
 #[derive(Debug)]
 pub struct Blocks {
-    /// The line.
     pub line: LineId,
 }
 

@@ -40,7 +40,6 @@ use crate::{
 /// Most characters of a field.
 const CHARS: usize = 400;
 
-/// A test with its fields.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RequestForm {
     line: LineId,
@@ -49,7 +48,6 @@ pub struct RequestForm {
     problem: Option<String>,
 }
 
-/// The field of a request with its function.
 const FUNCTION: usize = 1;
 
 /// A form that makes sense: the test, and what it does in words.
@@ -59,7 +57,6 @@ type Built = (Diagnostic, Vec<String>);
 const BAUDS: [u32; 8] = [9_600, 19_200, 115_200, 38_400, 57_600, 4_800, 2_400, 1_200];
 const CHARACTERS: [(Parity, u8); 4] = [(Parity::None, 1), (Parity::Even, 1), (Parity::Odd, 1), (Parity::None, 2)];
 
-/// A field that is typed, with what may be typed.
 fn typed(label: &'static str, text: &str, range: &str) -> Field {
     Field::text(label, text, CHARS).within(range)
 }
@@ -125,7 +122,6 @@ impl RequestForm {
         Window::Form(self).stay()
     }
 
-    /// Pasted text.
     pub fn on_paste(&mut self, text: &str) {
         self.form.paste(text);
     }
@@ -199,7 +195,6 @@ impl RequestForm {
         Ok((Diagnostic::Scan(Scan { first, last, serials, timeout }), vec![words]))
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         let Some(at) = LineView::new(cx, self.line) else { return };
         let theme = cx.theme;

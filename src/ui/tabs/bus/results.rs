@@ -4,7 +4,7 @@ use super::{
     LineView,
     frames::{broken, bytes_text},
     line::{ms, short_ms},
-    rows::{Row, plain},
+    rows::{Spans, plain},
     window::{dissection_rows, exchange_rows},
 };
 use crate::ui::{chrome::outcome_words, tabs::prelude::*};
@@ -25,7 +25,7 @@ use crate::{
 };
 
 /// The last test of a line, or how to begin.
-pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
+pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Spans> {
     let theme = cx.theme;
     let room = width.saturating_sub(3);
     let Some(run) = &at.status.test else {
@@ -96,19 +96,19 @@ pub fn rows(cx: &ViewContext, at: &LineView, width: u16) -> Vec<Row> {
 }
 
 /// How the signals of the port stood, and when.
-fn signal_row(cx: &ViewContext, after: std::time::Duration, signals: PortSignals) -> Row {
+fn signal_row(cx: &ViewContext, after: std::time::Duration, signals: PortSignals) -> Spans {
     let after = format!("{:5.2} s  ", after.as_secs_f64());
     vec![(after, cx.theme.dim()), (signals.to_string(), cx.theme.strong())]
 }
 
 /// What became of a pattern, unless all of it came back.
-fn pattern_row(cx: &ViewContext, n: usize, tally: PatternTally) -> Option<Row> {
+fn pattern_row(cx: &ViewContext, n: usize, tally: PatternTally) -> Option<Spans> {
     let words = || t!("✗ pattern {number}: {tally}", number = n + 1, tally);
     (0 < tally.faults()).then(|| plain(words(), cx.theme.trouble()))
 }
 
 /// What, by whom, when, how it stands; and how far it has come.
-fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Row> {
+fn heading(cx: &ViewContext, run: &DiagnosticRun, room: u16) -> Vec<Spans> {
     let theme = cx.theme;
     let at = clock(run.started, &cx.def().time_zone);
     let (state, style) = match &run.state {
@@ -173,7 +173,7 @@ fn came_back(
     bytes: &[u8],
     reply: Option<std::time::Duration>,
     room: u16,
-) -> Vec<Row> {
+) -> Vec<Spans> {
     let theme = cx.theme;
     let framing = at.settings.transport.framing();
     let to_all = |sent: &Vec<u8>| {
@@ -202,7 +202,7 @@ fn came_back(
     let part =
         answer.as_ref().and_then(|answer| answer.as_ref().ok()).map_or(bytes, |reply| &bytes[reply.range.clone()]);
     let dissection = dissect::dissect(part, Some(framing), Some(Direction::Answer), asked.as_deref());
-    let mut rows: Vec<Row> = broken(&t!("RX {bytes_text}", bytes_text = bytes_text(framing, bytes)), room)
+    let mut rows: Vec<Spans> = broken(&t!("RX {bytes_text}", bytes_text = bytes_text(framing, bytes)), room)
         .into_iter()
         .map(|line| plain(line, theme.normal()))
         .collect();

@@ -3,15 +3,15 @@
 use crate::ui::tabs::prelude::*;
 
 /// A row of the screen: words with their looks, one behind the other.
-pub type Row = Vec<(String, Style)>;
+pub type Spans = Vec<(String, Style)>;
 
 /// A row of one look.
-pub fn plain(text: impl Into<String>, style: Style) -> Row {
+pub fn plain(text: impl Into<String>, style: Style) -> Spans {
     vec![(text.into(), style)]
 }
 
 /// Draws rows from `first` on, a column free on the left; says how many more there are below.
-pub fn draw(cx: &ViewContext, canvas: &mut Canvas, rows: &[Row], first: usize) {
+pub fn draw(cx: &ViewContext, canvas: &mut Canvas, rows: &[Spans], first: usize) {
     let height = usize::from(canvas.height());
     // The last row says how much there is more, so that the mark covers nothing.
     let room = if rows.len() <= height { height } else { height.saturating_sub(1) };
@@ -43,7 +43,7 @@ pub fn last_first(count: usize, height: usize) -> usize {
 const LABEL: u16 = 10;
 
 /// Words that flow into rows of this width behind a label; those of one part stay together.
-pub fn flow(label: &str, style: Style, room: u16, parts: impl IntoIterator<Item = Row>) -> Vec<Row> {
+pub fn flow(label: &str, style: Style, room: u16, parts: impl IntoIterator<Item = Spans>) -> Vec<Spans> {
     let (mut rows, mut at) = (vec![plain(pad(label, LABEL), style)], LABEL);
     for part in parts {
         let long: u16 = part.iter().map(|(text, _)| width(text)).sum();
@@ -60,9 +60,7 @@ pub fn flow(label: &str, style: Style, room: u16, parts: impl IntoIterator<Item 
     rows
 }
 
-/// A column of a table.
-pub struct Column {
-    /// Its heading.
+pub struct TableColumn {
     pub title: &'static str,
     /// Numbers stand at the right.
     pub right: bool,
@@ -70,18 +68,16 @@ pub struct Column {
     pub need: u8,
 }
 
-/// A column of words.
-pub const fn words(title: &'static str, need: u8) -> Column {
-    Column { title, right: false, need }
+pub const fn words(title: &'static str, need: u8) -> TableColumn {
+    TableColumn { title, right: false, need }
 }
 
-/// A column of numbers.
-pub const fn number(title: &'static str, need: u8) -> Column {
-    Column { title, right: true, need }
+pub const fn number(title: &'static str, need: u8) -> TableColumn {
+    TableColumn { title, right: true, need }
 }
 
 /// Headings and lines of a table, as wide as their widest cell; columns that do not fit are left out whole.
-pub fn table<const N: usize>(columns: &[Column; N], lines: &[[String; N]], room: u16) -> (String, Vec<String>) {
+pub fn table<const N: usize>(columns: &[TableColumn; N], lines: &[[String; N]], room: u16) -> (String, Vec<String>) {
     let widest =
         |n: usize| lines.iter().map(|line| width(&line[n])).max().unwrap_or(0).max(width(translate(columns[n].title)));
     let mut kept: Vec<(usize, u16)> = (0..N).map(|n| (n, widest(n))).collect();

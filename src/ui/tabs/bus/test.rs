@@ -10,7 +10,7 @@ use super::{
     frames::{broken, bytes_text},
     request::RequestForm,
     results,
-    rows::{self, Row, plain},
+    rows::{self, Spans, plain},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -38,9 +38,7 @@ const ENTRY_MAX: usize = 800;
 /// What can be tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TestKind {
-    /// Bytes as they are.
     Bytes,
-    /// A request by its fields.
     Request,
     /// Diagnostics 08/00.
     Loopback,
@@ -85,7 +83,6 @@ impl TestKind {
     }
 }
 
-/// State of the page.
 #[derive(Debug, Default)]
 pub struct Bench {
     selected: usize,
@@ -100,12 +97,10 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// The selected test.
     pub fn selected(&self) -> TestKind {
         TestKind::ALL[self.selected.min(TestKind::ALL.len() - 1)]
     }
 
-    /// Opens the entry of a test.
     pub fn open(&mut self, cx: &ViewContext, at: &LineView, kind: TestKind) -> Vec<UiAction> {
         self.selected = TestKind::ALL.iter().position(|known| *known == kind).unwrap_or(0);
         self.first = None;
@@ -282,7 +277,6 @@ pub fn again(cx: &ViewContext, at: &LineView) -> Vec<UiAction> {
     at.status.test.iter().filter_map(|run| start(cx, at, run.diagnostic.clone()).ok()).collect()
 }
 
-/// Stops the test at work.
 pub fn stop(at: &LineView) -> Vec<UiAction> {
     if at.is_testing() { vec![UiAction::Command(CommandKind::StopTest(at.id))] } else { Vec::new() }
 }

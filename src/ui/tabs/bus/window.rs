@@ -6,7 +6,7 @@ use super::{
     frames::{broken, bytes_text},
     line::short_ms,
     request::RequestForm,
-    rows::{self, Row, plain},
+    rows::{self, Spans, plain},
     test::Send,
 };
 use crate::ui::tabs::prelude::*;
@@ -23,24 +23,20 @@ use crate::{
     },
 };
 
-/// A window of this tab.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Window {
     /// Something to read.
     Text(TextWindow),
     /// Bytes or words to be sent.
     Send(Send),
-    /// A test with its fields.
     Form(RequestForm),
 }
 
 impl Window {
-    /// Is it only something to read?
     pub fn only_shows(&self) -> bool {
         matches!(self, Window::Text(_))
     }
 
-    /// A key.
     pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
         match self {
             Window::Text(text) => text.on_key(event),
@@ -49,12 +45,10 @@ impl Window {
         }
     }
 
-    /// Stays open.
     pub fn stay(self) -> Next {
         Next::Stay(Modal::Bus(Box::new(self)))
     }
 
-    /// Opens it.
     pub fn open(self) -> UiAction {
         UiAction::Open(Modal::Bus(Box::new(self)))
     }
@@ -68,7 +62,6 @@ impl Window {
         }
     }
 
-    /// The keys of the moment.
     pub fn hints(&self) -> Vec<Hint> {
         let hint = |key: &str, label: &str| Hint::new(key, label, "");
         let close = hint(t!("Esc"), t!("close"));
@@ -81,7 +74,6 @@ impl Window {
         }
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         match self {
             Window::Text(text) => text.view(cx, screen, body),
@@ -101,25 +93,18 @@ pub struct TextWindow {
     first: usize,
 }
 
-/// What a text shows.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shown {
     /// One frame, byte by byte.
     Frame {
-        /// Name of its line.
         line: String,
-        /// The frame.
         frame: Box<Frame>,
         /// Earlier frames, the latest first: one of them is the request.
         before: Vec<Frame>,
     },
-    /// The tags of a block.
     Block {
-        /// On which line.
         line: LineId,
-        /// Of which device.
         device: DeviceId,
-        /// In which table.
         table: Table,
         /// From which address on.
         address: u16,
@@ -179,7 +164,7 @@ fn means(cx: &ViewContext, line: &str, frame: &Frame, before: &[Frame], message:
 }
 
 /// Every byte of a frame with its name and meaning.
-fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection, room: u16) -> Vec<Row> {
+fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection, room: u16) -> Vec<Spans> {
     let theme = cx.theme;
     let at = draw::local(cx, frame.at, "%H:%M:%S%.6f");
     let direction = if frame.sent { t!("TX sent") } else { t!("RX received") };
@@ -199,9 +184,9 @@ fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection,
 }
 
 /// Summary and fields.
-pub fn dissection_rows(cx: &ViewContext, dissection: &dissect::Dissection, room: u16) -> Vec<Row> {
+pub fn dissection_rows(cx: &ViewContext, dissection: &dissect::Dissection, room: u16) -> Vec<Spans> {
     let theme = cx.theme;
-    let mut rows: Vec<Row> =
+    let mut rows: Vec<Spans> =
         wrap(&dissection.summary, room).into_iter().map(|line| plain(line, theme.strong())).collect();
     let widest = |text: fn(&dissect::Field) -> &str, most| {
         dissection.fields.iter().map(|field| width(text(field))).max().unwrap_or(0).min(most)
@@ -226,7 +211,7 @@ pub fn dissection_rows(cx: &ViewContext, dissection: &dissect::Dissection, room:
 }
 
 /// A request and its answer in words.
-pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Row> {
+pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Spans> {
     let theme = cx.theme;
     let framing = Some(exchange.framing);
     let asked = dissect::message_of(&exchange.request, exchange.framing);
@@ -234,7 +219,7 @@ pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Ro
     let row = |direction: &str, bytes: &[u8], words: &str, style| {
         let mut lines = broken(&format!("{direction} {}", bytes_text(exchange.framing, bytes)), room);
         lines.extend(wrap(words, room.saturating_sub(3)).into_iter().map(|line| format!("   {line}")));
-        lines.into_iter().map(|line| plain(line, style)).collect::<Vec<Row>>()
+        lines.into_iter().map(|line| plain(line, style)).collect::<Vec<Spans>>()
     };
     let mut rows = row("TX", &exchange.request, &request.summary, theme.dim());
     let reply =
@@ -250,7 +235,7 @@ pub fn exchange_rows(cx: &ViewContext, exchange: &Exchange, room: u16) -> Vec<Ro
 }
 
 /// The tags of a block as they stand.
-fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, address: u16) -> Vec<Row> {
+fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, address: u16) -> Vec<Spans> {
     let report = cx.snapshot.line(line).report.as_deref();
     let poll = report.and_then(|report| {
         report.polls.iter().find(|poll| (poll.device, poll.table, poll.address) == (device, table, address))
@@ -291,7 +276,7 @@ fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, ad
     rows.extend(poll.tags.iter().zip(lines).map(|(tag, line)| plain(line, value::show(cx, *tag).style)));
     let last = poll.tags.first().and_then(|tag| cx.snapshot.source_frames.get(tag.index())?.clone());
     if let Some(exchange) = last {
-        rows.push(Row::new());
+        rows.push(Spans::new());
         rows.push(plain(t!("last read: {hex}", hex = hex(&exchange.answer)), cx.theme.dim()));
     }
     rows

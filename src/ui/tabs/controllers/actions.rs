@@ -32,7 +32,6 @@ impl Controllers {
         Offer::footer_if(self.device(cx).is_some_and(has))
     }
 
-    /// The role that may write to this tag of the device.
     pub(super) fn role_for(&self, cx: &ViewContext, tag: impl FnOnce(&DeviceDef) -> Option<TagId>) -> Option<Role> {
         self.device(cx).and_then(tag).map(|tag| rights::to_write(cx, [tag]))
     }
@@ -52,12 +51,10 @@ impl Controllers {
         self.cell.tag(device.program.as_ref()?)
     }
 
-    /// The comparison that is shown.
     pub(super) fn compared(&self) -> Option<&Compare> {
-        if let Page::Compare(compare) = &self.page { Some(compare) } else { None }
+        if let Page::Compare(compare) = self.page() { Some(compare) } else { None }
     }
 
-    /// Acts on the device.
     fn on_device(
         &mut self,
         cx: &ViewContext,
@@ -71,7 +68,7 @@ impl Controllers {
         self.on_device(cx, |tab, device| match why_not {
             Some(why) => notice(device, why),
             None => {
-                tab.page = page;
+                tab.pages.push(page);
                 Vec::new()
             }
         })
@@ -120,7 +117,6 @@ impl Controllers {
         })
     }
 
-    /// The window that writes a tag of the device.
     pub(super) fn write(
         &mut self,
         cx: &ViewContext,
@@ -183,13 +179,11 @@ impl Controllers {
     }
 
     pub(super) fn show_guide(&mut self, _cx: &ViewContext) {
-        let before = std::mem::replace(&mut self.page, Page::List);
-        self.page = Page::Guide(0, Box::new(before));
+        self.pages.push(Page::Guide(0));
     }
 
-    /// Turns the pages of the guide.
     pub(super) fn turn(&mut self, by: isize) {
-        if let Page::Guide(page, _) = &mut self.page {
+        if let Some(Page::Guide(page)) = self.pages.last_mut() {
             *page = page.saturating_add_signed(by).min(guide::count() - 1);
         }
     }
@@ -201,7 +195,7 @@ impl Controllers {
             if let Some(notice) = sets::problems(cx, &source) {
                 return open(Modal::Notice(notice));
             }
-            tab.page = Page::Compare(Compare::new(source));
+            tab.pages.push(Page::Compare(Compare::new(source)));
             Vec::new()
         })
     }
@@ -218,7 +212,7 @@ impl Controllers {
                 return notice(device, t!("only a copy between two controllers can be turned around"));
             };
             tab.show(*other);
-            tab.page = Page::Compare(Compare::new(Source::Device(device.id)));
+            tab.pages.extend([Page::Sets, Page::Compare(Compare::new(Source::Device(device.id)))]);
             Vec::new()
         })
     }
@@ -231,7 +225,6 @@ impl Controllers {
     }
 }
 
-/// The window that writes a tag.
 fn write(cx: &ViewContext, tag: Option<TagId>) -> Vec<UiAction> {
     open(tag.and_then(|tag| Modal::write(cx, tag)))
 }

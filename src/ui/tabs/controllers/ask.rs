@@ -16,7 +16,6 @@ const ROOM: u16 = 68;
 /// Lines of warnings that a window of 24 rows has room for.
 const WARNINGS_MAX: usize = 6;
 
-/// The confirmation to write these changes.
 pub fn confirm_restore(
     cx: &ViewContext,
     device: &DeviceDef,

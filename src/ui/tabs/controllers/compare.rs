@@ -14,10 +14,8 @@ use crate::{
     ui::chrome::outcome_words,
 };
 
-/// The page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Compare {
-    /// What is compared with the device.
     pub source: Source,
     /// The first row shown.
     scroll: Scroll,
@@ -29,7 +27,6 @@ pub struct Compare {
 type Plan = Result<Vec<PlannedChange>, Vec<Problem>>;
 
 impl Compare {
-    /// A source against the device.
     pub fn new(source: Source) -> Compare {
         Compare { source, scroll: Scroll::default(), all: false }
     }
@@ -65,7 +62,6 @@ impl Compare {
         Some(parameter_set::plan(cx.def(), device.id, &set, &trusted(cx)))
     }
 
-    /// Scrolls.
     pub fn scroll(&mut self, cx: &ViewContext, device: &DeviceDef, motion: Motion, room: usize) {
         self.scroll.on(motion, self.rows(cx, device).len(), room);
     }
@@ -100,7 +96,6 @@ impl Compare {
         Ok(ask::confirm_restore(cx, device, &self.source, set, changes))
     }
 
-    /// Draws the page.
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
         let theme = cx.theme;
         let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));

@@ -2,7 +2,7 @@
 
 use super::{
     faceplate,
-    table::{Table, default_text, differs},
+    table::{ParameterTable, default_text, differs},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -21,8 +21,7 @@ const PANEL_ROWS: u16 = 24;
 /// Columns of the faceplate beside the table.
 const PANEL: u16 = 36;
 
-/// Draws the page.
-pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Table, trend: Option<&Series>) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &ParameterTable, trend: Option<&Series>) {
     heading(cx, device, canvas);
     let (wide, high) = (canvas.width(), canvas.height());
     if device.faceplate.is_some() && Size::is_wide(wide) && PANEL_ROWS <= high {
@@ -38,7 +37,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &T
 }
 
 /// The table, what the selected parameter means, and the last write.
-fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Table) {
+fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &ParameterTable) {
     let (wide, high) = (canvas.width(), canvas.height());
     let (end, bottom) = (wide.saturating_sub(1), high.saturating_sub(1));
     let words = if high > 16 { 2 } else { 1 };

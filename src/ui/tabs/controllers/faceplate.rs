@@ -96,7 +96,6 @@ pub fn panel(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, series: 
     }
 }
 
-/// How the bars are laid out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bars {
     /// Three rows each: value, bar, ends of the scale.

@@ -12,7 +12,6 @@ fn pages() -> impl Iterator<Item = (&'static str, std::str::Lines<'static>)> {
     pages.map(|(heading, text)| (heading, text.lines()))
 }
 
-/// How many there are.
 pub fn count() -> usize {
     pages().count()
 }
@@ -36,7 +35,6 @@ fn lines(paragraphs: std::str::Lines<'static>, room: u16) -> Vec<String> {
     lines
 }
 
-/// Draws a page.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, page: usize) {
     let Some((heading, paragraphs)) = pages().nth(page) else { return };
     canvas.text(1, 0, translation(heading).unwrap_or(heading), cx.theme.strong());

@@ -3,7 +3,6 @@
 use super::{Controllers, Page, compare::Compare, lamps, sets::Source};
 use crate::ui::tabs::prelude::*;
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Controllers>;
 
 const SELECT: [Key; 6] = motions!("select", Controllers::step);
@@ -172,7 +171,7 @@ const COMPARE: &[Key] = &[
     .when(|tab, cx| tab.offer(cx, |device| cx.snapshot.restore(device.id).is_some_and(|run| run.at_work())))
     .needs(Role::Technician),
     Key::change(char('='), "all", "show or hide equal settings", |tab, _| {
-        if let Page::Compare(compare) = &mut tab.page {
+        if let Some(Page::Compare(compare)) = tab.pages.last_mut() {
             compare.all = !compare.all;
         }
     }),
@@ -221,7 +220,7 @@ const READ: &[Key] = &[
 
 impl KeyTable for Controllers {
     fn keys(&self, _cx: &ViewContext) -> Keys<Controllers> {
-        table(&self.page)
+        table(self.page())
     }
 
     /// Nothing is written or sent on the line of another master, and it has no settings to try.
@@ -232,14 +231,12 @@ impl KeyTable for Controllers {
     #[cfg(test)]
     fn chords() -> crate::ui::keys::PageChords {
         let compare = Page::Compare(Compare::new(Source::Set(String::new())));
-        let guide = Page::Guide(0, Box::new(Page::List));
-        let runs = [Page::Runs, Page::Procedures, Page::Overlay(Box::new(Page::Runs))];
-        let pages = [Page::List, Page::Device, Page::Lamps, Page::Program, Page::Sets, compare, guide];
+        let pages = [Page::List, Page::Device, Page::Lamps, Page::Program, Page::Sets, compare];
+        let runs = [Page::Runs, Page::Procedures, Page::Overlay, Page::Guide(0)];
         pages.into_iter().chain(runs).map(|page| ("controllers", table(&page).chords())).collect()
     }
 }
 
-/// The keys of a page.
 fn table(page: &Page) -> Keys<Controllers> {
     Keys::of(match page {
         Page::List => &[&SELECT, LIST],
@@ -250,8 +247,8 @@ fn table(page: &Page) -> Keys<Controllers> {
         Page::Compare(_) => &[&SCROLL, COMPARE],
         Page::Runs => &[RUNS],
         Page::Procedures => &[PROCEDURES],
-        Page::Overlay(_) => &[OVERLAY],
-        Page::Guide(..) => &[READ],
+        Page::Overlay => &[OVERLAY],
+        Page::Guide(_) => &[READ],
     })
 }
 

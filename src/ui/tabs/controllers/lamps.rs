@@ -125,7 +125,6 @@ impl Lamp<'_> {
     }
 }
 
-/// Draws the page.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, live: &Live) {
     let theme = cx.theme;
     let (wide, high) = (canvas.width(), canvas.height());

@@ -5,27 +5,28 @@ use crate::plant::{def::Subject, snapshot::ActiveAlarm};
 use crate::ui::{modal::faceplate::unknown_text, tabs::prelude::*};
 
 /// Widths that depend on the plant and the screen.
-struct Columns {
+struct DeviceColumns {
     name: u16,
     model: u16,
     line: u16,
     state: u16,
 }
 
-impl Columns {
+impl DeviceColumns {
     const VALUE: u16 = 8;
     const MODE: u16 = 8;
     const ALARM: u16 = 6;
     const REPLY: u16 = 6;
 
-    fn new(cx: &ViewContext, screen: u16) -> Columns {
+    fn new(cx: &ViewContext, screen: u16) -> DeviceColumns {
         let devices = &cx.def().devices;
         let widest = |text: &dyn Fn(&DeviceDef) -> String, least: u16, most: u16| {
             devices.iter().map(|device| width(&text(device))).max().unwrap_or(0).clamp(least, most)
         };
         let name = widest(&|device| device.name.clone(), 6, 10);
         let line = widest(&|device| place(cx, device), 4, 10);
-        let fixed = 3 + Columns::VALUE * 3 + Columns::MODE + Columns::ALARM + Columns::REPLY + 9;
+        let fixed =
+            3 + DeviceColumns::VALUE * 3 + DeviceColumns::MODE + DeviceColumns::ALARM + DeviceColumns::REPLY + 9;
         let free = screen.saturating_sub(fixed + name + line + 2);
         let model = widest(&|device| device.model.clone(), 5, free.clamp(5, 20));
         // The mark alone, and words where there is room for some.
@@ -33,16 +34,15 @@ impl Columns {
             room @ 12.. => 3 + room.min(30),
             _ => 2,
         };
-        Columns { name, model, line, state }
+        DeviceColumns { name, model, line, state }
     }
 }
 
-/// Draws the list of these devices with this one selected.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, (devices, selected): (&[&DeviceDef], usize), found: &str) {
     let theme = cx.theme;
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     canvas.text(1, 0, &fit_words(&summary(cx, devices.len(), found), end), theme.normal());
-    let columns = Columns::new(cx, canvas.width());
+    let columns = DeviceColumns::new(cx, canvas.width());
     put(canvas, 1, heading(&columns, theme.dim()));
     let room = usize::from(bottom.saturating_sub(3)).max(1);
     let first = first(selected, devices.len(), room);
@@ -104,19 +104,19 @@ fn put(canvas: &mut Canvas, y: u16, cells: Cells) {
     }
 }
 
-fn heading(columns: &Columns, style: Style) -> Cells {
-    let value = |name| (pad_left(name, Columns::VALUE), Columns::VALUE, style);
+fn heading(columns: &DeviceColumns, style: Style) -> Cells {
+    let value = |name| (pad_left(name, DeviceColumns::VALUE), DeviceColumns::VALUE, style);
     vec![
         (t!("device").to_owned(), columns.name, style),
         (t!("model").to_owned(), columns.model, style),
         (t!("unit").to_owned(), columns.line, style),
         (if columns.state > 3 { t!("state") } else { "" }.to_owned(), columns.state, style),
-        (t!("alarm").to_owned(), Columns::ALARM, style),
+        (t!("alarm").to_owned(), DeviceColumns::ALARM, style),
         value("PV"),
         value("SV"),
         value("MV"),
-        (t!("mode").to_owned(), Columns::MODE, style),
-        (pad_left(t!("reply"), Columns::REPLY), Columns::REPLY, style),
+        (t!("mode").to_owned(), DeviceColumns::MODE, style),
+        (pad_left(t!("reply"), DeviceColumns::REPLY), DeviceColumns::REPLY, style),
     ]
 }
 
@@ -125,7 +125,7 @@ fn place(cx: &ViewContext, device: &DeviceDef) -> String {
     format!("{}/{}", cx.def().line(device.line).name, device.unit)
 }
 
-fn row(cx: &ViewContext, canvas: &mut Canvas, y: u16, columns: &Columns, device: &DeviceDef, selected: bool) {
+fn row(cx: &ViewContext, canvas: &mut Canvas, y: u16, columns: &DeviceColumns, device: &DeviceDef, selected: bool) {
     let theme = cx.theme;
     let mut cells = cells(cx, columns, device);
     if selected {
@@ -137,7 +137,7 @@ fn row(cx: &ViewContext, canvas: &mut Canvas, y: u16, columns: &Columns, device:
     put(canvas, y, cells);
 }
 
-fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
+fn cells(cx: &ViewContext, columns: &DeviceColumns, device: &DeviceDef) -> Cells {
     let theme = cx.theme;
     let (mark, words, style) = state(cx, device.id);
     let mut cells = vec![
@@ -147,29 +147,29 @@ fn cells(cx: &ViewContext, columns: &Columns, device: &DeviceDef) -> Cells {
         (if columns.state > 3 { format!("{mark} {words}") } else { mark }, columns.state, style),
     ];
     let (text, style) = alarm(cx, device.id);
-    cells.push((text, Columns::ALARM, style));
+    cells.push((text, DeviceColumns::ALARM, style));
     match &device.faceplate {
         Some(faceplate) => {
             for tag in [Some(faceplate.pv), Some(faceplate.sv_to_show()), faceplate.mv] {
                 let shown = tag.map(|tag| value::show(cx, tag));
                 let text = shown.as_ref().map_or(String::new(), |shown| {
                     let whole = shown.with_unit();
-                    if width(&whole) <= Columns::VALUE { whole } else { shown.bare(Columns::VALUE) }
+                    if width(&whole) <= DeviceColumns::VALUE { whole } else { shown.bare(DeviceColumns::VALUE) }
                 });
                 let style = shown.map_or(theme.dim(), |shown| shown.style);
-                cells.push((pad_left(&text, Columns::VALUE), Columns::VALUE, style));
+                cells.push((pad_left(&text, DeviceColumns::VALUE), DeviceColumns::VALUE, style));
             }
-            cells.push((mode(cx, device), Columns::MODE, theme.normal()));
+            cells.push((mode(cx, device), DeviceColumns::MODE, theme.normal()));
         }
         None => {
             let (words, style) = values_good(cx, device);
-            cells.push((words, Columns::VALUE * 3 + 2, style));
-            cells.push((String::new(), Columns::MODE, style));
+            cells.push((words, DeviceColumns::VALUE * 3 + 2, style));
+            cells.push((String::new(), DeviceColumns::MODE, style));
         }
     }
     let reply = cx.snapshot.device(device.id).response_time.filter(|_| answers(cx, device.id));
     let reply = reply.map_or(String::new(), |reply| t!("{reply} ms", reply = reply.as_millis()));
-    cells.push((pad_left(&reply, Columns::REPLY), Columns::REPLY, theme.dim()));
+    cells.push((pad_left(&reply, DeviceColumns::REPLY), DeviceColumns::REPLY, theme.dim()));
     cells
 }
 
@@ -204,7 +204,7 @@ fn mode(cx: &ViewContext, device: &DeviceDef) -> String {
         return t!("AT").to_owned();
     }
     let shown = faceplate.run.filter(|_| on(faceplate.run)).or(faceplate.mode);
-    shown.map_or(String::new(), |tag| value::show(cx, tag).bare(Columns::MODE))
+    shown.map_or(String::new(), |tag| value::show(cx, tag).bare(DeviceColumns::MODE))
 }
 
 fn answers(cx: &ViewContext, device: DeviceId) -> bool {

@@ -7,10 +7,10 @@ impl Controllers {
         let Some(device) = self.device(cx) else { return };
         let listed = self.listed(cx);
         let wall =
-            (self.page == Page::List && self.is_wall(cx)).then(|| wall::Grid::new(cx.size, cx.area, listed.len()));
+            (*self.page() == Page::List && self.is_wall(cx)).then(|| wall::Grid::new(cx.size, cx.area, listed.len()));
         let room = wall.map_or(usize::from(cx.area.height.saturating_sub(4)).max(1), |grid| grid.rows * grid.columns);
         let to = |at: usize, count: usize| motion.to(at, count, room);
-        match &mut self.page {
+        match self.pages.last_mut().unwrap_or(&mut Page::List) {
             Page::List => {
                 let (at, count) = (self.place(&listed), listed.len());
                 let place = match (motion, wall) {
@@ -25,24 +25,22 @@ impl Controllers {
                 self.cell.row = to(self.cell.row, steps);
             }
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
-            Page::Sets | Page::Runs | Page::Procedures => {}
-            Page::Lamps | Page::Overlay(_) | Page::Guide(..) => {}
+            Page::Sets | Page::Runs | Page::Procedures | Page::Lamps | Page::Overlay | Page::Guide(_) => {}
         }
     }
 
     /// Lays the marked runs, or those of the procedures, over each other, or goes back to their list.
     pub(super) fn swap_overlay(&mut self, cx: &ViewContext) {
-        let before = std::mem::replace(&mut self.page, Page::List);
-        if let Page::Overlay(before) = before {
-            (self.page, self.runs.overlay) = (*before, None);
+        if *self.page() == Page::Overlay {
+            TabView::back(self, cx);
             return;
         }
-        if before == Page::Procedures {
+        if *self.page() == Page::Procedures {
             self.runs.overlay = self.procedures.overlay(cx);
         } else {
             self.runs.lay_over(cx);
         }
-        self.page = if self.runs.overlay.is_some() { Page::Overlay(Box::new(before)) } else { before };
+        self.pages.extend(self.runs.overlay.is_some().then_some(Page::Overlay));
     }
 
     /// Shows the device so many further on, around the end.

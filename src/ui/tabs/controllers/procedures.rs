@@ -22,10 +22,8 @@ const SPAN: SignedDuration = SignedDuration::from_hours(24 * 90);
 const ROOM: u16 = 68;
 const LINES_MAX: usize = 6;
 
-/// The page.
 pub type Procedures = List<PlantProcedures>;
 
-/// The procedures of the plant.
 #[derive(Debug, Default)]
 pub struct PlantProcedures;
 
@@ -127,7 +125,6 @@ fn run_of(cx: &ViewContext, def: &ProcedureDef, runs: Option<&Vec<ControlRun>>) 
 
 /// What is done with the selected one.
 impl Procedures {
-    /// The selected one.
     pub fn id(&self, cx: &ViewContext) -> Option<ProcedureId> {
         self.selected(cx).map(|procedure| procedure.id)
     }
@@ -184,7 +181,6 @@ impl Procedures {
     }
 }
 
-/// Why the page is not shown.
 pub fn why_none(cx: &ViewContext) -> &'static str {
     if cx.is_past() { t!("procedures are shown in the present only") } else { t!("this plant has no procedures") }
 }

@@ -8,7 +8,6 @@ use crate::{
     ui::widgets::mimic::trend,
 };
 
-/// The selected cell.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Cell {
     /// Step, from 0.
@@ -21,7 +20,6 @@ pub struct Cell {
 const CELL: u16 = 12;
 
 impl Cell {
-    /// The tag of the cell.
     pub fn tag(self, program: &ProgramDef) -> Option<TagId> {
         let step = program.steps.get(self.row)?;
         [step.sv, step.ramp, step.soak].get(self.column).copied()
@@ -32,7 +30,6 @@ impl Cell {
     }
 }
 
-/// Draws the page.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, program: &ProgramDef, cell: Cell) {
     let (wide, high) = (canvas.width(), canvas.height());
     heading(cx, canvas, device, program);

@@ -14,10 +14,8 @@ const ROWS: usize = 50;
 /// The list reaches back so far.
 const SPAN: SignedDuration = SignedDuration::from_hours(24 * 90);
 
-/// The page.
 pub type Runs = Overlaid<ControlRuns>;
 
-/// The control runs of a controller.
 #[derive(Debug)]
 pub struct ControlRuns {
     pub device: DeviceId,

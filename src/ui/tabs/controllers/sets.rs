@@ -8,7 +8,6 @@ use crate::ui::tabs::prelude::*;
 /// Where the values to compare with come from.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Source {
-    /// A set of the station.
     Set(String),
     /// Another device, as it is now.
     Device(DeviceId),
@@ -38,7 +37,6 @@ impl Source {
     }
 }
 
-/// What is trusted now.
 pub fn trusted<'a>(cx: &'a ViewContext) -> impl Fn(TagId) -> Option<Exact> + 'a {
     |tag| cx.snapshot.sample(tag).good_exact()
 }
@@ -65,7 +63,6 @@ pub fn problems(cx: &ViewContext, source: &Source) -> Option<Notice> {
     Some(Notice::new(t!("set {name}", name), words))
 }
 
-/// The page.
 pub type Sets = List<SetsOf>;
 
 /// What a device can be compared with.

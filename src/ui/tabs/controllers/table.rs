@@ -14,7 +14,7 @@ use crate::{
 
 /// What is shown of the table, and what is selected in it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Table {
+pub struct ParameterTable {
     /// The selected parameter, by its place among those shown.
     pub selected: usize,
     /// Only parameters with these words in name or meaning.
@@ -23,7 +23,7 @@ pub struct Table {
     pub defaults: bool,
 }
 
-impl Table {
+impl ParameterTable {
     /// The tags that are shown, those of one group together, in the order of the profile.
     pub fn rows<'a>(&self, cx: &ViewContext<'a>, device: DeviceId) -> Vec<&'a TagDef> {
         let tags: Vec<&TagDef> = cx.def().tags_of(device).filter(|tag| self.fits(tag)).collect();
@@ -32,7 +32,6 @@ impl Table {
         sorted
     }
 
-    /// The selected tag.
     pub fn tag<'a>(&self, cx: &ViewContext<'a>, device: DeviceId) -> Option<&'a TagDef> {
         self.rows(cx, device).into_iter().nth(self.selected)
     }
@@ -59,7 +58,7 @@ impl Table {
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas, device: DeviceId) -> usize {
         let theme = cx.theme;
         let tags = self.rows(cx, device);
-        let columns = Columns::new(cx, device, canvas.width());
+        let columns = ParameterColumns::new(cx, device, canvas.width());
         let names = ["", t!("parameter"), t!("value"), "", t!("range"), t!("default"), t!("age"), t!("meaning")];
         canvas.text(1, 0, &columns.row(names), theme.dim());
         if tags.is_empty() {
@@ -95,13 +94,13 @@ impl Table {
         cx: &ViewContext,
         canvas: &mut Canvas,
         y: u16,
-        columns: &Columns,
+        columns: &ParameterColumns,
         tag: &TagDef,
         selected: bool,
     ) {
         let theme = cx.theme;
         let shown = value::show(cx, tag.id);
-        let text = shown.bare(Columns::VALUE);
+        let text = shown.bare(ParameterColumns::VALUE);
         let now = matches!(tag.poll, Poll::Every(_))
             && cx.age(tag.id).as_secs() < 60
             && cx.snapshot.sample(tag.id).quality.is_good();
@@ -122,11 +121,11 @@ impl Table {
         let meaning = if known { &tag.meaning } else { &shown.note };
         let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
         let default = default_text(cx, tag).unwrap_or_default();
-        let range = whole(&range, Columns::RANGE);
+        let range = whole(&range, ParameterColumns::RANGE);
         let row = columns.row([pen, &name, &text, &shown.unit, &range, &default, &read, meaning]);
         canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
         if !selected && tag.is_read() && !cx.snapshot.sample(tag.id).quality.is_good() {
-            canvas.text(1 + columns.value_at(), y, &pad_left(&text, Columns::VALUE), shown.style);
+            canvas.text(1 + columns.value_at(), y, &pad_left(&text, ParameterColumns::VALUE), shown.style);
         }
     }
 }
@@ -145,7 +144,7 @@ pub fn default_text(cx: &ViewContext, tag: &TagDef) -> Option<String> {
 }
 
 /// Widths of the columns that depend on device and screen.
-struct Columns {
+struct ParameterColumns {
     short: u16,
     name: u16,
     range: u16,
@@ -153,7 +152,7 @@ struct Columns {
     meaning: u16,
 }
 
-impl Columns {
+impl ParameterColumns {
     const VALUE: u16 = 10;
     const UNIT: u16 = 6;
     const RANGE: u16 = 16;
@@ -161,20 +160,20 @@ impl Columns {
     /// Of a label, at least.
     const LABEL: u16 = 8;
 
-    fn new(cx: &ViewContext, device: DeviceId, wide: u16) -> Columns {
+    fn new(cx: &ViewContext, device: DeviceId, wide: u16) -> ParameterColumns {
         let tags = || cx.def().tags_of(device);
         let short = tags().map(|tag| width(&tag.short)).max().unwrap_or(0).min(10);
         let label = tags().map(|tag| width(&tag.label)).max().unwrap_or(0);
-        let fixed = 3 + Columns::VALUE + Columns::UNIT + Columns::AGE + 5;
+        let fixed = 3 + ParameterColumns::VALUE + ParameterColumns::UNIT + ParameterColumns::AGE + 5;
         // Before a name is a stump, the range gives way: the window of a change has it.
-        let is_narrow = wide < fixed + Columns::RANGE + short + 1 + Columns::LABEL.min(label);
-        let range = if is_narrow { 0 } else { Columns::RANGE };
+        let is_narrow = wide < fixed + ParameterColumns::RANGE + short + 1 + ParameterColumns::LABEL.min(label);
+        let range = if is_narrow { 0 } else { ParameterColumns::RANGE };
         let free = wide.saturating_sub(fixed + range);
         let name = (short + 1 + label).min(free);
         let left = free - name;
         let any = tags().any(|tag| tag.default.is_some());
         let default = if any && left >= 8 { 7 } else { 0 };
-        Columns { short, name, range, default, meaning: left.saturating_sub(default + 1) }
+        ParameterColumns { short, name, range, default, meaning: left.saturating_sub(default + 1) }
     }
     fn value_at(&self) -> u16 {
         2 + self.name + 1
@@ -187,9 +186,9 @@ impl Columns {
         format!(
             "{pen:1} {} {} {} {range}{default}{} {}",
             pad(name, self.name),
-            pad_left(value, Columns::VALUE),
-            pad(unit, Columns::UNIT),
-            pad_left(age, Columns::AGE),
+            pad_left(value, ParameterColumns::VALUE),
+            pad(unit, ParameterColumns::UNIT),
+            pad_left(age, ParameterColumns::AGE),
             pad(meaning, self.meaning)
         )
     }

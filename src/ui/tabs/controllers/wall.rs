@@ -29,7 +29,6 @@ const FIXED: u16 = 7;
 /// Rows above and below the faceplates.
 const AROUND: u16 = 2;
 
-/// The faceplates on a tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
     /// Beside each other.
@@ -73,7 +72,6 @@ pub fn tags(cx: &ViewContext, devices: &[&DeviceDef], selected: usize) -> Vec<Ta
     seen.filter_map(|device| Some(device.faceplate.as_ref()?.pv)).collect()
 }
 
-/// Draws these devices with this one selected.
 pub fn view(
     cx: &ViewContext,
     canvas: &mut Canvas,

@@ -12,7 +12,6 @@ use crate::{
     ui::widgets::value::show,
 };
 
-/// Columns of the list.
 const LIST: u16 = 31;
 /// Rows that the comparison with the truth has at the least.
 const TRUTH_MIN: u16 = 5;
@@ -151,7 +150,6 @@ enum TruthComparison {
     Wrong,
     /// Not shown as good.
     Unknown,
-    /// As it is.
     Same,
 }
 

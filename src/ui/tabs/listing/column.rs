@@ -4,9 +4,7 @@ use std::cmp::Ordering;
 
 use crate::ui::tabs::prelude::*;
 
-/// A column.
 pub struct Column<R: ?Sized> {
-    /// Its heading.
     pub head: &'static str,
     width: Width,
     /// Filled from the left.
@@ -70,7 +68,6 @@ impl<R: ?Sized> Column<R> {
         Column { order: Some(order), ..self }
     }
 
-    /// The same, dim.
     pub fn dim(self) -> Column<R> {
         Column { is_dim: true, ..self }
     }

@@ -10,7 +10,6 @@ pub fn all<P: KeyTable>(own: Keys<P>) -> Keys<P> {
     moves.and(own).and(Keys::of(&[P::ACTING]))
 }
 
-/// The tables of a page.
 trait Tables: Sized + 'static {
     const MOVING: &'static [Key<Self>];
     const ACTING: &'static [Key<Self>];

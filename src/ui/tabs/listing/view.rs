@@ -12,7 +12,6 @@ use crate::ui::tabs::prelude::*;
 const ROWS_MIN: u16 = 3;
 
 impl<L: Listing> List<L> {
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let (theme, width, height) = (cx.theme, canvas.width(), canvas.height());
         let rows = self.rows(cx);
@@ -101,7 +100,6 @@ impl<L: Listing> List<L> {
         canvas.text(x, 0, &fit(&words.0, end.saturating_sub(x + if 0 < right { right + 1 } else { 0 })), words.1);
     }
 
-    /// Why there is no row.
     fn why_empty(&self, cx: &ViewContext, heading: &Heading) -> String {
         let is_answered = !heading.waits && (self.answered.value.is_some() || self.of.query(cx).is_none());
         match (is_answered, self.filter.is_empty()) {

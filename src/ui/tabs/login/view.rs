@@ -13,7 +13,6 @@ const READ_MAX: u16 = 72;
 /// Rows that the alarms have at least, heading included.
 const ALARM_ROWS_MIN: u16 = 4;
 
-/// Draws the page.
 pub(super) fn draw(login: &Login, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (width, height) = (canvas.width(), canvas.height());

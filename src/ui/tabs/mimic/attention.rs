@@ -20,13 +20,13 @@ use crate::{
 };
 
 /// A row of a list with its look.
-pub type Row = (String, Style);
+pub type AttentionRow = (String, Style);
 
 /// A failed command is listed for so long.
 const FAILED_FOR: SignedDuration = SignedDuration::from_mins(30);
 
 /// Alarms, failed commands, lines and devices that do not respond, outputs that do not follow, in this order.
-pub fn needs_action(cx: &ViewContext) -> Vec<Row> {
+pub fn needs_action(cx: &ViewContext) -> Vec<AttentionRow> {
     let (def, snapshot, trouble) = (cx.def(), cx.snapshot, cx.theme.trouble());
     let has_alarm = |subject| snapshot.alarms.iter().any(|alarm| def.alarm(alarm.id).subject == subject);
     let is_lost = |line: &LineDef| match snapshot.line(line.id).state {
@@ -51,7 +51,7 @@ pub fn needs_action(cx: &ViewContext) -> Vec<Row> {
 }
 
 /// The active alarms, in order of urgency.
-fn alarms(cx: &ViewContext) -> impl Iterator<Item = Row> {
+fn alarms(cx: &ViewContext) -> impl Iterator<Item = AttentionRow> {
     let row = |alarm: &ActiveAlarm| {
         let def = cx.def().alarm(alarm.id);
         let (mark, since) = (cx.theme.priority_mark(def.priority), running(elapsed(since(alarm), cx.now)));
@@ -62,7 +62,7 @@ fn alarms(cx: &ViewContext) -> impl Iterator<Item = Row> {
 }
 
 /// Commands that failed lately, unless a later one for the same tag went well.
-fn failed_commands(cx: &ViewContext) -> impl Iterator<Item = Row> {
+fn failed_commands(cx: &ViewContext) -> impl Iterator<Item = AttentionRow> {
     let commands = &cx.snapshot.commands;
     let has_failed = |status: &CommandStatus| match status.outcome {
         Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => true,
@@ -88,7 +88,7 @@ fn failed_commands(cx: &ViewContext) -> impl Iterator<Item = Row> {
 }
 
 /// Bad and uncertain values, values outside their normal band, manual operation and suppressed alarms, in this order.
-pub fn not_normal(cx: &ViewContext) -> Vec<Row> {
+pub fn not_normal(cx: &ViewContext) -> Vec<AttentionRow> {
     let (def, snapshot, normal) = (cx.def(), cx.snapshot, cx.theme.normal());
     // What the state of its device does not explain.
     let values = def.tags.iter().filter(|tag| tag.is_read() && responds(cx, def.device(tag.device)));
@@ -158,7 +158,7 @@ fn is_trouble(cause: Cause) -> bool {
 }
 
 /// Sections of rows with their headings, each at most so many rows and `none` where it has none; returns the row below.
-pub fn sections(cx: &ViewContext, canvas: &mut Canvas, rows_max: usize, sections: &[(&str, Vec<Row>)]) -> u16 {
+pub fn sections(cx: &ViewContext, canvas: &mut Canvas, rows_max: usize, sections: &[(&str, Vec<AttentionRow>)]) -> u16 {
     let (width, dim) = (canvas.width(), cx.theme.dim());
     let mut y = 0;
     for (title, rows) in sections {
@@ -199,7 +199,7 @@ mod tests {
         ui::fixture::{Fixture, now, with_cx},
     };
 
-    fn rows(snapshot: &Snapshot, list: fn(&ViewContext) -> Vec<Row>) -> Vec<String> {
+    fn rows(snapshot: &Snapshot, list: fn(&ViewContext) -> Vec<AttentionRow>) -> Vec<String> {
         with_cx(snapshot, list).into_iter().map(|(text, _)| text).collect()
     }
 

@@ -12,7 +12,6 @@ use super::{
 };
 use crate::ui::widgets::spark::spark;
 
-/// Values of a card.
 const TAGS_MAX: usize = 8;
 /// Least columns of a card, and of one that is a single line.
 const WIDTH_MIN: u16 = 46;
@@ -56,7 +55,6 @@ pub fn cards(cx: &ViewContext) -> Vec<Card> {
 pub enum Density {
     /// A value with its range and its curve below it.
     Tall,
-    /// A row a value.
     Rows,
     /// So many values at most, without a blank row.
     Short(u16),
@@ -82,7 +80,6 @@ impl Density {
     }
 }
 
-/// Where each card is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Arrangement {
     pub density: Density,
@@ -133,7 +130,6 @@ pub fn arrange(cards: &[Card], selected: usize, (width, height): (u16, u16)) -> 
     Arrangement { density: Density::Line, places, width, step: rows, below: cards.len().saturating_sub(first + seen) }
 }
 
-/// Draws the cards that are seen.
 pub fn view(cx: &ViewContext, canvas: &mut Canvas, cards: &[Card], selected: usize, series: &[Series]) {
     let area = canvas.area();
     let arrangement = arrange(cards, selected, (area.width, area.height));

@@ -36,7 +36,6 @@ fn command_window(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
     }
 }
 
-/// The window of all actuators.
 pub fn actuators(cx: &ViewContext) -> Vec<UiAction> {
     let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
     open(Faceplate::new(t!("commands"), outputs).map(Modal::Faceplate))

@@ -31,7 +31,6 @@ const TREND_MIN: u16 = 9;
 const SHIFT: u16 = 6;
 /// What the trend shows.
 const WINDOW_S: i64 = 3_600;
-/// Pens of the trend.
 const PENS_MAX: usize = 3;
 /// Rows of a section that may be longer.
 const ROWS_MAX: usize = 8;
@@ -45,10 +44,8 @@ const TREND_EVERY_S: f64 = 10.0;
 const SHIFT_EVERY_S: f64 = 60.0;
 const TIMEOUT_S: f64 = 30.0;
 
-/// The parts of the tab.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Parts {
-    /// The mimic.
     pub picture: Rect,
     /// The column beside it.
     pub side: Option<Rect>,
@@ -80,18 +77,15 @@ pub fn parts(nominal: (u16, u16), area: Rect) -> Parts {
     Parts { picture, side: Some(Rect { x: area.x + width + 1, width: side, ..area }), trend, shift }
 }
 
-/// What the companions have asked for.
 #[derive(Debug, Default)]
 pub struct Companions {
     alarms: Answered<Vec<AlarmRecord>>,
     actions: Answered<Vec<ActionRecord>>,
     curves: Answered<Vec<Series>>,
-    /// The running shift.
     shift: Answered<Box<ShiftReport>>,
 }
 
 impl Companions {
-    /// Asks for what is due.
     pub fn ask(&mut self, cx: &ViewContext, parts: &Parts) -> Vec<UiAction> {
         let mut actions = Vec::new();
         let (every, timeout) = (real(cx, EVERY_S), real(cx, TIMEOUT_S));
@@ -122,7 +116,6 @@ impl Companions {
         vec![&mut self.alarms, &mut self.actions, &mut self.curves, &mut self.shift]
     }
 
-    /// Draws them.
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, parts: &Parts) {
         if let Some(side) = parts.side {
             let mut canvas = Canvas::new(frame.buffer_mut(), Rect { x: side.x - 1, width: side.width + 1, ..side });

@@ -1,6 +1,6 @@
 //! What comes next, where rate and target are known: the end of a step, a value at its target or at a limit.
 
-use super::attention::Row;
+use super::attention::AttentionRow;
 use crate::ui::{tabs::prelude::*, widgets::mimic::limits};
 use crate::{
     history::Series,
@@ -57,7 +57,7 @@ pub fn left_in_step(cx: &ViewContext, sequence: TagId) -> Option<Duration> {
 }
 
 /// What comes next, the soonest first; `series` are curves up to now.
-pub fn next(cx: &ViewContext, series: &[Series]) -> Vec<Row> {
+pub fn next(cx: &ViewContext, series: &[Series]) -> Vec<AttentionRow> {
     let def = cx.def();
     let mut rows: Vec<(Duration, String)> = Vec::new();
     for sequence in &def.logic.sequences {

@@ -12,7 +12,6 @@ use crate::{
     },
 };
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Mimic>;
 
 /// Keys of this tab; [`PLANT`] lists the four arrows as one.

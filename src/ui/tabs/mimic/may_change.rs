@@ -1,10 +1,10 @@
 //! Which commands can be given now, and what forbids the others, before a key is pressed.
 
-use super::attention::Row;
+use super::attention::AttentionRow;
 use crate::ui::{interlock, tabs::prelude::*};
 
 /// The commands of actuators and the setpoints of controllers: those that are allowed, then the others by what forbids them.
-pub fn rows(cx: &ViewContext) -> Vec<Row> {
+pub fn rows(cx: &ViewContext) -> Vec<AttentionRow> {
     if cx.is_past() {
         return Vec::new();
     }

@@ -1,7 +1,7 @@
 //! The plant at a glance: every device as a card, what needs an action, what is not normal, the shift and what comes next.
 
 use super::{
-    attention::{Row, needs_action, not_normal, sections},
+    attention::{AttentionRow, needs_action, not_normal, sections},
     cards::{self, Card},
     forecast, shift,
     shift::Shift,
@@ -21,14 +21,12 @@ const LISTS_BELOW: (u16, u16) = (5, 10);
 /// Rows of a list beside the cards.
 const ROWS_MAX: usize = 6;
 
-/// State of the page.
 #[derive(Debug, Default)]
 pub struct Overview {
     selected: usize,
     curves: Answered<Vec<Series>>,
 }
 
-/// The parts of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Parts {
     cards: Rect,
@@ -82,7 +80,6 @@ impl Overview {
         vec![&mut self.curves]
     }
 
-    /// The selected card.
     pub fn card(&self, cx: &ViewContext) -> Option<Card> {
         cards::cards(cx).into_iter().nth(self.selected)
     }
@@ -97,14 +94,13 @@ impl Overview {
         self.curves.query.want();
     }
 
-    /// Draws the page.
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect, shift: &Shift) {
         let parts = parts(cx, area, shift.height(cx));
         let series = self.curves.value.as_deref().unwrap_or_default();
         let cards = cards::cards(cx);
         let left = Rect { x: parts.cards.x + 1, width: parts.cards.width.saturating_sub(1), ..parts.cards };
         cards::view(cx, &mut Canvas::new(frame.buffer_mut(), left), &cards, self.selected, series);
-        let next: Vec<Row> = forecast::next(cx, series).into_iter().chain(shift::end(cx)).collect();
+        let next: Vec<AttentionRow> = forecast::next(cx, series).into_iter().chain(shift::end(cx)).collect();
         let beside = Size::is_wide(area.width);
         if let Some(lists) = parts.lists {
             let mut canvas = Canvas::new(frame.buffer_mut(), lists);
@@ -135,7 +131,7 @@ impl Overview {
 }
 
 /// The lists beside each other, a line for each row.
-fn below(cx: &ViewContext, canvas: &mut Canvas, lists: &[(&str, Vec<Row>)]) {
+fn below(cx: &ViewContext, canvas: &mut Canvas, lists: &[(&str, Vec<AttentionRow>)]) {
     let wide = canvas.width() / to_u16(lists.len().max(1));
     let rows_max = usize::from(canvas.height().saturating_sub(1));
     for (n, (title, rows)) in lists.iter().enumerate() {

@@ -28,7 +28,6 @@ pub(super) fn item_at(picture: &Picture, area: Rect, at: Position) -> Option<usi
     near.min_by_key(|((x, y, size), _)| (x + 2 * y, *size)).map(|(_, n)| n)
 }
 
-/// The scale of a picture on an area.
 pub(super) fn scale(picture: &Picture, area: Rect) -> CanvasScale {
     CanvasScale::new(picture.size, (area.width, area.height))
 }

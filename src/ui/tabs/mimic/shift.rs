@@ -1,6 +1,6 @@
 //! The shift on one time axis: steps of sequences and programs, alarms and operator actions, with a line at the present.
 
-use super::attention::Row;
+use super::attention::AttentionRow;
 use crate::ui::tabs::{alarms::NO_CHANGE, prelude::*};
 use crate::{
     history::Series,
@@ -109,7 +109,6 @@ impl Shift {
         lanes(cx).into_iter().filter(runs).take(LANES_MAX).collect()
     }
 
-    /// Rows that it takes.
     pub fn height(&self, cx: &ViewContext) -> u16 {
         3 + to_u16(self.drawn(cx).len())
     }
@@ -265,8 +264,7 @@ fn steps(cx: &ViewContext, canvas: &mut Canvas, axis: Axis, lane: Lane, series: 
     }
 }
 
-/// When the shift ends.
-pub fn end(cx: &ViewContext) -> Option<Row> {
+pub fn end(cx: &ViewContext) -> Option<AttentionRow> {
     let (_, to) = span(cx).filter(|_| !cx.def().shifts.is_empty())?;
     let left = running(elapsed(cx.now, to));
     Some((t!("{left}  shift ends {at}", left, at = draw::local(cx, to, "%H:%M")), cx.theme.normal()))

@@ -1,11 +1,11 @@
 //! Where sequences and programs are, and how much of the step is left, where that is known.
 
-use super::{attention::Row, forecast::left_in_step};
+use super::{attention::AttentionRow, forecast::left_in_step};
 use crate::plant::program::ProgramPosition;
 use crate::ui::tabs::{controllers::program, prelude::*};
 
 /// Each sequence with its chain of steps, and each program that is under way.
-pub fn rows(cx: &ViewContext) -> Vec<Row> {
+pub fn rows(cx: &ViewContext) -> Vec<AttentionRow> {
     let def = cx.def();
     let sequences = def.logic.sequences.iter().flat_map(|sequence| {
         let now = cx.snapshot.sample(sequence.step).good_value();

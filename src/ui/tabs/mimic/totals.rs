@@ -1,11 +1,11 @@
 //! What the running shift has counted so far: energy, batches, run hours, starts.
 
-use super::attention::Row;
+use super::attention::AttentionRow;
 use crate::report::{RunFigures, ShiftReport, TagFigures, text::mean_or_difference};
 use crate::ui::tabs::prelude::*;
 
 /// The counters that have counted and the actuators that have run, as `heater energy +2.31 kWh` and `PLC-1.P-1 1.2 h, 14 starts`.
-pub fn rows(cx: &ViewContext, report: &ShiftReport) -> Vec<Row> {
+pub fn rows(cx: &ViewContext, report: &ShiftReport) -> Vec<AttentionRow> {
     let name = |tag: &str| {
         let label = cx.def().tag_named(tag).map(|id| cx.def().tag(id).label.as_str()).unwrap_or_default();
         if label.is_empty() { tag.to_owned() } else { translate(label).to_owned() }

@@ -34,12 +34,10 @@ pub struct Cell {
     pub seen: VecDeque<(Timestamp, u16)>,
 }
 
-/// The cells of a unit.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cells(BTreeMap<(Table, u16), Cell>);
 
 impl Cells {
-    /// What is known of an address.
     pub fn get(&self, table: Table, address: u16) -> Option<&Cell> {
         self.0.get(&(table, address))
     }

@@ -1,17 +1,16 @@
 //! The window beside another unit, or beside what this unit gave at an earlier moment.
 
 use super::{
-    Registers,
+    ReadFor, Registers,
     cells::{Cell, Cells},
     view,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
     bus::interpret,
-    plant::live::{AddressSpan, LiveRead, LiveReading},
+    plant::live::{LiveRead, LiveReading},
 };
 
-/// What the window is compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reference {
     /// Another unit, read as often as the window.
@@ -20,25 +19,13 @@ pub enum Reference {
     Moment(Timestamp),
 }
 
-/// A comparison at work.
 #[derive(Debug)]
 pub struct Comparison {
     reference: Reference,
     cells: Cells,
-    /// Number and steady time of the read on its way, and what it reads.
-    on_way: Option<(u32, Timestamp, AddressSpan)>,
 }
 
 impl Comparison {
-    fn new(reference: Reference, cells: Cells) -> Comparison {
-        Comparison { reference, cells, on_way: None }
-    }
-
-    /// Is this its read?
-    pub fn awaits(&self, number: u32) -> bool {
-        self.on_way.is_some_and(|(own, ..)| own == number)
-    }
-
     fn label(&self, cx: &ViewContext) -> String {
         match self.reference {
             Reference::Unit(unit) => t!("unit {unit}", unit),
@@ -77,28 +64,21 @@ impl Registers {
             }
             (Reference::Unit(unit), Cells::default())
         };
-        self.comparison = Some(Comparison::new(reference, cells));
+        self.comparison = Some(Comparison { reference, cells });
         Ok(())
     }
 
     /// Reads the same of the other unit right behind this one, unless that is on its way.
     pub(super) fn read_compared(&mut self, cx: &ViewContext) -> Option<UiAction> {
-        let (line, span, now) = (self.line, self.span(cx), cx.monotonic_now());
-        let lost = super::LOST_AFTER + self.period;
-        let comparison = self.comparison.as_mut()?;
-        let Reference::Unit(unit) = comparison.reference else { return None };
-        if comparison.on_way.is_some_and(|(_, at, on_way)| on_way == span && now.duration_since(at) <= lost) {
-            return None;
-        }
-        let number = cx.numbers.next();
-        comparison.on_way = Some((number, now, span));
+        let Reference::Unit(unit) = self.comparison.as_ref()?.reference else { return None };
+        let span = self.span(cx);
+        let (line, what) = (self.line, ReadFor::Comparison(span));
         let read = LiveRead { line, unit, spans: vec![span], not_before: None, relearn: false };
-        Some(UiAction::query(self.tab, number, Query::Registers(read)))
+        (!self.is_on_way(cx, &what)).then(|| self.send(cx, what, read))
     }
 
     pub(super) fn on_compared(&mut self, reading: Option<LiveReading>) {
         let Some(comparison) = &mut self.comparison else { return };
-        comparison.on_way = None;
         reading.iter().for_each(|reading| comparison.cells.on_reading(reading));
     }
 }
@@ -165,7 +145,6 @@ fn pair<'a>(
     (own, other, standing(own.and_then(|cell| cell.word), other.and_then(|cell| cell.word)))
 }
 
-/// The names of the columns.
 pub fn columns(tab: &Registers, cx: &ViewContext, comparison: &Comparison, canvas: &mut Canvas) {
     let theme = cx.theme;
     let labels = [t!("unit {unit}", unit = tab.unit), comparison.label(cx)];

@@ -51,7 +51,6 @@ pub struct Hit {
     pub shown: String,
 }
 
-/// A number that is looked for.
 struct Wanted {
     value: f64,
     /// Digits behind the point, as it was typed.

@@ -5,7 +5,6 @@ use crate::ui::tabs::bus;
 #[cfg(test)]
 use crate::ui::tabs::trends;
 
-/// A row of the tables here.
 type Key = crate::ui::keys::Key<Registers>;
 
 const MOVE: [Key; 6] = motions!("", Registers::scroll);

@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use super::{Registers, find, view::named_text};
+use super::{ReadFor, Registers, find, view::named_text};
 use crate::bus::recognise;
 use crate::plant::{
     PlantDef,
@@ -24,19 +24,16 @@ const GAP_MAX: u32 = 8;
 /// Columns of a value or a model: a text, the names of many bits or of a whole family are cut.
 const VALUE_WIDTH: u16 = 28;
 
-/// The page.
 pub type Picking = List<Picks>;
 
-/// What is listed.
 #[derive(Debug)]
 pub struct Picks {
-    what: What,
+    what: PicksOf,
     rows: Vec<Pick>,
 }
 
-/// Of what.
 #[derive(Debug, Clone, PartialEq)]
-pub enum What {
+pub enum PicksOf {
     /// Everything that has a name.
     Values,
     /// Device profiles, the likeliest first.
@@ -45,7 +42,6 @@ pub enum What {
     Hits(String),
 }
 
-/// A row.
 #[derive(Debug, Clone)]
 pub struct Pick {
     id: usize,
@@ -58,12 +54,10 @@ pub struct Pick {
     target: Target,
 }
 
-/// What a row leads to.
 #[derive(Debug, Clone)]
 pub enum Target {
     /// Registers, and the order to see them in.
     Place(AddressSpan, Option<ByteOrder>),
-    /// A profile.
     Profile(Arc<PlantDef>),
 }
 
@@ -74,9 +68,9 @@ impl Listing for Picks {
 
     fn heading<'a>(&self, _cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
         match &self.what {
-            What::Values => Heading::new(t!("values with names"), t!("nothing has a name yet")),
-            What::Profiles => Heading::new(t!("device profiles, the likeliest first"), t!("no profile")),
-            What::Hits(text) => {
+            PicksOf::Values => Heading::new(t!("values with names"), t!("nothing has a name yet")),
+            PicksOf::Profiles => Heading::new(t!("device profiles, the likeliest first"), t!("no profile")),
+            PicksOf::Hits(text) => {
                 Heading::new(t!("where {text} may be", text), t!("in none of the registers read so far"))
             }
         }
@@ -92,15 +86,15 @@ impl Listing for Picks {
 
     fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<Pick>> {
         let [group, name, value, note] = match self.what {
-            What::Values => [t!("group"), t!("name"), t!("now"), t!("address")],
-            What::Profiles => [t!("model"), t!("profile"), t!("probes fit"), t!("why not")],
-            What::Hits(_) => [t!("address"), t!("type"), t!("likelihood"), t!("as")],
+            PicksOf::Values => [t!("group"), t!("name"), t!("now"), t!("address")],
+            PicksOf::Profiles => [t!("model"), t!("profile"), t!("probes fit"), t!("why not")],
+            PicksOf::Hits(_) => [t!("address"), t!("type"), t!("likelihood"), t!("as")],
         };
         let label = Column::words(t!("label"), |_, row: &Pick| row.label.clone()).rank(1);
         let columns = [
             Some(Column::words(group, |_, row: &Pick| row.group.clone())),
             Some(Column::words(name, |_, row: &Pick| row.name.clone())),
-            (self.what == What::Values).then_some(label),
+            (self.what == PicksOf::Values).then_some(label),
             Some(Column::number(value, |_, row: &Pick| row.value.clone())),
             Some(rest(10, note, |_, row: &Pick, room| fit(&row.note, room))),
         ];
@@ -108,7 +102,6 @@ impl Listing for Picks {
     }
 }
 
-/// A row of the tables here.
 type Key = keys::Key<Registers>;
 
 /// Its own keys; those of every list come with it.
@@ -120,15 +113,14 @@ pub const KEYS: &[Key] = &[
 impl Registers {
     /// Shows everything that has a name.
     pub(super) fn list_values(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.list_of(cx, What::Values)
+        self.list_of(cx, PicksOf::Values)
     }
 
-    /// Shows the device profiles.
     pub(super) fn list_profiles(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.list_of(cx, What::Profiles)
+        self.list_of(cx, PicksOf::Profiles)
     }
 
-    pub(super) fn list_of(&mut self, cx: &ViewContext, what: What) -> Vec<UiAction> {
+    pub(super) fn list_of(&mut self, cx: &ViewContext, what: PicksOf) -> Vec<UiAction> {
         let rows = self.picks(cx, &what);
         self.picking = Some(List::new(Picks { what, rows }));
         self.follow_list(cx);
@@ -139,11 +131,11 @@ impl Registers {
     pub(super) fn follow_list(&mut self, cx: &ViewContext) {
         let Some(picking) = &self.picking else { return self.listed_spans.clear() };
         let what = picking.of.what.clone();
-        if what == What::Values {
+        if what == PicksOf::Values {
             let rows = self.picks(cx, &what);
             self.picking.iter_mut().for_each(|picking| picking.of.rows.clone_from(&rows));
         }
-        let Some(picking) = self.picking.as_ref().filter(|_| what == What::Values) else {
+        let Some(picking) = self.picking.as_ref().filter(|_| what == PicksOf::Values) else {
             return self.listed_spans.clear();
         };
         let (rows, selected) = (picking.rows(cx), picking.selected(cx).map(|row| row.id));
@@ -153,11 +145,11 @@ impl Registers {
         self.listed_spans = joined(spans.collect());
     }
 
-    fn picks(&self, cx: &ViewContext, what: &What) -> Vec<Pick> {
+    fn picks(&self, cx: &ViewContext, what: &PicksOf) -> Vec<Pick> {
         let mut rows = match what {
-            What::Values => self.value_rows(cx),
-            What::Profiles => self.profile_rows(),
-            What::Hits(text) => self.hit_rows(text),
+            PicksOf::Values => self.value_rows(cx),
+            PicksOf::Profiles => self.profile_rows(),
+            PicksOf::Hits(text) => self.hit_rows(text),
         };
         rows.iter_mut().enumerate().for_each(|(n, row)| row.id = n);
         rows
@@ -249,12 +241,10 @@ impl Registers {
         find::check(text)?;
         let spans = self.swept(cx);
         if spans.is_empty() {
-            return Ok(self.list_of(cx, What::Hits(text.to_owned())));
+            return Ok(self.list_of(cx, PicksOf::Hits(text.to_owned())));
         }
-        let number = cx.numbers.next();
-        self.value_search = Some((number, text.to_owned()));
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
-        Ok(vec![UiAction::query(self.tab, number, Query::Registers(read))])
+        Ok(vec![self.send(cx, ReadFor::Search(text.to_owned()), read)])
     }
 
     /// Does what the selected row leads to.

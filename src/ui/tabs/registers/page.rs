@@ -1,6 +1,6 @@
 //! The registers as a page of the tab Bus, of a unit that the plant file knows.
 
-use super::Registers;
+use super::{ReadFor, Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
@@ -47,7 +47,6 @@ impl Registers {
         }
     }
 
-    /// The line whose registers are shown.
     pub fn line(&self) -> LineId {
         self.line
     }
@@ -59,7 +58,7 @@ impl Registers {
 
     /// What was to be read next is not.
     pub fn rest(&mut self) -> Vec<UiAction> {
-        self.on_way = None;
+        self.sent.retain(|sent| !matches!(sent.what, ReadFor::Window(_)));
         Vec::new()
     }
 }

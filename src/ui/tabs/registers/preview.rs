@@ -26,13 +26,11 @@ pub struct Preview {
     bytes: Vec<u8>,
     context: ListContext,
     list: List,
-    /// The selected column.
     column: usize,
     /// The first row on the screen.
     top: usize,
 }
 
-/// A row of the tables here.
 type Key = keys::Key<Registers>;
 
 const SCROLL: [Key; 6] = motions!("", Registers::scroll_list);
@@ -63,7 +61,6 @@ const KEEP: &[Key] =
     &[Key::new(char('S'), "profile", "save all of it as a device profile", |registers, _| registers.keep_list())];
 const CANCEL: &[Key] = &[Key::elsewhere(code(KeyCode::Esc), "cancel", "take nothing of this list")];
 
-/// All keys.
 pub const KEYS: &[&[keys::Key<Registers>]] = &[&SCROLL, LIST, KEEP, CANCEL];
 
 impl Preview {
@@ -138,7 +135,6 @@ impl Registers {
         Ok(self.read_now(cx))
     }
 
-    /// Changes how the list is read.
     fn change_list(&mut self, change: impl FnOnce(&mut Preview)) {
         let Some(preview) = &mut self.preview else { return };
         change(preview);
@@ -206,7 +202,6 @@ fn base_words(context: &ListContext) -> &'static str {
     }
 }
 
-/// Draws it.
 pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     let (Some(preview), theme) = (&tab.preview, cx.theme) else { return };
     let Preview { context, list, column, top, .. } = preview;

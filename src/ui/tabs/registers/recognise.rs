@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{LOST_AFTER, Registers};
+use super::{ReadFor, Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{
@@ -30,25 +30,22 @@ pub enum Recognition {
     /// Before the first value of the window.
     #[default]
     Waiting,
-    /// Its SunSpec models; number and steady time of the read.
-    Walking { walk: Walk, on_way: Option<(u32, Timestamp)> },
-    /// The signature at work, of these; number and steady time of its read.
-    Asking { known: Vec<Arc<PlantDef>>, at: usize, retries: Retries, on_way: Option<(u32, Timestamp)> },
+    /// Its SunSpec models.
+    Walking(Walk),
+    /// The signature at work, of these.
+    Asking { known: Vec<Arc<PlantDef>>, at: usize, retries: Retries },
     /// The profile that fits; `None`: no profile fits.
     Done(Option<Recognised>),
 }
 
-/// A profile that fits.
 #[derive(Debug)]
 pub struct Recognised {
     /// Its device is the only one of this plant.
     pub def: Arc<PlantDef>,
     how: How,
-    /// Its names were taken.
     is_taken: bool,
 }
 
-/// By what.
 #[derive(Debug, Clone, Copy)]
 enum How {
     Probes(Fit),
@@ -62,22 +59,11 @@ enum How {
 }
 
 impl Recognition {
-    /// Is this its read?
-    pub fn awaits(&self, number: u32) -> bool {
-        let on_way = match self {
-            Recognition::Walking { on_way, .. } | Recognition::Asking { on_way, .. } => *on_way,
-            Recognition::Waiting | Recognition::Done(_) => None,
-        };
-        on_way.is_some_and(|(own, _)| own == number)
-    }
-
     /// The profile whose names were taken.
     pub fn applied(&self) -> Option<&Arc<PlantDef>> {
         match self {
             Recognition::Done(Some(Recognised { def, is_taken: true, .. })) => Some(def),
-            Recognition::Waiting | Recognition::Walking { .. } | Recognition::Asking { .. } | Recognition::Done(_) => {
-                None
-            }
+            Recognition::Waiting | Recognition::Walking(_) | Recognition::Asking { .. } | Recognition::Done(_) => None,
         }
     }
 
@@ -85,7 +71,7 @@ impl Recognition {
     pub fn words(&self) -> String {
         match self {
             Recognition::Waiting => String::new(),
-            Recognition::Walking { walk, .. } => match walk.count() {
+            Recognition::Walking(walk) => match walk.count() {
                 0 => t!("looking for SunSpec").to_owned(),
                 count => t!("SunSpec models so far: {count}", count),
             },
@@ -121,22 +107,19 @@ impl Registers {
             return Vec::new();
         }
         if matches!(self.recognition, Recognition::Waiting) {
-            self.recognition = Recognition::Walking { walk: Walk::default(), on_way: None };
+            self.recognition = Recognition::Walking(Walk::default());
         }
-        let now = cx.monotonic_now();
-        let (spans, on_way) = match &mut self.recognition {
-            Recognition::Walking { walk, on_way } => (walk.next(), on_way),
-            Recognition::Asking { known, at, on_way, .. } => (asked_by(known, *at), on_way),
-            Recognition::Waiting | Recognition::Done(_) => return Vec::new(),
-        };
-        if on_way.is_some_and(|(_, sent)| now.duration_since(sent) < LOST_AFTER) {
+        if self.is_on_way(cx, &ReadFor::Recognition) {
             return Vec::new();
         }
+        let spans = match &mut self.recognition {
+            Recognition::Walking(walk) => walk.next(),
+            Recognition::Asking { known, at, .. } => asked_by(known, *at),
+            Recognition::Waiting | Recognition::Done(_) => return Vec::new(),
+        };
         let Some(spans) = spans else { return self.conclude(cx) };
-        let number = cx.numbers.next();
-        *on_way = Some((number, now));
         let read = LiveRead { line: self.line, unit: self.unit, spans, not_before: None, relearn: false };
-        vec![UiAction::query(self.tab, number, Query::Registers(read))]
+        vec![self.send(cx, ReadFor::Recognition, read)]
     }
 
     /// Takes what was asked. What could not be read does not fit.
@@ -145,14 +128,10 @@ impl Registers {
             self.cells.on_reading(&reading);
         }
         match &mut self.recognition {
-            Recognition::Walking { walk, on_way } => {
-                walk.on_outcomes(&|table, address| self.cells.outcome(table, address));
-                *on_way = None;
-            }
-            Recognition::Asking { known, at, retries, on_way } => {
+            Recognition::Walking(walk) => walk.on_outcomes(&|table, address| self.cells.outcome(table, address)),
+            Recognition::Asking { known, at, retries } => {
                 let is_lost = asked_by(known, *at).iter().flatten().any(|span| self.cells.is_lost(*span));
                 *at += usize::from(!retries.again(is_lost));
-                *on_way = None;
             }
             Recognition::Waiting | Recognition::Done(_) => {}
         }
@@ -162,7 +141,7 @@ impl Registers {
     /// All was read: what it says.
     fn conclude(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         match &self.recognition {
-            Recognition::Walking { walk, .. } => match walk.found() {
+            Recognition::Walking(walk) => match walk.found() {
                 Some(found) => {
                     let how = How::SunSpec { count: found.models.len(), is_cut: found.is_cut };
                     let text = profile_text(found);
@@ -217,7 +196,7 @@ impl Registers {
 
     fn ask_signatures(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let known = self.profiles.recognisable();
-        self.recognition = Recognition::Asking { known, at: 0, retries: Retries::default(), on_way: None };
+        self.recognition = Recognition::Asking { known, at: 0, retries: Retries::default() };
         self.recognise(cx)
     }
 

@@ -158,7 +158,6 @@ fn save_new(files: Vec<(PathBuf, Vec<u8>)>) -> UiAction {
     UiAction::Do(Effect::SaveNew { tab: Tab::Registers, files })
 }
 
-/// Why nothing is loaded.
 pub fn no_list(why: String) -> UiAction {
     UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![why])))
 }

@@ -35,7 +35,6 @@ struct Bench {
     asked: Vec<(QueryId, LiveRead)>,
     /// What the signatures ask.
     probed: Vec<(QueryId, LiveRead)>,
-    /// Rows of a log.
     rows: Vec<String>,
 }
 
@@ -81,8 +80,9 @@ impl Bench {
             Effect::Query(id, Query::Registers(read)) => Some((id, read)),
             _ => None,
         });
-        let recognition = &self.model.tabs.registers.recognition;
-        let (probes, reads): (Vec<_>, Vec<_>) = reads.partition(|(id, _)| recognition.awaits(id.number));
+        let sent = &self.model.tabs.registers.sent;
+        let is_probe = |number| sent.iter().any(|read| read.number == number && read.what == ReadFor::Recognition);
+        let (probes, reads): (Vec<_>, Vec<_>) = reads.partition(|(id, _)| is_probe(id.number));
         self.probed.extend(probes);
         self.asked.extend(reads);
     }

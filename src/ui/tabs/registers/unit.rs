@@ -36,6 +36,7 @@ impl Registers {
         (self.unit, self.reads) = (unit, 0);
         (self.cells, self.last, self.recognition) = (Cells::default(), None, Recognition::default());
         self.watch.clear();
+        self.sent.clear();
         self.comparison = None;
         self.names_of_plant = Names::default();
         self.name_by_plant(cx.snapshot);

@@ -5,7 +5,7 @@ use super::{
     advice::advice,
     cells::Cell,
     compare, detail,
-    layout::{Columns, layout, name_column},
+    layout::{Layout, layout, name_column},
     watch,
 };
 use crate::ui::tabs::prelude::*;
@@ -40,7 +40,6 @@ pub fn rows(tab: &Registers, height: u16) -> usize {
     usize::from(height.saturating_sub(HEAD + below)).max(1)
 }
 
-/// Draws the tab.
 pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     heading(tab, cx, canvas);
     let height = canvas.height();
@@ -262,7 +261,7 @@ fn numbers(
     address: u16,
     (hex, word): (&str, u16),
     style: Style,
-    at: &Columns,
+    at: &Layout,
 ) {
     let words = tab.cells.words(tab.table, address, 2);
     canvas.text(17, y, hex, style);

@@ -42,14 +42,12 @@ struct Watched {
     greatest: Exact,
 }
 
-/// A log under way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Log {
     path: PathBuf,
     rows: u64,
 }
 
-/// The list.
 #[derive(Debug, Default)]
 pub struct WatchList {
     items: Vec<Watched>,

@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use super::{Registers, preview::Preview, view};
+use super::{ReadFor, Registers, preview::Preview, view};
 use crate::{
     access::right::needs_for_query,
     plant::{
         command::Refusal,
-        live::{AddressSpan, CELLS_MAX, LiveRead, SPANS_MAX},
+        live::{AddressSpan, CELLS_MAX, LiveRead, LiveReading, SPANS_MAX},
         number::to_u32,
     },
     ui::{rights, tabs::prelude::*},
@@ -20,7 +20,6 @@ const PERIODS_MS: [i64; 8] = [200, 500, 1_000, 2_000, 5_000, 10_000, 30_000, 60_
 const BEHIND: u32 = 3;
 
 impl Registers {
-    /// The rows of the window.
     pub(super) fn rows(&self, cx: &ViewContext) -> Range<u32> {
         let first = u32::from(self.first);
         first..(first + to_u32(view::rows(self, cx.area.height))).min(0x1_0000)
@@ -64,8 +63,7 @@ impl Registers {
     /// Something else is shown: what is on its way is no longer wanted.
     pub(super) fn read_now(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if self.paused {
-            self.on_way = None;
-            return Vec::new();
+            return self.rest();
         }
         self.ask(cx, None)
     }
@@ -85,14 +83,35 @@ impl Registers {
             left.inspect(|left| room = *left).is_some()
         };
         let spans = spans.take(SPANS_MAX).filter(fits).collect();
-        let query = Query::Registers(LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn });
+        let read = LiveRead { line: self.line, unit: self.unit, spans, not_before, relearn };
         let silent = cx.def().listens_on(self.line).then(|| Refusal::OnlyListens.to_string());
-        if let Some(why) = silent.or_else(|| rights::lacks(cx, needs_for_query(&query))) {
+        if let Some(why) = silent.or_else(|| rights::lacks(cx, needs_for_query(&Query::Registers(read.clone())))) {
             self.trouble = Some(why);
             return Vec::new();
         }
-        let number = cx.numbers.next();
-        self.on_way = Some((number, cx.monotonic_now(), span));
-        vec![UiAction::query(self.tab, number, query)]
+        vec![self.send(cx, ReadFor::Window(span), read)]
+    }
+
+    /// The window was read: the next read is due one period later.
+    pub(super) fn on_window(&mut self, cx: &ViewContext, reading: LiveReading) -> Vec<UiAction> {
+        self.trouble = None;
+        self.reads += 1;
+        reading.response_time.into_iter().for_each(|reply| self.replies.see(reply));
+        self.cells.on_reading(&reading);
+        self.name_by_profile();
+        self.follow_list(cx);
+        let began = reading.began;
+        let early = self.due.filter(|due| began + self.period / 2 < *due && *due <= began + self.period);
+        let mut actions = self.watch_reading(&reading, early.is_none());
+        self.took = cx.monotonic_now().duration_since(began);
+        self.last = Some(reading);
+        if self.paused {
+            return actions;
+        }
+        actions.extend(self.read_compared(cx));
+        actions.extend(self.recognise(cx));
+        self.due = early.or_else(|| began.checked_add(self.period).ok());
+        actions.extend(self.ask(cx, self.due));
+        actions
     }
 }

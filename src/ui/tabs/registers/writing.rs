@@ -18,7 +18,6 @@ use crate::{
     register_map::named::{Named, Names},
 };
 
-/// Writes that are listed.
 const WRITES_MAX: usize = 200;
 
 /// A write that has ended.
@@ -140,7 +139,6 @@ impl Registers {
         self.ask_text(super::Asking::Write, &title, &hint)
     }
 
-    /// Enables writing.
     pub(super) fn enable_writing(&mut self, text: &str) -> Result<Vec<UiAction>, String> {
         if text != t!("yes") {
             return Err(t!("found `{text}`, expected yes", text));

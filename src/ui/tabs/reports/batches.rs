@@ -1,6 +1,6 @@
 //! The list of batches: each with its times, energy and alarms, and what is known of the selected one.
 
-use super::{Export, Key, Reports};
+use super::{Export, Key, Page, Reports};
 use crate::ui::tabs::{
     overlay::{Kind, Laid, Laying, Overlaid},
     prelude::*,
@@ -11,11 +11,10 @@ use crate::{
     text::file,
 };
 
-/// Keys of the list.
 pub const LIST: &[&[Key]] = &[&[
     Key::change(code(KeyCode::Enter), "report", "the whole report of its time", |reports, cx| {
         if let Some(period) = reports.batches.period(cx) {
-            reports.batches_shown = false;
+            reports.page = Page::Report;
             reports.show(Some(period));
         }
     }),
@@ -24,7 +23,7 @@ pub const LIST: &[&[Key]] = &[&[
     }),
     Key::new(char('e'), "export", "write the list as CSV", Reports::export_batches).needs(Role::Technician),
     Key::change(char('b'), "shifts", "the reports of shifts", |reports, _| {
-        (reports.batches_shown, reports.export) = (false, Export::Not);
+        (reports.page, reports.export) = (Page::Report, Export::Not);
     }),
 ]];
 
@@ -40,7 +39,6 @@ const ROWS: usize = 50;
 /// The list reaches back so far.
 const SPAN: SignedDuration = SignedDuration::from_hours(24 * 30);
 
-/// The page.
 pub type Batches = Overlaid<BatchReports>;
 
 /// The batches of the plant, newest first.
@@ -127,7 +125,6 @@ impl Batches {
         if self.overlay.is_some() { OVERLAY } else { LIST }
     }
 
-    /// The period of the selected batch.
     fn period(&self, cx: &ViewContext) -> Option<Period> {
         self.list.selected(cx).map(|report| report.period())
     }

@@ -8,16 +8,13 @@ use crate::{
     ui::tabs::prelude::*,
 };
 
-/// How the file stands.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Export {
     /// Nothing written of this period.
     Not,
     /// On its way to the disk.
     Writing,
-    /// Written here.
     Done(PathBuf),
-    /// Why not.
     Failed(String),
 }
 

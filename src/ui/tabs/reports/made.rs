@@ -1,6 +1,6 @@
 //! The reports that the station makes by itself: each with its state, its file and how to fetch it, and the selected one as text.
 
-use super::{Key, Reports};
+use super::{Key, Page, Reports};
 use crate::ui::tabs::prelude::*;
 use crate::{
     history::MadeReports,
@@ -8,31 +8,25 @@ use crate::{
     report::{Period, ShiftReport, automatic::is_given_up, calendar, content, language, text::lines},
 };
 
-/// Keys of the list.
 pub const LIST: &[&[Key]] = &[&[
     Key::change(code(KeyCode::Enter), "text", "the selected report as text", |reports, cx| {
         reports.made.open = reports.made.list.selected(cx).map(|report| opened(cx, &report));
     }),
-    Key::change(char('r'), "shifts", "the reports of shifts", |reports, _| reports.made.shown = false),
+    Key::change(char('r'), "shifts", "the reports of shifts", |reports, _| reports.page = Page::Report),
 ]];
-/// Keys of the text.
 pub const TEXT: &[&[Key]] = &[
     &motions!("", |reports: &mut Reports, cx: &ViewContext, motion| reports.made.scroll(cx, motion)),
     &[Key::change(char('r'), "list", "back to the list of automatic reports", |reports, _| reports.made.open = None)],
 ];
 
-/// Rows of the list.
 const ROWS: usize = 500;
 /// A report over weeks may take its time.
 const REPORT_TIMEOUT_S: f64 = 60.0;
 /// Columns of a text report.
 const WIDTH: u16 = 80;
 
-/// State of the page.
 #[derive(Debug, Default)]
 pub struct AutomaticReportsPage {
-    /// It is shown in place of a report.
-    pub shown: bool,
     pub list: List<AutomaticReports>,
     /// The report that is shown as text, in place of the list.
     pub open: Option<Opened>,
@@ -95,7 +89,6 @@ impl AutomaticReportsPage {
         query.into_iter().collect()
     }
 
-    /// Draws it.
     pub fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
         match &self.open {

@@ -2,11 +2,10 @@
 
 use jiff::{civil, tz::TimeZone};
 
-use super::{Export, Key, Reports};
+use super::{Export, Key, Page, Reports};
 use crate::report::{self, RecordRow, ShiftReport, record_csv::record_decimals};
 use crate::ui::tabs::prelude::*;
 
-/// Keys of the page.
 pub const KEYS: &[&[Key]] = &[
     &[
         Key::change(code(KeyCode::Left), "earlier", "rows of the previous shift", |reports, cx| reports.step(cx, -1)),
@@ -24,7 +23,7 @@ pub const KEYS: &[&[Key]] = &[
         })
         .needs(Role::Technician),
         Key::change(char('n'), "report", "the figures of the report", |reports, _| {
-            (reports.rows.shown, reports.export) = (false, Export::Not);
+            (reports.page, reports.export) = (Page::Report, Export::Not);
         }),
     ],
     &motions!("scroll", |reports: &mut Reports, cx: &ViewContext, motion| {
@@ -32,18 +31,14 @@ pub const KEYS: &[&[Key]] = &[
     }),
 ];
 
-/// State of the page.
 #[derive(Debug, Default)]
-pub struct Rows {
-    /// It is shown in place of the figures.
-    pub shown: bool,
+pub struct RecordRows {
     conditions: Vec<Condition>,
     scroll: Scroll,
 }
 
-/// A column of the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Column {
+enum RecordColumn {
     Sv,
     Pv,
     Er,
@@ -52,12 +47,11 @@ enum Column {
 /// `pv > 60`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Condition {
-    column: Column,
+    column: RecordColumn,
     above: bool,
     limit: f64,
 }
 
-/// What was typed.
 #[derive(Debug, Clone, PartialEq)]
 enum Typed {
     /// A time of day, of the first date that has it.
@@ -66,11 +60,11 @@ enum Typed {
     Conditions(Vec<Condition>),
 }
 
-fn column_of(word: &str) -> Option<Column> {
+fn column_of(word: &str) -> Option<RecordColumn> {
     match word {
-        "sv" => Some(Column::Sv),
-        "pv" => Some(Column::Pv),
-        "er" => Some(Column::Er),
+        "sv" => Some(RecordColumn::Sv),
+        "pv" => Some(RecordColumn::Pv),
+        "er" => Some(RecordColumn::Er),
         _ => None,
     }
 }
@@ -101,15 +95,15 @@ impl Condition {
     /// What is not known is neither above nor below.
     fn holds(self, row: &RecordRow) -> bool {
         let value = match self.column {
-            Column::Sv => row.sv,
-            Column::Pv => row.pv,
-            Column::Er => row.er,
+            RecordColumn::Sv => row.sv,
+            RecordColumn::Pv => row.pv,
+            RecordColumn::Er => row.er,
         };
         value.is_some_and(|value| if self.above { value > self.limit } else { value < self.limit })
     }
 }
 
-impl Rows {
+impl RecordRows {
     /// Another period: its first row.
     pub fn rewind(&mut self) {
         self.scroll = Scroll::default();
@@ -119,7 +113,6 @@ impl Rows {
         report.record.iter().filter(|row| self.conditions.iter().all(|condition| condition.holds(row))).collect()
     }
 
-    /// Scrolls.
     pub fn on_motion(&mut self, cx: &ViewContext, report: Option<&ShiftReport>, motion: Motion) {
         let count = report.map_or(0, |report| self.filtered(report).len());
         self.scroll.on(motion, count, room(cx.area.height.saturating_sub(1)));
@@ -199,10 +192,13 @@ mod tests {
             ("14:05", Some(Typed::Time(civil::time(14, 5, 0, 0)))),
             ("2026-11-26 14:05", Some(Typed::Instant(civil::date(2026, 11, 26).at(14, 5, 0, 0)))),
             ("2026-11-26", Some(Typed::Instant(civil::date(2026, 11, 26).at(0, 0, 0, 0)))),
-            ("PV>60", Some(Typed::Conditions(vec![condition(Column::Pv, true, 60.0)]))),
+            ("PV>60", Some(Typed::Conditions(vec![condition(RecordColumn::Pv, true, 60.0)]))),
             (
                 "er < -1 sv > 2",
-                Some(Typed::Conditions(vec![condition(Column::Er, false, -1.0), condition(Column::Sv, true, 2.0)])),
+                Some(Typed::Conditions(vec![
+                    condition(RecordColumn::Er, false, -1.0),
+                    condition(RecordColumn::Sv, true, 2.0),
+                ])),
             ),
             ("", Some(Typed::Conditions(Vec::new()))),
             ("mv > 3", None),

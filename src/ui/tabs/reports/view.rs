@@ -20,10 +20,8 @@ const LIST_MAX: usize = 500;
 
 /// Columns of the figures beside a chart.
 const FIGURES: u16 = 80;
-/// Rows of the chart at most.
 const CHART_ROWS: u16 = 24;
 
-/// Draws the tab.
 pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
     let (columns, height) = (canvas.width(), canvas.height());

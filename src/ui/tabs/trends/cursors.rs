@@ -90,12 +90,10 @@ impl Trends {
         }
     }
 
-    /// Both cursors.
     pub(crate) fn both(&self) -> Option<(Timestamp, Timestamp)> {
         self.cursor.zip(self.between.b)
     }
 
-    /// Do the arrows move cursor B?
     pub(super) fn moves_b(&self) -> bool {
         self.between.moves_b
     }

@@ -42,7 +42,6 @@ impl Trends {
         }
     }
 
-    /// Asks what is due.
     pub(super) fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         if let Some(overlay) = &mut self.overlay {
             return overlay.ask(cx);

@@ -12,7 +12,6 @@ const EVENTS_MAX: usize = 200;
 /// Batches are shown in windows up to this: each costs a small report.
 const BATCHES_SPAN: SignedDuration = SignedDuration::from_hours(24 * 31);
 
-/// The events of the view.
 #[derive(Debug, Default)]
 pub(super) struct Events {
     pub alarms: Answered<Vec<AlarmRecord>>,
@@ -25,7 +24,6 @@ pub(super) struct Events {
 /// What an event is; the first is shown where several happened in one column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum EventKind {
-    /// An alarm was raised.
     Alarm,
     /// An operator left a note with an action.
     Note,

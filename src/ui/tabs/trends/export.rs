@@ -40,7 +40,6 @@ impl Export {
         &mut self.values
     }
 
-    /// Is something on its way?
     pub(super) fn is_busy(&self) -> bool {
         self.wanted.is_some() || !self.files.is_empty()
     }

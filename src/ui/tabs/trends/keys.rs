@@ -3,10 +3,8 @@
 use super::{Asking, RATES, Trends, WINDOWS, overlay, plots::Plot, window::Direction};
 use crate::ui::tabs::prelude::*;
 
-/// A row of the tables here.
 pub(super) type Key = crate::ui::keys::Key<Trends>;
 
-/// Keys of the curves.
 pub(super) const CURVES: &[Key] = &[
     Key::elsewhere(code(KeyCode::Esc), "close", "close the picture, as every key does")
         .when(|trends, _| Offer::only_if(trends.pictured)),
@@ -92,11 +90,9 @@ pub(super) const CURVES: &[Key] = &[
 ];
 
 const FIND: Key =
-    Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Trends::ask_filter)
-        .when(of_plant);
+    Key::new(char('/'), "find", "find values to draw: a filter of the list of all values", Trends::find).when(of_plant);
 const WHY: Key = Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Trends::why).when(of_plant);
 
-/// Keys of the list of all values.
 pub(super) const VALUES: &[Key] = &[
     // In a replay Esc leads back here before it ends the past.
     Key::elsewhere(code(KeyCode::Esc), "back", "previous page").when(|_, cx| Offer::only_if(cx.is_past())),
@@ -105,10 +101,6 @@ pub(super) const VALUES: &[Key] = &[
     FIND,
     Key::change(char('v'), "curves", "back to the curves", |trends, _| trends.show_values(None)),
     WHY,
-    Key::change(code(KeyCode::Up), "", "a row up", |trends, cx| trends.select_value(cx, Motion::Rows(-1))),
-    Key::change(code(KeyCode::Down), "select", "a row down", |trends, cx| trends.select_value(cx, Motion::Rows(1))),
-    Key::change(code(KeyCode::PageUp), "", "a page up", |trends, cx| trends.select_value(cx, Motion::Pages(-1))),
-    Key::change(code(KeyCode::PageDown), "", "a page down", |trends, cx| trends.select_value(cx, Motion::Pages(1))),
 ];
 
 /// A key of the present: a replay keeps its instant in the view with the cursor on it, and nothing moves.

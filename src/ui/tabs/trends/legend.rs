@@ -18,7 +18,7 @@ use crate::{
 const FIGURE: u16 = 7;
 
 /// Columns of the legend: right ends of the numbers, and where the last column begins.
-struct Columns {
+struct Ends {
     name: u16,
     value: u16,
     min: u16,
@@ -28,17 +28,17 @@ struct Columns {
     hour: u16,
 }
 
-impl Columns {
-    fn new(width: u16) -> Columns {
+impl Ends {
+    fn new(width: u16) -> Ends {
         let name = 13 + width.saturating_sub(80).min(40) / 2;
         // Where the share of good time would stand outside, the value has less room.
         let value = 4 + name + 13 + width.saturating_sub(80).min(40) / 4 - 63_u16.saturating_sub(width).min(4);
-        Columns { name, value, min: value + 8, mean: value + 16, max: value + 24, good: value + 33, hour: value + 36 }
+        Ends { name, value, min: value + 8, mean: value + 16, max: value + 24, good: value + 33, hour: value + 36 }
     }
 }
 
 pub(super) fn draw_legend(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, plan: Option<&Plan>) {
-    let (columns, dim) = (Columns::new(canvas.width()), cx.theme.dim());
+    let (columns, dim) = (Ends::new(canvas.width()), cx.theme.dim());
     if canvas.height() == 0 {
         return;
     }
@@ -179,7 +179,7 @@ fn draw_pen(
     cursor: Option<Timestamp>,
     own: Option<(f64, f64)>,
 ) {
-    let (theme, columns) = (cx.theme, Columns::new(row.width()));
+    let (theme, columns) = (cx.theme, Ends::new(row.width()));
     let (pen_style, off) = draw_name(trends, cx, row, (n, pen), columns.name);
     let room = columns.value - columns.name - 5;
     let (text, style) = match cursor {
@@ -216,7 +216,7 @@ fn draw_pen(
 /// Least, mean and greatest of the window and its share of good time; nothing where there was no good value, and no
 /// arithmetic with the numbers of an enumeration.
 fn draw_figures(trends: &Trends, cx: &ViewContext, row: &mut Canvas, tag: TagId) {
-    let (columns, style) = (Columns::new(row.width()), cx.theme.normal());
+    let (columns, style) = (Ends::new(row.width()), cx.theme.normal());
     let Some((summary, good)) = trends.figures.get(&tag) else { return };
     if cx.def().tag(tag).enum_labels.is_empty() {
         for (end, value) in [columns.min, columns.mean, columns.max]

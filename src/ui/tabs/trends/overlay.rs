@@ -13,7 +13,6 @@ const FORMS: &str = "yesterday  7d  8h  2026-11-20  06:00-14:00 / 2026-11-20 06:
 /// What is offered: one alone lies over the view.
 const OFFERED: &str = "yesterday";
 
-/// Keys of that page.
 pub(super) const KEYS: &[Key] = &[
     Key::change(code(KeyCode::Left), "", "previous tag", |trends, _| trends.next_overlaid(-1)),
     Key::change(code(KeyCode::Right), "tag", "next tag", |trends, _| trends.next_overlaid(1)),
@@ -22,7 +21,6 @@ pub(super) const KEYS: &[Key] = &[
 ];
 
 impl Trends {
-    /// Asks what lies over the view.
     pub(super) fn ask_overlay(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
         self.asking = Asking::Overlay;
         let typed = self.typed_overlay.as_deref().unwrap_or(OFFERED);

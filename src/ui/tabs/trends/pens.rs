@@ -54,12 +54,10 @@ impl Trends {
         if self.opened.is_empty() { &self.picked } else { &self.opened }
     }
 
-    /// The number of groups.
     pub(super) fn groups(&self, cx: &ViewContext) -> usize {
         cx.def().trends.len() + usize::from(!self.behind().is_empty())
     }
 
-    /// The name of the shown group.
     pub(super) fn name(&self, cx: &ViewContext) -> String {
         match (cx.def().trends.get(self.group), self.behind()) {
             (Some(group), _) => group.name.clone(),
@@ -127,7 +125,7 @@ impl Trends {
 
     /// Marks the selected value of the list as a pen, or no longer.
     pub(super) fn pick(&mut self, cx: &ViewContext) {
-        let Some(tag) = self.values.and_then(|(_, row)| self.listed(cx).get(row).copied()) else { return };
+        let Some(tag) = self.listed_value(cx) else { return };
         match self.picked.iter().position(|picked| *picked == tag) {
             Some(place) => drop(self.picked.remove(place)),
             None if self.picked.len() < PENS_MAX => self.picked.push(tag),
@@ -146,7 +144,6 @@ impl Trends {
         }
     }
 
-    /// Asks for the scale of the selected pen.
     pub(super) fn ask_scale(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let Some(pen) = self.pens(cx).get(self.selected).copied() else { return Vec::new() };
         self.asking = Asking::Scale(pen.tag);

@@ -28,7 +28,6 @@ use crate::{
     },
 };
 
-/// Size of the page.
 const PAGE: (u16, u16) = (1_280, 800);
 /// The plot on it: left, top and right.
 const PLOT: (f32, f32, f32) = (80.0, 64.0, 1_200.0);

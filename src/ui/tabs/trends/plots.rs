@@ -16,10 +16,8 @@ use crate::{
 /// Columns of the view that a plot is made of: finer than any screen.
 const COLUMNS: usize = 2_000;
 
-/// What the tab draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Plot {
-    /// Curves over time.
     #[default]
     Time,
     /// The selected pen over the next one.
@@ -28,12 +26,10 @@ pub enum Plot {
     Histogram,
     /// The answer of a controller to its last step of the setpoint.
     Response,
-    /// The pens as large numbers.
     Numbers,
 }
 
 impl Plot {
-    /// The next one.
     pub fn next(self) -> Plot {
         match self {
             Plot::Time => Plot::Xy,

@@ -26,9 +26,8 @@ pub fn copied(trends: &Trends, cx: &ViewContext) -> Vec<String> {
         };
         return trends.drawn(cx).into_iter().map(line).collect();
     }
-    let tag = match trends.values {
-        Some((_, row)) => trends.listed(cx).get(row).copied(),
-        None => trends.pens(cx).get(trends.selected).map(|pen| pen.tag),
-    };
-    tag.into_iter().map(|tag| value::line(cx, tag)).collect()
+    if let Some(list) = trends.list(cx) {
+        return list.copied(cx);
+    }
+    trends.pens(cx).get(trends.selected).map(|pen| value::line(cx, pen.tag)).into_iter().collect()
 }

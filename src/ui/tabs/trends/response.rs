@@ -125,7 +125,6 @@ pub(super) fn draw_response(trends: &Trends, cx: &ViewContext, canvas: &mut Canv
     }
 }
 
-/// The figures in words.
 fn figures(cx: &ViewContext, device: &DeviceDef, pv: TagId, found: &StepResponse, step: Duration) -> [String; 4] {
     let (unit, arrow) = (cx.snapshot.unit(pv), cx.theme.pick("→", "->"));
     let number = |value: f64| cx.snapshot.format(pv, value);

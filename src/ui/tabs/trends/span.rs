@@ -44,7 +44,6 @@ pub struct View {
     pub from: Timestamp,
     /// Right edge; for a living view up to one column, or a hop, after now.
     pub to: Timestamp,
-    /// Number of columns.
     pub columns: usize,
 }
 
@@ -87,12 +86,10 @@ impl View {
         self.to.duration_since(self.from) / i32::try_from(self.columns.max(1)).unwrap_or(i32::MAX)
     }
 
-    /// Width of the view.
     pub fn width(self) -> SignedDuration {
         self.to.duration_since(self.from)
     }
 
-    /// Is an instant on it?
     pub fn holds(self, at: Timestamp) -> bool {
         self.from <= at && at < self.to
     }

@@ -7,6 +7,7 @@ mod overlay;
 mod pens;
 mod picture;
 mod queries;
+mod values;
 mod window;
 
 use queries::kinds;
@@ -100,6 +101,7 @@ impl Stand {
                 '→' => KeyCode::Right,
                 '↓' => KeyCode::Down,
                 '⏎' => KeyCode::Enter,
+                '⎋' => KeyCode::Esc,
                 key => KeyCode::Char(key),
             };
             self.send(Msg::Key(KeyEvent::new(code, KeyModifiers::NONE)));

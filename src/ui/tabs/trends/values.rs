@@ -19,39 +19,29 @@ impl Trends {
         cx.def().tags.iter().filter(|tag| tag.is_stored() && fits(tag)).map(|tag| tag.id).collect()
     }
 
-    /// Asks for the words of the filter, and shows the list.
-    pub(super) fn ask_filter(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
-        self.asking = Asking::Filter;
+    /// The selected value, while they are listed.
+    pub(super) fn listed_value(&self, cx: &ViewContext) -> Option<TagId> {
+        self.values.and_then(|(_, row)| self.listed(cx).get(row).copied())
+    }
+
+    /// Shows the list, and asks for the words of its filter.
+    pub(super) fn find(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         self.values.get_or_insert((0, 0));
         self.hours.query.want();
-        let words = t!("words of name, label or unit; none lists all");
-        open(Modal::Prompt(Prompt::new(t!("Find values"), words, &self.filter.to_string())))
-    }
-
-    /// Lists the values that fit these words.
-    pub(super) fn filter_values(&mut self, text: &str) {
-        (self.filter, self.values) = (Words::parse(text), Some((0, 0)));
-        self.hours.query.want();
-    }
-
-    /// Out of the list: first the filter goes.
-    pub(super) fn leave_values(&mut self) -> bool {
-        if self.filter.is_empty() {
-            self.values = None;
-        } else {
-            self.filter_values("");
-        }
-        true
+        listing::ask_filter(self, cx)
     }
 
     /// Shows the curve of the selected value.
     pub(super) fn open(&mut self, cx: &ViewContext) {
-        if let Some(tag) = self.values.and_then(|(_, row)| self.listed(cx).get(row).copied()) {
+        if let Some(tag) = self.listed_value(cx) {
             self.open_value(cx, tag);
         }
     }
+}
 
-    pub(super) fn select_value(&mut self, cx: &ViewContext, motion: Motion) {
+/// The list of values.
+impl ListPage for Trends {
+    fn step(&mut self, cx: &ViewContext, motion: Motion) {
         let (first, row) = self.values.unwrap_or_default();
         let rows = usize::from(cx.area.height.saturating_sub(2)).max(1);
         let row = motion.to(row, self.listed(cx).len(), rows);
@@ -60,6 +50,31 @@ impl Trends {
             self.hours.query.want();
         }
         self.values = Some((first_now, row));
+    }
+
+    fn back(&mut self, cx: &ViewContext) -> bool {
+        let filtered = !self.filter.is_empty();
+        if filtered {
+            self.set_filter(cx, "");
+        }
+        filtered
+    }
+
+    fn copied(&self, cx: &ViewContext) -> Vec<String> {
+        self.listed_value(cx).into_iter().map(|tag| value::line(cx, tag)).collect()
+    }
+
+    fn filter(&self) -> String {
+        self.filter.to_string()
+    }
+
+    fn filter_hint(&self) -> &'static str {
+        t!("words of name, label or unit; none lists all")
+    }
+
+    fn set_filter(&mut self, _cx: &ViewContext, text: &str) {
+        (self.filter, self.values) = (Words::parse(text), Some((0, 0)));
+        self.hours.query.want();
     }
 }
 

@@ -36,7 +36,6 @@ const CHART_ROWS_MIN: u16 = 7;
 
 pub(super) static NO_TRACE: Trace = Trace::EMPTY;
 
-/// Draws the tab.
 pub fn draw(trends: &Trends, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     if let Some(overlay) = &trends.overlay {
         return overlay.view(cx, frame, area);
@@ -48,7 +47,6 @@ pub fn draw(trends: &Trends, cx: &ViewContext, frame: &mut Frame, area: Rect) {
     }
 }
 
-/// Rows of the legend on a tab of this height.
 fn legend_rows(trends: &Trends, cx: &ViewContext, height: u16) -> u16 {
     (to_u16(trends.pens(cx).len()) + 1).min(height.saturating_sub(1 + CHART_ROWS_MIN))
 }
@@ -300,7 +298,6 @@ pub(super) fn at_cursor(trends: &Trends, cx: &ViewContext, tag: TagId, at: Times
     Some(cx.snapshot.format(tag, value))
 }
 
-/// The last hour of a tag.
 pub(super) fn hour(trends: &Trends, tag: TagId) -> Option<&Series> {
     trends.hours.value.iter().flatten().find(|series| series.tag == tag)
 }

@@ -14,7 +14,6 @@ pub enum Direction {
     Forward,
 }
 
-/// A window that was shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Window {
     window: usize,

@@ -6,20 +6,14 @@ use super::{Key, Users};
 use crate::ui::tabs::prelude::*;
 use crate::{plant::record::ActionRecord, report::Period, ui::modal::AuditEntryDialog};
 
-/// What can be searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchField {
-    /// Words anywhere.
     Words,
-    /// Who.
     Who,
-    /// Which action.
     Action,
-    /// When.
     Time,
 }
 
-/// Keys of the audit list.
 pub const KEYS: &[Key] = &[
     Key::new(code(KeyCode::Enter), "open", "entry details", |users, cx| users.in_audit(|audit| audit.open(cx))),
     Key::new(char('/'), "search", "only rows with some words", |users, _| ask(users, SearchField::Words)),
@@ -44,7 +38,6 @@ const ROWS: usize = 1_000;
 /// By default the list reaches back so far.
 const SPAN: SignedDuration = SignedDuration::from_hours(24 * 7);
 
-/// The page.
 pub type Audit = List<AuditLog>;
 
 /// The audit log, as far as it is searched.
@@ -57,7 +50,6 @@ pub struct AuditLog {
     who: String,
     action: String,
     period: Option<Period>,
-    /// What the open window asks for.
     asking: Option<SearchField>,
 }
 
@@ -149,7 +141,6 @@ impl Audit {
         }
     }
 
-    /// Asks what to search.
     fn ask_for(&mut self, field: SearchField) -> Vec<UiAction> {
         let of = &mut self.of;
         of.asking = Some(field);

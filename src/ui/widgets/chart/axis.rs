@@ -6,9 +6,7 @@ use jiff::{Timestamp, tz::TimeZone};
 /// The range of an axis and the distance of its ticks, in the unit of its curves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
-    /// Bottom.
     pub low: f64,
-    /// Top.
     pub high: f64,
     /// From tick to tick: 1, 2 or 5 times a power of ten.
     pub step: f64,

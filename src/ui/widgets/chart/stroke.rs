@@ -2,7 +2,6 @@
 
 use super::trace::Span;
 
-/// The look of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Stroke {
     /// A value holds until the next: what the station knew.
@@ -17,10 +16,8 @@ pub enum Stroke {
 }
 
 impl Stroke {
-    /// All of them.
     pub const ALL: [Stroke; 4] = [Stroke::Step, Stroke::Line, Stroke::Dots, Stroke::Bars];
 
-    /// The next one.
     pub fn next(self) -> Stroke {
         match self {
             Stroke::Step => Stroke::Line,

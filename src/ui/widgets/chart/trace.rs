@@ -25,9 +25,7 @@ pub struct Trace {
 /// What a curve did within one column of dots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Span {
-    /// Least.
     pub min: f64,
-    /// Greatest.
     pub max: f64,
     /// At the end of the column.
     pub last: f64,

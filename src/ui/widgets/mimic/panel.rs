@@ -101,10 +101,8 @@ fn bar(cx: &ViewContext, canvas: &mut Canvas, y: u16, faceplate: &Faceplate) {
     }
 }
 
-/// What a sequence panel shows.
 #[derive(Debug, Clone, Copy)]
 pub struct Sequence<'a> {
-    /// Heading.
     pub label: &'a str,
     /// The step; its labels are the steps.
     pub step: TagId,

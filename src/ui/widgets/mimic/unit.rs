@@ -87,7 +87,6 @@ pub fn mark(cx: &ViewContext, canvas: &mut Canvas, x: u16, rows: &[u16], tag: Ta
     }
 }
 
-/// A label and its value.
 pub fn labelled(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, label: &str, tag: TagId, selected: bool) {
     // In the row of the valve or pump beside it.
     let at = Bounds { y: at.y + at.height / 2, ..at };

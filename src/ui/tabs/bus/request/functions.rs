@@ -18,18 +18,15 @@ const SUB_FUNCTIONS: [u16; 15] = [0, 2, 11, 12, 13, 14, 15, 16, 17, 18, 1, 3, 4,
 /// Read device identification codes of 43/14.
 const READ_CODES: [u8; 4] = [1, 2, 3, 4];
 
-/// What a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Address in the table of the function.
     Address,
     /// Registers or bits to read, at most so many.
     Count(i64),
-    /// One bit.
     Bit,
     /// Bits with their count.
     Bits,
-    /// One register.
     Register,
     /// Registers with their count.
     Registers,
@@ -60,7 +57,6 @@ fn row(function: u8) -> Vec<(&'static str, Kind, &'static str)> {
     }
 }
 
-/// What may be typed.
 fn range(kind: Kind, table: Table) -> String {
     match kind {
         Kind::Address => t!("{first} …, or 0 – 65535 as sent", first = table.modicon(0)),

@@ -6,7 +6,6 @@ use crate::plant::port_signals::{HOLD_MAX_S, OutputSignal, SignalTest};
 /// Seconds that are enough to read a meter.
 const USUAL_S: u16 = 10;
 
-/// Of the form.
 pub(super) fn fields() -> Vec<Field> {
     vec![
         Field::choice(t!("signal"), OutputSignal::ALL.map(OutputSignal::word), 0),

@@ -3,7 +3,6 @@
 use super::{fields::address, *};
 use crate::plant::sweep::{EVERY_USUAL, Sweep};
 
-/// Of the form of a sweep.
 pub(super) fn fields(unit: Field) -> Vec<Field> {
     let typed = |label, text: &str| typed(label, text, t!("on the wire, from 0; or a Modicon number"));
     let depth = [t!("ranges of 8 addresses or more"), t!("every address")];

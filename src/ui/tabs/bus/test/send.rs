@@ -44,7 +44,6 @@ impl Send {
         Window::Send(self).stay()
     }
 
-    /// Pasted text.
     pub fn on_paste(&mut self, text: &str) {
         self.text.paste(text);
     }
@@ -121,7 +120,7 @@ impl Send {
 }
 
 impl Ready {
-    fn rows(&self, cx: &ViewContext, line: LineId, bare: bool, width: u16) -> Vec<Row> {
+    fn rows(&self, cx: &ViewContext, line: LineId, bare: bool, width: u16) -> Vec<Spans> {
         let theme = cx.theme;
         let added = match (bare, self.added.is_empty()) {
             (true, _) => t!("as typed, nothing added").to_owned(),

@@ -36,6 +36,8 @@ fn registers_of_the_device_are_read_live() {
         insta::assert_snapshot!(format!("registers_{width}x{height}"), screen(&mut model, width, height));
     }
     assert!(asked(type_keys(&mut model, "w")).is_none() && model.modal.is_none(), "nothing is written here");
+    let copied = model.tabs.shown().copied(&model.cx());
+    assert!(copied[0].starts_with("41003 / 03EA\t02BC\t700\t"), "{copied:?}");
     type_keys(&mut model, "T");
     assert!(screen(&mut model, 80, 24).contains("‹Test›"));
 }

@@ -31,7 +31,6 @@ use crate::{
     ui::Effect,
 };
 
-/// Pens of a group.
 const PENS: usize = 8;
 /// The window of what goes on is at least so wide at first.
 const WINDOW_MIN: SignedDuration = SignedDuration::from_mins(2);
@@ -123,7 +122,6 @@ fn series(samples: &VecDeque<Sample>, tag: TagId, span: Span, buckets: usize) ->
 }
 
 impl WatchList {
-    /// Is the graph shown?
     pub fn has_graph(&self) -> bool {
         self.graph.is_some()
     }
@@ -133,7 +131,6 @@ impl WatchList {
         self.graph.as_ref().is_some_and(|graph| graph.log.is_some())
     }
 
-    /// Back to the registers.
     pub fn close_graph(&mut self) -> bool {
         !self.is_shown_log() && self.graph.take().is_some()
     }

@@ -16,7 +16,6 @@ use crate::{
 /// What the tab of the registers begins with.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Start {
-    /// What is watched.
     pub watch: Vec<Named>,
     /// Where it is logged.
     pub log: Option<PathBuf>,
