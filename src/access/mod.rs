@@ -1,14 +1,14 @@
 //! Who may: users and their passwords, sessions, rights, lockout, and the audit log.
 
-pub mod right;
 mod session_end;
 pub mod session_request;
+pub mod right;
 pub mod password;
+pub mod audit_log;
 pub mod user;
 pub mod lockout;
 mod rate_limit;
 pub mod control;
-pub mod audit_log;
 pub mod sealing;
 pub mod io;
 

@@ -21,7 +21,7 @@ use crate::{
 };
 
 use super::{
-    CliError, StationArgs, client, in_runtime, load, local, run, say,
+    CliError, StationArgs, client, in_runtime, load, local, paths, say,
     source::{Source, unexpected},
 };
 
@@ -84,7 +84,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
 
 fn make_key(args: &KeyArgs) -> Result<(), CliError> {
     let def = load(&args.plant, &args.station)?;
-    let log = audit_log::beside(&run::history_file(&def, &args.station));
+    let log = audit_log::beside(&paths::history_file(&def, &args.station));
     let key = sealing::make(&log, Timestamp::now());
     let path = sealing::beside(&log);
     let key = key.map_err(|error| match error.kind() {
@@ -122,7 +122,7 @@ fn verify(args: VerifyArgs) -> Result<(), CliError> {
     let (path, rows) = match &args.log {
         Some(path) => (path.clone(), None),
         None => {
-            (audit_log::beside(&run::history_file(&def, &args.station)), Some(in_runtime(chain_hashes(&def, &args))))
+            (audit_log::beside(&paths::history_file(&def, &args.station)), Some(in_runtime(chain_hashes(&def, &args))))
         }
     };
     let mut not_compared = Vec::new();

@@ -94,7 +94,7 @@ async fn demonstrate(
     let clock = Clock::starting_at(Timestamp::now(), args.speed);
     let services: Vec<_> = def.lines.iter().map(sim::io::Service::new).collect();
     let simulated = drill::simulator(&def, scenario.as_deref())?;
-    let simulated = sim::io::serve_simulator(&def, simulated, clock, &services).await.map_err(simulation_error)?;
+    let simulated = sim::io::serve_simulator(&def, simulated, clock, &services).await?;
     simulated.plug_into(&mut def);
     let def = Arc::new(def);
     let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
@@ -233,12 +233,5 @@ impl Drop for Scratch {
             // A folder that will not go is the temporary folder's business, not the operator's.
             let _ = std::fs::remove_dir_all(folder);
         }
-    }
-}
-
-pub(super) fn simulation_error(error: sim::io::SimError) -> CliError {
-    match error {
-        sim::io::SimError::Unknown(error) => CliError::Usage(error.to_string()),
-        sim::io::SimError::Io(error) => CliError::Io { what: "cannot serve the simulated plant".into(), error },
     }
 }

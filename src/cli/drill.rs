@@ -21,7 +21,7 @@ use crate::{
     station::{event_log, io as station},
 };
 
-use super::{CliError, demo::simulation_error, log, say};
+use super::{CliError, log, say};
 
 /// Arguments of `drill`.
 #[derive(Debug, clap::Args)]
@@ -59,7 +59,7 @@ pub fn load(path: &Path) -> Result<(Scenario, Arc<PlantDef>), CliError> {
 
 /// The simulator of a scenario at its start.
 pub fn simulator(def: &PlantDef, scenario: Option<&Scenario>) -> Result<Simulator, CliError> {
-    let mut simulator = Simulator::new(def).map_err(|error| simulation_error(error.into()))?;
+    let mut simulator = Simulator::new(def).map_err(crate::sim::io::SimError::from)?;
     if let Some(scenario) = scenario {
         if scenario.start == Start::Rest {
             simulator = simulator.at_rest();

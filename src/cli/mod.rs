@@ -1,51 +1,51 @@
 //! The command line: one file a subcommand, one place for exit codes.
 
-mod ack_write;
-mod attach;
-mod batches;
-mod procedure;
-mod runs;
-mod audit;
-mod alarms;
-mod check;
-mod client;
-mod control;
-mod demo;
-mod drill;
-mod experiments;
-mod export;
-mod help;
-mod history;
-mod decode;
-mod init;
-mod list;
-mod log;
-mod menu;
-mod mimic;
-mod mistyped;
-mod new;
-mod open;
-mod open_log;
 mod output;
+mod client;
+mod procedure;
+mod init;
 mod own_files;
 mod paths;
-mod profile_choice;
-mod profiles;
-mod register_map;
-mod progress;
+mod log;
+mod menu;
 mod prompt;
-mod recognition;
-mod report;
+mod times;
+mod terminal;
+mod mistyped;
+mod profiles;
+mod source;
+mod status;
+mod attach;
 mod run;
 mod sim;
-mod source;
-mod sql;
-mod status;
-mod times;
-mod tools;
-mod systemd_unit;
-mod terminal;
+mod report;
 mod work_folder;
+mod sql;
+mod register_map;
+mod systemd_unit;
+mod progress;
+mod export;
+mod recognition;
+mod tools;
+mod profile_choice;
+mod list;
+mod runs;
+mod batches;
+mod open_log;
+mod open;
+mod new;
+mod mimic;
+mod history;
+mod help;
+mod experiments;
+mod drill;
+mod demo;
+mod decode;
+mod control;
+mod check;
+mod audit;
+mod alarms;
+mod ack_write;
 
 use std::{
     io::Write,
@@ -329,7 +329,10 @@ fn run_command(args: Args) -> Result<(), CliError> {
         Some(Command::Runs(args)) => runs::main(args),
         Some(Command::Procedure(args)) => procedure::main(args),
         Some(Command::Decode(args)) => decode::main(args),
-        Some(Command::Scan(args)) => tools::scan::main(args),
+        Some(Command::Scan(args)) => match tools::scan::main(args)? {
+            Some(words) => open::main(open::Args::from_words(words).map_err(CliError::Usage)?),
+            None => Ok(()),
+        },
         Some(Command::Probe(args)) => tools::probe::main(args),
         Some(Command::Loopback(args)) => tools::loopback::main(args),
         Some(Command::Send(args)) => tools::send::main(args),

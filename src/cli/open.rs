@@ -7,14 +7,14 @@ use clap::Parser;
 use super::{
     CliError, TerminalArgs, in_runtime, log, menu,
     open_log::{self, WatchArgs},
-    paths, say,
+    paths, recognition, say,
     tools::{self, PortArgs, scan},
 };
 use crate::{
-    bus::io::{clock::Clock, testing::Bench, transport::Connector},
+    bus::io::{clock::Clock, testing::Bench},
     plant::{
         PlantDef,
-        def::{DeviceDef, DeviceId, LineDef, LineId, Parity, Serial, Transport},
+        def::{LineDef, Parity, Serial, Transport},
         diagnostics::{Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, Finding, Scan},
     },
     profile::{self, OwnProfiles, Search},
@@ -73,7 +73,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     in_runtime(async {
         let (line, unit) = find(line, &args).await?;
         menu::remember(&place(&line, unit));
-        let station = bench_station(line, unit);
+        let station = recognition::bench_station(line, unit);
         let session = station.session(&paths::operator());
         let options = ui::io::Options {
             start,
@@ -142,23 +142,6 @@ impl Args {
     pub fn line(&self) -> Result<LineDef, CliError> {
         self.port.line()
     }
-}
-
-/// A station without history over one line of which nothing is known.
-pub fn bench_station(line: LineDef, unit: u8) -> station::Station {
-    let def = Arc::new(bench(line, unit));
-    let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
-    station::start_transient(def, Clock::real(), connectors, Box::new(|_| {}))
-}
-
-/// A plant that is one device on one line, of which nothing is known.
-fn bench(line: LineDef, unit: u8) -> PlantDef {
-    let place = match &line.transport {
-        Transport::Serial { port, serial, .. } => format!("{port} {serial}"),
-        Transport::Network { host, port, .. } => format!("{host}:{port}"),
-    };
-    let device = DeviceDef { unit, ..DeviceDef::new(DeviceId(0), "device", LineId(0)) };
-    PlantDef { name: "bench".into(), title: place, lines: vec![line], devices: vec![device], ..PlantDef::default() }
 }
 
 /// The settings and the unit that answer; what is given is taken as it is.

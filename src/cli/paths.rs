@@ -2,6 +2,7 @@
 
 use std::{env, path::PathBuf};
 
+use super::StationArgs;
 use crate::plant::{
     PlantDef,
     def::{Framing, Protocol, Rs485, Serial, Transport},
@@ -22,6 +23,11 @@ pub fn state_folder() -> PathBuf {
 
 pub fn history_of(plant: &str) -> PathBuf {
     state_folder().join(format!("{plant}.duckdb"))
+}
+
+/// The history file that the arguments name, or the plant's own.
+pub fn history_file(def: &PlantDef, args: &StationArgs) -> PathBuf {
+    args.history.clone().unwrap_or_else(|| history_of(&def.name))
 }
 
 /// The login name of the user of this terminal.

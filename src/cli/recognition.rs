@@ -3,9 +3,10 @@
 
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-use super::{CliError, open, paths, say, source};
+use super::{CliError, paths, say, source};
 use crate::{
     bus::{
+        io::{clock::Clock, transport::Connector},
         live::{Outcome, Retries},
         recognise::{self, Ranked},
         sunspec::Walk,
@@ -13,19 +14,36 @@ use crate::{
     history::{Answer, Query},
     plant::{
         PlantDef,
-        def::{LineDef, LineId},
+        def::{DeviceDef, DeviceId, LineDef, LineId, Transport},
         event::{Fault, LineState},
         live::{AddressSpan, LiveRead, LiveReading, ReplyTimes},
         tag::Table,
     },
     profile::sunspec::SunSpecDevice,
-    station::Session,
+    station::{self, Session},
 };
 
 /// Replies from which the timeout is learned.
 const REPLIES: usize = 20;
 /// A live read of a line that does not even connect is given up.
 const READ_MAX: Duration = Duration::from_secs(30);
+
+/// A station without history over one line of which nothing is known.
+pub fn bench_station(line: LineDef, unit: u8) -> station::io::Station {
+    let def = Arc::new(bench(line, unit));
+    let connectors = def.lines.iter().map(|line| Connector::Real(line.transport.clone())).collect();
+    station::io::start_transient(def, Clock::real(), connectors, Box::new(|_| {}))
+}
+
+/// A plant that is one device on one line, of which nothing is known.
+fn bench(line: LineDef, unit: u8) -> PlantDef {
+    let place = match &line.transport {
+        Transport::Serial { port, serial, .. } => format!("{port} {serial}"),
+        Transport::Network { host, port, .. } => format!("{host}:{port}"),
+    };
+    let device = DeviceDef { unit, ..DeviceDef::new(DeviceId(0), "device", LineId(0)) };
+    PlantDef { name: "bench".into(), title: place, lines: vec![line], devices: vec![device], ..PlantDef::default() }
+}
 
 /// What was found at a unit.
 pub struct FoundUnit {
@@ -51,7 +69,7 @@ pub async fn recognise_all(
     units: &[(u8, bool)],
     known: &[Arc<PlantDef>],
 ) -> Result<(Vec<FoundUnit>, ReplyTimes), CliError> {
-    let station = open::bench_station(line.clone(), units.first().map_or(1, |(unit, _)| *unit));
+    let station = bench_station(line.clone(), units.first().map_or(1, |(unit, _)| *unit));
     let session = station.session(&paths::operator());
     let (mut found, mut replies) = (Vec::new(), ReplyTimes::default());
     for (unit, has_register) in units.iter().copied() {
@@ -85,7 +103,7 @@ pub fn sunspec_words(unit: u8, device: &SunSpecDevice) -> String {
 
 /// The SunSpec models of a unit; `None` where it has none.
 pub async fn sunspec(line: &LineDef, unit: u8) -> Result<Option<SunSpecDevice>, CliError> {
-    let station = open::bench_station(line.clone(), unit);
+    let station = bench_station(line.clone(), unit);
     let session = station.session(&paths::operator());
     let found = sunspec_at(&session, unit).await;
     station.stop().await;

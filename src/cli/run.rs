@@ -57,11 +57,11 @@ pub struct Args {
 pub fn main(args: Args) -> Result<(), CliError> {
     let (def, file) = load_with_file(&args.plant, &args.station)?;
     let def = Arc::new(def);
-    let _log = log::start(args.station.log.as_deref(), Some(&history_file(&def, &args.station)))?;
+    let _log = log::start(args.station.log.as_deref(), Some(&paths::history_file(&def, &args.station)))?;
     in_runtime(async {
         let listener = listen(&def)?;
         let clock = Clock::real();
-        let mut station = start(&def, clock, history_file(&def, &args.station), file)?;
+        let mut station = start(&def, clock, paths::history_file(&def, &args.station), file)?;
         let mut lifecycle = station.take_lifecycle();
         let mut serving = Serving::new(listener, station);
         say_plant(&def);
@@ -95,7 +95,7 @@ fn checked(args: &Args) -> impl Fn() -> Result<(Reloaded, Users), CliError> + Cl
     let (plant, station) = (args.plant.clone(), args.station.clone());
     move || {
         let (def, file) = load_with_file(&plant, &station)?;
-        let users = users::read(&users_beside(&history_file(&def, &station))).map_err(CliError::Users)?;
+        let users = users::read(&users_beside(&paths::history_file(&def, &station))).map_err(CliError::Users)?;
         let connectors = connectors(&def);
         Ok((Reloaded { def: Arc::new(def), connectors, file, users: None }, users))
     }
@@ -112,9 +112,9 @@ pub fn with_terminal(plant: &str, args: &StationArgs, terminal: &TerminalArgs) -
         {
             return attach::attach_to(&station, terminal).await;
         }
-        let _log = log::start(args.log.as_deref(), Some(&history_file(&def, args)))?;
+        let _log = log::start(args.log.as_deref(), Some(&paths::history_file(&def, args)))?;
         let listener = listen(&def)?;
-        let mut station = start(&def, Clock::real(), history_file(&def, args), file)?;
+        let mut station = start(&def, Clock::real(), paths::history_file(&def, args), file)?;
         let mut lifecycle = station.take_lifecycle();
         let mut serving = Serving::new(listener, station);
         let session = serving.station.session(&paths::operator());
@@ -217,11 +217,6 @@ impl Serving {
         let socket = self.socket.await;
         socket.map_err(|error| CliError::Failed(format!("the socket ended badly: {error}"))).map(|_| last)
     }
-}
-
-/// The history file that the arguments name, or the plant's own.
-pub fn history_file(def: &PlantDef, args: &StationArgs) -> PathBuf {
-    args.history.clone().unwrap_or_else(|| paths::history_of(&def.name))
 }
 
 /// A station on the lines of its plant.

@@ -5,10 +5,19 @@ use std::{net::SocketAddr, path::PathBuf};
 use crate::{
     bus::io::clock::Clock,
     plant::{PlantDef, def::LineId},
-    sim::io::{Endpoint, Mode, Service, serve},
+    sim::io::{Endpoint, Mode, Service, SimError, serve},
 };
 
-use super::{CliError, StationArgs, demo::simulation_error, load, log, run, runtime, say, speed};
+use super::{CliError, StationArgs, load, log, run, runtime, say, speed};
+
+impl From<SimError> for CliError {
+    fn from(error: SimError) -> CliError {
+        match error {
+            SimError::Unknown(error) => CliError::Usage(error.to_string()),
+            SimError::Io(error) => CliError::Io { what: "cannot serve the simulated plant".into(), error },
+        }
+    }
+}
 
 /// Arguments of `sim`.
 #[derive(Debug, clap::Args)]
@@ -69,7 +78,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let _log = log::start(args.log.as_deref(), None)?;
     runtime()?.block_on(async {
         let clock = Clock::starting_at(jiff::Timestamp::now(), args.speed);
-        let serving = serve(&def, clock, &services).await.map_err(simulation_error)?;
+        let serving = serve(&def, clock, &services).await?;
         let port = serving.endpoints().first().and_then(Endpoint::path);
         let link = args.link.zip(port).map(|(link, port)| Link::make(link, port)).transpose()?;
         for ((line, service), place) in def.lines.iter().zip(&services).zip(serving.endpoints()) {

@@ -20,7 +20,7 @@ use crate::{
     station::Session,
 };
 
-use super::{CliError, StationArgs, client, load, own_files, put_out, put_out_file, run, say};
+use super::{CliError, StationArgs, client, load, own_files, paths, put_out, put_out_file, say};
 
 /// The plant, the period and the login of a command that reads the history.
 #[derive(Debug, clap::Args)]
@@ -64,7 +64,7 @@ impl HistoryArgs {
 
     /// Refuses to write to a file of the station.
     pub fn refuse_own_file(&self, def: &PlantDef, out: &Path) -> Result<(), CliError> {
-        own_files::refuse(out, &run::history_file(def, &self.station))
+        own_files::refuse(out, &paths::history_file(def, &self.station))
     }
 
     /// Opens the history and resolves the period.
@@ -131,7 +131,7 @@ impl Source {
             }
             return Ok(Source::Station(Box::new(session)));
         }
-        let path: PathBuf = run::history_file(def, args);
+        let path: PathBuf = paths::history_file(def, args);
         let store = Store::open_read_only(&path, def).map_err(|error| match error {
             error @ HistoryError::Locked { .. } => CliError::InUse(error),
             other => CliError::History(other),

@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 use super::{
-    CliError, StationArgs, client, in_runtime, load, own_files, run, say, say_error,
+    CliError, StationArgs, client, in_runtime, load, own_files, paths, say, say_error,
     source::{Source, unexpected},
     span,
     work_folder::WorkFolder,
@@ -97,7 +97,7 @@ pub struct Args {
 pub fn main(args: Args) -> Result<(), CliError> {
     let def = Arc::new(load(&args.plant, &args.station)?);
     if let Some(file) = &args.parquet {
-        own_files::refuse(file, &run::history_file(&def, &args.station))?;
+        own_files::refuse(file, &paths::history_file(&def, &args.station))?;
     }
     // One value can need more than any machine has, and the engine does not count it.
     let most = Rlimit { current: Some(ADDRESS_SPACE_MAX), ..getrlimit(Resource::As) };

@@ -19,9 +19,9 @@
 
 pub mod deadband;
 pub mod forwarder;
-pub mod io;
-pub mod payload;
 pub(crate) mod refusals;
 pub mod request;
+pub mod payload;
 pub(crate) mod request_log;
+pub mod io;
 pub(crate) mod requests;

@@ -7,11 +7,11 @@
 //!          rows)        a form)       └─ export
 //! ```
 
+pub mod named;
+pub mod list;
 mod container;
 pub mod export;
 mod format;
-pub mod list;
-pub mod named;
 pub mod profile;
 #[cfg(test)]
 mod tests;

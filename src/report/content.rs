@@ -4,8 +4,6 @@
 mod alarms;
 mod production;
 
-pub(super) use production::of_part;
-
 use std::{sync::Arc, time::Duration};
 
 use jiff::{Timestamp, civil, tz::TimeZone};

@@ -6,7 +6,6 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    content::of_part,
     csv::{self, floor_percent, iso, number, plain},
     document::{Cell, Column, Table},
 };
@@ -250,4 +249,9 @@ pub(super) fn table(runs: &[ControlRun], parts: &[RunPart]) -> Table {
             Cell::number(part.and(run.energy).map(|(kwh, _)| kwh), 3),
         ]
     }))
+}
+
+/// A state, and that only a part lies in the period.
+pub(super) fn of_part(state: &str, is_part: bool) -> String {
+    if is_part { t!("{state}, part", state) } else { state.to_owned() }
 }

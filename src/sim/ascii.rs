@@ -1,7 +1,15 @@
 //! Modbus ASCII as a slave receives it: characters become requests.
 
-use super::wire::SlaveRequest;
 use crate::bus::ascii::{self, FRAME_MAX};
+
+/// A request as a slave found it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SlaveRequest {
+    /// Unit and PDU, without the check.
+    pub message: Vec<u8>,
+    /// How many characters it took on the wire.
+    pub characters: usize,
+}
 
 /// Collects characters and cuts whole requests with a right check out of them.
 #[derive(Debug, Clone)]

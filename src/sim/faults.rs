@@ -26,7 +26,7 @@ use crate::{
         number::{to_u16, to_usize},
     },
 };
-use process::ProcessFaults;
+use process::process_faults;
 use values::{AnswerMemory, Values};
 
 /// The active faults.
@@ -135,7 +135,7 @@ impl Faults {
                 }
             }
             (FaultTarget::Process, _) => {
-                let process_faults = ProcessFaults::new(self.at(FaultTarget::Process, TargetKind::Process));
+                let process_faults = process_faults(self.at(FaultTarget::Process, TargetKind::Process));
                 if let Some(rig) = simulator.rig_mut() {
                     rig.set_process_faults(process_faults);
                 }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::dl06::sequence::Step;
 use super::dl06::{Dl06, Outputs, SCAN};
-use super::faults::process::ProcessFaults;
+use super::process_faults::ProcessFaults;
 use super::pxr::{DECIMALS_AT, Pxr, SAMPLE, Sensor};
 use super::slave::Slave;
 use super::tank::{AMBIENT_C, Actuators, Readings, Tank};
@@ -196,7 +196,7 @@ impl Rig {
         let wanted = self.plc.device.actuators(&readings, self.pxr.device.mv_percent());
         self.moving = self.process_faults.apply(wanted);
         self.tank.step(SCAN.as_secs_f64(), &self.moving);
-        self.tank.spill(SCAN.as_secs_f64(), self.process_faults.leak_l_per_min());
+        self.tank.spill(SCAN.as_secs_f64(), self.process_faults.leak_l_per_min);
         self.steps = self.steps.wrapping_add(1);
     }
 }

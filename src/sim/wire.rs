@@ -1,19 +1,10 @@
 //! Requests on a serial line as a slave finds them: what comes between two silences is one frame, whatever its function says.
 
-use super::ascii;
+use super::ascii::{self, SlaveRequest};
 use crate::bus::frame::crc16;
 
 /// The longest frame of a serial line (Modbus serial line V1.02, 2.5.1).
 const BYTES_MAX: usize = 256;
-
-/// A request as a slave found it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SlaveRequest {
-    /// Unit and PDU, without the check.
-    pub message: Vec<u8>,
-    /// How many characters it took on the wire.
-    pub characters: usize,
-}
 
 /// Collects received characters into requests.
 #[derive(Debug, Clone)]

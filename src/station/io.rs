@@ -36,7 +36,6 @@ use crate::{
     profile::PlantFile,
 };
 
-pub(super) use self::begin::USERS_MISSING;
 pub use self::begin::{start, start_guarded, start_observed};
 pub use self::reload::{PreparedReload, Reloaded};
 use self::{begin::Guarded, lines::Line, outlet::Outlet, reports::ReportTask};

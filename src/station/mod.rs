@@ -31,20 +31,20 @@
 //! | a line's task panics | started again after 1, 2, 5 s; the other lines do not notice | acknowledged |
 
 pub mod session;
-mod audit_queue;
 mod durability;
 mod entries;
+mod audit_queue;
 mod found;
 mod session_acceptor;
-mod session_server;
 mod past;
-mod plant_task;
 pub mod liveness;
 mod sets;
+mod plant_task;
 pub mod companions;
 mod supervisor;
 pub mod event_log;
 mod blocking_jobs;
+mod session_server;
 pub mod io;
 
 #[cfg(test)]

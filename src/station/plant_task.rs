@@ -14,7 +14,7 @@ use tokio::{
 };
 
 use self::files::{Saving, filed, saved};
-pub(super) use self::reload::{Inputs, NewPlant, Reload};
+pub(super) use self::reload::{Inputs, NewPlant, Reload, USERS_MISSING};
 use super::{
     audit_queue::{AuditMessage, AuditQueue, RecorderFaults},
     entries,

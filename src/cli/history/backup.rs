@@ -11,9 +11,9 @@ use super::StoredPlant;
 use crate::{
     access::SessionRequest,
     cli::{
-        CliError, client, in_runtime,
+        CliError, client, in_runtime, paths,
         progress::{Progress, cancelled_by_ctrl_c, wait_for},
-        run, say,
+        say,
     },
     history::{
         HistoryError,
@@ -37,7 +37,7 @@ pub struct Args {
 pub fn main(args: &Args) -> Result<(), CliError> {
     let (def, station) = (args.plant.load()?, &args.plant.station);
     let to = std::path::absolute(&args.to).map_err(CliError::io(args.to.display().to_string()))?;
-    let path = run::history_file(&def, station);
+    let path = paths::history_file(&def, station);
     let written = in_runtime(async {
         match station.history.is_none() && client::find_station(Some(&def.name)).await.is_ok() {
             false => {

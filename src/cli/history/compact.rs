@@ -4,7 +4,7 @@ use jiff::Timestamp;
 
 use super::{StoredPlant, size};
 use crate::{
-    cli::{CliError, run, say},
+    cli::{CliError, paths, say},
     history::io::{compact::compact, store::Store},
 };
 
@@ -18,7 +18,7 @@ pub struct Args {
 /// Compacts, and tells the size before and after.
 pub fn main(args: &Args) -> Result<(), CliError> {
     let (def, now) = (args.plant.load()?, Timestamp::now());
-    let path = run::history_file(&def, &args.plant.station);
+    let path = paths::history_file(&def, &args.plant.station);
     if !path.exists() {
         return Err(CliError::History(crate::history::HistoryError::Missing { path: path.display().to_string() }));
     }

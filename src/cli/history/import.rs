@@ -12,9 +12,9 @@ use super::{StoredPlant, open_log, record};
 use crate::{
     access::{SessionRequest, io::audit_log},
     cli::{
-        CliError, client, in_runtime,
+        CliError, client, in_runtime, paths,
         progress::{Progress, cancelled_by_ctrl_c, wait_for},
-        run, say,
+        say,
         source::query_station,
     },
     history::{
@@ -54,7 +54,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     in_runtime(async {
         match station.history.is_none() && client::find_station(Some(&def.name)).await.is_ok() {
             true => through_station(args, &def, &file).await,
-            false => into_file(&def, &run::history_file(&def, station), &file),
+            false => into_file(&def, &paths::history_file(&def, station), &file),
         }
     })
 }
@@ -66,7 +66,7 @@ async fn through_station(args: &Args, def: &Arc<PlantDef>, file: &Path) -> Resul
     let session = client::attach(Some(&def.name), &args.plant.login).await?;
     let overview = overview(&session).await;
     let history =
-        overview.as_ref().map_or_else(|| run::history_file(def, &args.plant.station), |all| all.database.clone());
+        overview.as_ref().map_or_else(|| paths::history_file(def, &args.plant.station), |all| all.database.clone());
     let placed = import::place(file, &history).map_err(|error| {
         let folder = import::folder(&history);
         CliError::Failed(format!("the station imports files of {}: {error}; have it put there first", folder.display()))

@@ -11,7 +11,7 @@ use jiff::Timestamp;
 use super::{StoredPlant, open_log, record};
 use crate::{
     access::io::audit_log,
-    cli::{CliError, run, say},
+    cli::{CliError, paths, say},
     history::{
         backup::{AUDIT_LOG, Backup},
         io::{
@@ -41,7 +41,7 @@ pub struct Args {
 /// Restores, or finishes a restore that was interrupted. Refused while a station records to the history.
 pub fn main(args: &Args) -> Result<(), CliError> {
     let def = args.plant.load()?;
-    let db = run::history_file(&def, &args.plant.station);
+    let db = paths::history_file(&def, &args.plant.station);
     let now = Timestamp::now();
     if let Some(folder) = db.parent() {
         std::fs::create_dir_all(folder).map_err(CliError::io(folder.display().to_string()))?;

@@ -8,7 +8,7 @@ use crate::{
         network::{self, AT_ONCE, CONNECT_MAX, HostAnswer, Network, UNITS},
         testing::DEAF_MAX,
     },
-    cli::{CliError, in_runtime, menu, open, prompt, say},
+    cli::{CliError, in_runtime, menu, prompt, say},
     plant::{
         def::{LineDef, Transport},
         number::to_u32,
@@ -16,13 +16,13 @@ use crate::{
     profile,
 };
 
-/// Asks, connects to every host, shows who answers, and offers to open one.
-pub fn main(network: Network, line: &LineDef, yes: bool) -> Result<(), CliError> {
+/// Asks, connects to every host, shows who answers, and offers to open one: in words of `open`.
+pub fn main(network: Network, line: &LineDef, yes: bool) -> Result<Option<Vec<String>>, CliError> {
     if !yes && !menu::is_asked() {
         let words = "a scan of a network connects to every host of it: --yes does so without asking";
         return Err(CliError::Usage(words.to_owned()));
     }
-    let opened = in_runtime(async {
+    in_runtime(async {
         if !yes && !permitted(network, line).await? {
             return Err(CliError::Usage("nothing was connected to".to_owned()));
         }
@@ -41,11 +41,7 @@ pub fn main(network: Network, line: &LineDef, yes: bool) -> Result<(), CliError>
             _ => Err(format!("found `{answer}`, expected none or 1 to {}", units.len())),
         });
         chosen.await
-    })?;
-    match opened {
-        Some(words) => open::main(open::Args::from_words(words).map_err(CliError::Usage)?),
-        None => Ok(()),
-    }
+    })
 }
 
 /// Says what will be connected to, how many, and how long; was it agreed to?

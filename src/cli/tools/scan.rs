@@ -33,8 +33,9 @@ pub struct Args {
     yes: bool,
 }
 
-/// One request to every unit; who answers, even with a refusal, is there.
-pub fn main(args: Args) -> Result<(), CliError> {
+/// One request to every unit; who answers, even with a refusal, is there. What of a network is to be opened, in words of
+/// `open`.
+pub fn main(args: Args) -> Result<Option<Vec<String>>, CliError> {
     if let Some(network) = args.port.network() {
         let (network, port) = network.map_err(CliError::Usage)?;
         return network::main(network, &port.line()?, args.yes);
@@ -56,7 +57,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let run = run(&line, Diagnostic::Scan(scan), describe)?;
 
     let found = run.findings.iter().any(|finding| matches!(finding, Finding::Unit { .. }));
-    if found { Ok(()) } else { Err(CliError::Failed("no unit was found".into())) }
+    if found { Ok(None) } else { Err(CliError::Failed("no unit was found".into())) }
 }
 
 /// Requests of a scan, and how long it takes where no unit answers.

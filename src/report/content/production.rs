@@ -8,11 +8,11 @@ use crate::{
     report::{
         RunFigures,
         batch::{self, BatchReport},
+        control_runs::of_part,
         counters::CounterRow,
         csv::floor_percent,
         document::{Cell, Column, Table},
     },
-    t,
     text::translate,
 };
 
@@ -91,9 +91,4 @@ pub fn batches(batches: &[BatchReport]) -> Table {
             Cell::number(whole.and_then(|whole| whole.energy).map(|(kwh, _)| kwh), 3),
         ]
     }))
-}
-
-/// A state, and that only a part lies in the period.
-pub fn of_part(state: &str, is_part: bool) -> String {
-    if is_part { t!("{state}, part", state) } else { state.to_owned() }
 }

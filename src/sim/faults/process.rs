@@ -1,77 +1,50 @@
-//! What faults of the process do between the outputs of PLC and controller and the water.
+//! Which parts of the process faults break.
 
 use super::syntax::{InjectedFault, Position, Valve};
-use crate::sim::tank::Actuators;
+use crate::sim::process_faults::ProcessFaults;
 
-/// The active faults of the process.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ProcessFaults {
-    heater: bool,
-    pump: bool,
-    agitator: bool,
-    drain: Option<Position>,
-    fill: Option<Position>,
-    leak_l_per_min: f64,
-}
-
-impl ProcessFaults {
-    /// The faults of the process among these.
-    pub fn new(faults: impl Iterator<Item = InjectedFault>) -> ProcessFaults {
-        let mut process_faults = ProcessFaults::default();
-        for fault in faults {
-            match fault {
-                InjectedFault::HeaterBurnout => process_faults.heater = true,
-                InjectedFault::PumpFailed => process_faults.pump = true,
-                InjectedFault::AgitatorFailed => process_faults.agitator = true,
-                InjectedFault::ValveStuck(Valve::Drain, position) => process_faults.drain = Some(position),
-                InjectedFault::ValveStuck(Valve::Fill, position) => process_faults.fill = Some(position),
-                InjectedFault::Leak(ml_per_min) => process_faults.leak_l_per_min = f64::from(ml_per_min) / 1e3,
-                // The PLC sees to it.
-                InjectedFault::Switch(_) => {}
-                // Of the line or of a unit.
-                InjectedFault::Noise(_)
-                | InjectedFault::Silent
-                | InjectedFault::Late(_)
-                | InjectedFault::BadCrc
-                | InjectedFault::Cut
-                | InjectedFault::Exception(_)
-                | InjectedFault::Stuck
-                | InjectedFault::Torn
-                | InjectedFault::WordOrder
-                | InjectedFault::SensorBurnout => {}
+/// The broken parts of the process among these faults.
+pub fn process_faults(faults: impl Iterator<Item = InjectedFault>) -> ProcessFaults {
+    let mut process_faults = ProcessFaults::default();
+    for fault in faults {
+        match fault {
+            InjectedFault::HeaterBurnout => process_faults.heater = true,
+            InjectedFault::PumpFailed => process_faults.pump = true,
+            InjectedFault::AgitatorFailed => process_faults.agitator = true,
+            InjectedFault::ValveStuck(Valve::Drain, position) => {
+                process_faults.drain = Some(position == Position::Open)
             }
+            InjectedFault::ValveStuck(Valve::Fill, position) => process_faults.fill = Some(position == Position::Open),
+            InjectedFault::Leak(ml_per_min) => process_faults.leak_l_per_min = f64::from(ml_per_min) / 1e3,
+            // The PLC sees to it.
+            InjectedFault::Switch(_) => {}
+            // Of the line or of a unit.
+            InjectedFault::Noise(_)
+            | InjectedFault::Silent
+            | InjectedFault::Late(_)
+            | InjectedFault::BadCrc
+            | InjectedFault::Cut
+            | InjectedFault::Exception(_)
+            | InjectedFault::Stuck
+            | InjectedFault::Torn
+            | InjectedFault::WordOrder
+            | InjectedFault::SensorBurnout => {}
         }
-        process_faults
     }
-
-    /// What moves in the process for these outputs.
-    pub fn apply(&self, wanted: Actuators) -> Actuators {
-        let valve = |stuck: Option<Position>, wanted| stuck.map_or(wanted, |position| position == Position::Open);
-        Actuators {
-            pump: wanted.pump && !self.pump,
-            agitator: wanted.agitator && !self.agitator,
-            drain_valve: valve(self.drain, wanted.drain_valve),
-            fill_valve: valve(self.fill, wanted.fill_valve),
-            heater_percent: if self.heater { 0.0 } else { wanted.heater_percent },
-        }
-    }
-
-    /// Water that TK-1 loses to the floor, in l/min.
-    pub fn leak_l_per_min(&self) -> f64 {
-        self.leak_l_per_min
-    }
+    process_faults
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::tank::Actuators;
 
     const ALL_ON: Actuators =
         Actuators { pump: true, agitator: true, drain_valve: true, fill_valve: true, heater_percent: 80.0 };
 
     fn check(faults: &[&str], wanted: Actuators, expect: Actuators) {
         let faults = faults.iter().map(|text| text.parse().expect("a fault"));
-        assert_eq!(ProcessFaults::new(faults).apply(wanted), expect);
+        assert_eq!(process_faults(faults).apply(wanted), expect);
     }
 
     #[test]

@@ -16,7 +16,7 @@ use super::LineHandle;
 use crate::bus::io::clock::Clock;
 use crate::plant::def::Serial;
 use crate::sim::faults::Answer;
-use crate::sim::wire::{FrameReceiver, SlaveRequest};
+use crate::sim::{ascii::SlaveRequest, wire::FrameReceiver};
 
 /// Requests and answers under way at once; a request beyond that is dropped.
 const JOBS_MAX: usize = 8;

@@ -28,15 +28,12 @@ use crate::{
         audit_queue::AuditQueue,
         found::FoundFile,
         past::Past,
-        plant_task::{self, Persistence, RecordObserver},
+        plant_task::{self, Persistence, RecordObserver, USERS_MISSING},
         session_server::{self, NewUsers},
         sets,
     },
 };
 
-/// Said of the users file where the audit log knows of users.
-pub(in crate::station) const USERS_MISSING: &str =
-    "the users file is missing although users existed: restore it from a backup";
 /// Each of the files is read for so long at most: an audit log may be large, and its disk slow.
 const READ_MAX: Duration = Duration::from_secs(30);
 /// How often users that were not read in time are looked for.

@@ -19,8 +19,12 @@ use crate::{
         station::{FaultState, StationFault},
     },
     profile::PlantFile,
-    station::{audit_queue::AuditMessage, entries, io::USERS_MISSING, past::Past},
+    station::{audit_queue::AuditMessage, entries, past::Past},
 };
+
+/// Said of the users file where the audit log knows of users.
+pub(in crate::station) const USERS_MISSING: &str =
+    "the users file is missing although users existed: restore it from a backup";
 
 /// What comes to the task.
 pub(in crate::station) struct Inputs {

@@ -3,6 +3,7 @@
 //! | file | law |
 //! |---|---|
 //! | `line` | modules form a line; the crate lists them in reading order |
+//! | `rooms` | within a module its rooms form a line, in the order in which it declares them |
 //! | `edge` | only `io`, and named files of `station` and `cli`, touch the outside world |
 //! | `size` | files below 400 lines, functions below 70, a header in every file |
 //! | `style` | tests assert visibly, have short names and no wall clock |
@@ -19,6 +20,7 @@ mod arms;
 mod edge;
 mod line;
 mod reader;
+mod rooms;
 mod size;
 mod source;
 mod style;
