@@ -24,6 +24,8 @@ pub(crate) mod experiment;
 pub(crate) mod model;
 mod random;
 pub mod simulator;
+#[cfg(test)]
+mod library;
 pub mod faults;
 pub(crate) mod scenario;
 pub(crate) mod ground_truth;
