@@ -17,7 +17,7 @@ use super::{
     exact::Exact,
     id::{DeviceId, TagId},
     keyword::keyword_enum,
-    raw_number::is_same,
+    raw_number::BadSpan,
     role::{Reauthentication, Role},
     sample::Sample,
     simulate::Simulate,
@@ -69,7 +69,7 @@ pub struct TagDef {
     /// Names of the bits of a status word.
     pub bit_labels: Vec<(u8, String)>,
     /// Raw numbers (before scaling) that mean "no value".
-    pub bad_if: Vec<Exact>,
+    pub bad_if: Vec<BadSpan>,
     /// Another tag that makes this one bad while `value & mask != 0` (PXR 31008 for PV).
     pub quality_from: Option<(TagId, u64)>,
     /// Function code to write with; `None` picks 5/6 for one word, 16 for more.
@@ -250,7 +250,7 @@ impl TagDef {
     }
     /// Does this raw number mean "no value"?
     pub fn is_bad(&self, raw: Exact) -> bool {
-        self.bad_if.iter().any(|bad| is_same(*bad, raw))
+        self.bad_if.iter().any(|bad| bad.holds(raw))
     }
 }
 

@@ -27,6 +27,7 @@ use super::{
 use crate::plant::{
     def::{DeviceId, Limits, Role, TagId},
     exact::Exact,
+    raw_number::BadSpan,
     tag::{
         Access, Bound, ByteOrder, Confidence, DataType, Decimals, Encoding, Point, Poll, PollClass, STORE_EVERY_MAX,
         StorePolicy, Table, TagDef,
@@ -173,7 +174,7 @@ fn row_of(mut layers: Vec<Raw>, context: &DeviceContext, problems: &mut Problems
     (row, has_default_marks)
 }
 
-fn bad_if(row: &TagTable, point: Option<Point>, is_default: bool, problems: &mut Problems) -> Vec<Exact> {
+fn bad_if(row: &TagTable, point: Option<Point>, is_default: bool, problems: &mut Problems) -> Vec<BadSpan> {
     let Some((marks, point)) = row.bad_if.as_ref().zip(point) else { return Vec::new() };
     marks.value.of(point, is_default, problems)
 }

@@ -8,7 +8,6 @@ use super::{
 };
 use crate::plant::{
     address::{in_table, table_named},
-    data_type::Clock,
     tag::{Access, ByteOrder, DataType, Point, StorePolicy},
 };
 
@@ -78,7 +77,7 @@ pub(super) fn check_text(row: &TagTable, point: Point, problems: &mut Problems) 
         problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
     }
     let is_reversed = |order: &At<ByteOrder>| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba);
-    if let Some(order) = row.order.filter(|order| is_reversed(order) && point.kind != DataType::Clock(Clock::Epoch)) {
+    if let Some(order) = row.order.filter(|order| is_reversed(order) && !point.kind.is_reversible()) {
         let problem = problems.add(order.at, "the words of a text cannot be reversed");
         problem.label("expected \"ABCD\", high byte first, or \"BADC\", low byte first");
     }

@@ -125,7 +125,7 @@ fn point_of(point: &Node, prefix: &str, at: u32, factors: &Factors) -> Result<Na
         return Ok(named);
     }
     let bad = bad.and_then(|pattern| named.point().raw_number(pattern, true).number());
-    let mut named = Named { bad_if: bad.into_iter().collect(), ..named };
+    let mut named = Named { bad_if: bad.into_iter().map(Into::into).collect(), ..named };
     named.unit = unit_of(point.word("units").unwrap_or_default());
     if let Some(node) = point.get("sf") {
         match (node.whole(), node.text().and_then(|name| factors.get(name))) {
@@ -172,8 +172,9 @@ fn kind_of(word: &str, size: i64) -> Result<(DataType, Option<i128>), String> {
     Ok(match kind {
         Kind::Number(kind) | Kind::Enum(kind) | Kind::Bits(kind) => (kind, sunspec_marker(kind)),
         Kind::NotZero(kind) => (kind, Some(0)),
+        Kind::Address(address) => (DataType::NetworkAddress(address), None),
         Kind::Power => (DataType::I16, sunspec_marker(DataType::I16)),
         Kind::Text => (DataType::TextToNul(to_u8(2 * size)), None),
-        Kind::Wide | Kind::Pad => return Err(t!("`{word}` is not a known type", word)),
+        Kind::Pad => return Err(t!("`{word}` is not a known type", word)),
     })
 }

@@ -66,3 +66,35 @@ fn a_power_of_ten_is_followed_or_its_value_is_left_out() {
     let refused = super::super::profile::written(&list, "made_up", "a test").err();
     assert!(refused.is_some_and(|why| why.contains("power of ten")));
 }
+
+#[test]
+fn a_calculated_row_is_an_expression_over_its_registers() {
+    let text = "parameters:
+  - group: Power
+    items:
+      - { name: PV1, rule: 1, registers: [10], uom: W }
+      - { name: PV Power, rule: 1, uom: W, sensors: [{ registers: [10] }, { registers: [11] }] }
+      - { name: Losses, rule: 1, scale: 0.1, uint: enforce, sensors: [{ registers: [10] }, { operator: subtract, signed: , registers: [12] }] }
+      - { name: Ratio, rule: 1, sensors: [{ registers: [10] }, { registers: [11] }, { operator: divide, registers: [13], multiply: { registers: [14], scale: 2 } }] }
+      - { name: Turned, rule: 2, inverted: true, sensors: [{ signed: , registers: [12], scale: 0.1 }] }
+      - { name: Unlike, rule: 1, sensors: [{ signed: , registers: [10] }] }
+      - { name: Checked, rule: 1, sensors: [{ registers: [10], validation: { min: 1 } }] }
+      - { name: Chosen, rule: 1, sensors: [{ registers: [10], enabled_lookup: { a: [b] } }] }
+";
+    let list = super::list_of(text);
+    let why = |key: &str| format!("`{key}` cannot be said in a profile");
+    let expect =
+        [format!("line 10: Checked: {}", why("validation")), format!("line 11: Chosen: {}", why("enabled_lookup"))];
+    assert_eq!(list.problems, expect);
+    let written = written(&list, "sums", "a file").expect("it is a profile");
+    assert_eq!(written.problems, ["line 9: Unlike: Unlike part 1: this address has a name already"]);
+    assert_eq!((written.checked.plant.tags.len(), written.parts), (9, 4), "{}", written.text);
+    for expr in [
+        "\"PV1 + PV_Power_part_2\"",
+        "\"max(0, (PV1 * 0.1) - Losses_part_2)\"",
+        "\"(PV1 + PV_Power_part_2) / (Ratio_part_3 * Ratio_factor_3)\"",
+        "\"0 - Losses_part_2\"",
+    ] {
+        assert!(written.text.contains(&format!("expr = {expr}")), "no {expr} in {}", written.text);
+    }
+}
