@@ -68,11 +68,12 @@ pub const UNPRINTABLE: char = '·';
 /// its end are filling, each byte or character that cannot be printed is shown as [`UNPRINTABLE`], and text of which
 /// nothing can be printed as the hex of its bytes. `None` for a point that holds no text.
 pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
-    match point.kind {
-        DataType::Clock(clock) => return clock::text(clock, &in_order(point.order, words)),
-        DataType::Version(_) => return Some(digits::version(&in_order(point.order, words))),
-        DataType::NetworkAddress(address) => return digits::address(address, &to_bytes(point.order, words)),
-        _ => {}
+    if let DataType::Clock(clock) = point.kind {
+        return clock::text(clock, &in_order(point.order, words));
+    } else if let DataType::Version(_) = point.kind {
+        return Some(digits::version(&in_order(point.order, words)));
+    } else if let DataType::NetworkAddress(address) = point.kind {
+        return digits::address(address, &to_bytes(point.order, words));
     }
     let count = point.kind.length().filter(|_| point.kind.is_text())?;
     let bytes = to_bytes(point.order, words);

@@ -62,7 +62,12 @@ impl Point {
         let with_sign = |pattern: i128| match self.kind.encoding() {
             Encoding::Signed => pattern - modulus,
             Encoding::SignMagnitude => half - pattern,
-            _ => pattern,
+            Encoding::Bit
+            | Encoding::Unsigned
+            | Encoding::Bcd
+            | Encoding::Float
+            | Encoding::Mod10k
+            | Encoding::Text => pattern,
         };
         let mut spans: Vec<(i128, i128)> = Vec::new();
         for (first, last) in [below, above] {

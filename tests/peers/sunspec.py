@@ -154,7 +154,7 @@ def rows(name, point):
     elif kind == "ipaddr":
         seen = str(ipaddress.IPv4Address(seen))
     elif kind == "ipv6addr":
-        seen = str(ipaddress.IPv6Address(int(seen.replace(":", ""), 16)))
+        seen = ipaddress.IPv6Address(int(seen.replace(":", ""), 16)).exploded
     yield {"name": name, "seen": seen}
 
 

@@ -1,7 +1,5 @@
 //! What devices keep as digits and persons read in groups: versions, and addresses of networks.
 
-use std::net::{Ipv4Addr, Ipv6Addr};
-
 use crate::plant::data_type::NetworkAddress;
 
 /// `1.0.A.2`, of several registers `1.0.A.2-0.0.0.7`.
@@ -21,8 +19,11 @@ pub(super) fn address(kind: NetworkAddress, bytes: &[u8]) -> Option<String> {
             let port = bytes.get(2..8).filter(|port| port.iter().any(|byte| *byte != 0xFF))?;
             port.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(":")
         }
-        NetworkAddress::Ipv4 => Ipv4Addr::from(*bytes.first_chunk::<4>()?).to_string(),
-        NetworkAddress::Ipv6 => Ipv6Addr::from(*bytes.first_chunk::<16>()?).to_string(),
+        NetworkAddress::Ipv4 => bytes.get(..4)?.iter().map(u8::to_string).collect::<Vec<_>>().join("."),
+        NetworkAddress::Ipv6 => {
+            let pair = |pair: &[u8]| format!("{:02x}{:02x}", pair[0], pair[1]);
+            bytes.get(..16)?.chunks_exact(2).map(pair).collect::<Vec<_>>().join(":")
+        }
     };
     (!is_none).then_some(shown)
 }
@@ -44,7 +45,7 @@ mod tests {
         check(NetworkAddress::Ipv4, &[0; 4], None);
         let mut local = [0; 16];
         (local[0], local[1], local[15]) = (0xFE, 0x80, 7);
-        check(NetworkAddress::Ipv6, &local, Some("fe80::7"));
+        check(NetworkAddress::Ipv6, &local, Some("fe80:0000:0000:0000:0000:0000:0000:0007"));
         check(NetworkAddress::Ipv6, &local[..8], None);
     }
 }
