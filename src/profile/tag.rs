@@ -76,6 +76,8 @@ pub(super) struct Defined {
     pub unlock: Option<(TagId, At<Choice>)>,
     /// What it is calculated from, which may be any tag of the plant.
     pub expr: Option<At<String>>,
+    /// What must hold for its device to have it.
+    pub when: Option<At<String>>,
     /// How it is simulated, which may ask any tag of the plant.
     pub simulate: Option<SimulateTable>,
 }
@@ -144,6 +146,7 @@ pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, probl
         is_unclear: !context.has_base && is_unclear(&row, point, problems),
         address_at: point.and(row.address.map(|address| address.at)),
         expr: row.expr,
+        when: row.when,
         needs: links.needs,
         unlock: links.unlock,
         simulate: row.simulate.map(|simulate| simulate.value),

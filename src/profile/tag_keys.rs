@@ -20,10 +20,10 @@ const FOR_NUMBERS: [&str; 17] = [
 
 /// Keys that belong to a register.
 #[rustfmt::skip]
-const FOR_REGISTERS: [&str; 29] = [
+const FOR_REGISTERS: [&str; 30] = [
     "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "scale_from", "unit_from", "access", "verify",
     "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_address", "write", "write_unlock", "poll",
-    "poll_class", "simulate", "default", "set",
+    "poll_class", "simulate", "default", "set", "when",
 ];
 
 /// The defaults of a profile without those that its kind of tag does not have: a type of registers is no coil's, a scale no

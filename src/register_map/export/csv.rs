@@ -34,6 +34,7 @@ pub fn write(tags: &[&TagDef], exported: &mut Exported) {
             tag,
             &[
                 (tag.quality_from.is_some(), "its quality from another tag"),
+                (tag.when.is_some(), "when the device has it"),
                 (tag.unit_from.is_some(), "its unit from another tag"),
                 (tag.writable() && !is_kept(tag), "writing it, which needs more than a list can say"),
                 (is_open(tag.min) || is_open(tag.max), "limits from another tag"),

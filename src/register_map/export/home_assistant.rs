@@ -135,6 +135,7 @@ fn lose(tag: &TagDef, exported: &mut Exported) {
             (tag.bad_if.iter().any(|bad| bad.single().is_none()), "ranges of numbers that are no value"),
             (is_fraction, "a number that is no value and not whole"),
             (tag.quality_from.is_some(), "its quality from another tag"),
+            (tag.when.is_some(), "when the device has it"),
             (tag.unit_from.is_some(), "its unit from another tag"),
         ],
     );
