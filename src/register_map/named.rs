@@ -63,8 +63,23 @@ pub struct Named {
     pub poll: Option<Poll>,
     /// Where a power of ten stands by which it is multiplied besides.
     pub power_at: Option<u16>,
+    /// It is the first of several, of which the device says how many it has.
+    pub repeat: Option<Repeat>,
     /// The line of the file that it comes from; 0 for none.
     pub line: usize,
+}
+
+/// Rows that stand in a device many times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Repeat {
+    /// What the names of the first of them begin with, without its number: `module` of `module1.W`.
+    pub prefix: String,
+    /// From one to the next.
+    pub step: u16,
+    /// The most of them.
+    pub count: u16,
+    /// The register that says how many there are, or how long they are together with so many registers in front.
+    pub counted_by: (u16, Option<u16>),
 }
 
 impl Named {
@@ -93,6 +108,7 @@ impl Named {
             write_at: None,
             poll: None,
             power_at: None,
+            repeat: None,
             line: 0,
         }
     }

@@ -9,7 +9,7 @@ use std::{
 
 use super::{
     list::{List, words::poll_text},
-    named::Named,
+    named::{Named, Repeat},
 };
 use crate::{
     plant::tag::{Access, TagDef},
@@ -32,8 +32,8 @@ pub struct Written {
     pub checked: Checked,
     /// What was left out of it, by line of the file that was read.
     pub problems: Vec<String>,
-    /// Tags of it that are no row, but a part of one.
-    pub parts: usize,
+    /// Rows of the list that it has.
+    pub rows: usize,
 }
 
 /// A row on its way into the profile.
@@ -59,7 +59,9 @@ pub fn written(list: &List, name: &str, source: &str) -> Result<Written, String>
         }
         let (text, lines) = text(list, &rows, name, source);
         let errors = match profile::check_text(name, &text) {
-            Ok(checked) => return Ok(Written { text, checked, problems, parts }),
+            Ok(checked) => {
+                return Ok(Written { text, checked, problems, rows: rows.len().saturating_sub(parts) });
+            }
             Err(errors) => errors,
         };
         let mut refused: Vec<(usize, String)> = Vec::new();
@@ -124,6 +126,20 @@ fn row(named: &Named, taken: &mut BTreeSet<String>) -> Row {
     Row { tag: named.tag(&short), named: named.clone(), is_bare: false, expr: None }
 }
 
+/// The keys of a row that stands for many: names of the first are those of each, and which of them a device has another tag
+/// says.
+fn repeated(keys: Vec<String>, repeat: &Repeat, counted_by: Option<&str>) -> Vec<String> {
+    let first = format!("\"{}1.", plain_name(&repeat.prefix));
+    let each = format!("\"{}{{n}}.", plain_name(&repeat.prefix));
+    let is_name = |key: &str| ["name = ", "scale_from = "].iter().any(|name| key.starts_with(name));
+    let of_each = |key: String| if is_name(&key) { key.replacen(&first, &each, 1) } else { key };
+    let when = counted_by.map(|short| match repeat.counted_by.1 {
+        None => format!("when = \"{short} >= {{n}}\""),
+        Some(fixed) => format!("when = \"({short} - {fixed}) / {} >= {{n}}\"", repeat.step),
+    });
+    keys.into_iter().map(of_each).chain(when).collect()
+}
+
 fn with_register(rows: &[Row]) -> impl Iterator<Item = &Row> {
     rows.iter().filter(|row| row.expr.is_none())
 }
@@ -150,6 +166,7 @@ fn text(list: &List, rows: &[Row], name: &str, source: &str) -> (String, Vec<usi
     let powers: BTreeMap<_, _> =
         with_register(rows).map(|row| ((row.named.table, row.named.address), &row.tag.short)).collect();
     let mut line = out.matches('\n').count();
+    let mut before = None;
     for Row { named, tag, expr, .. } in rows {
         let mut keys = expr.as_ref().map_or_else(|| tag_keys(tag), |expr| calculated_keys(tag, expr));
         keys.extend(named.poll.filter(|_| expr.is_none()).map(|poll| format!("poll = \"{}\"", poll_text(poll))));
@@ -157,9 +174,20 @@ fn text(list: &List, rows: &[Row], name: &str, source: &str) -> (String, Vec<usi
             keys.retain(|key| !key.starts_with("decimals = "));
             keys.push(format!("scale_from = {}", quoted(power)));
         }
-        lines.push(line + 2);
-        line += keys.len() + 2;
-        let _ = writeln!(out, "\n[[tag]]\n{}", keys.join("\n"));
+        let mut head = "\n[[tag]]".to_owned();
+        if let Some(repeat) = &named.repeat {
+            let counted_by = powers.get(&(named.table, repeat.counted_by.0));
+            keys = repeated(keys, repeat, counted_by.map(|short| short.as_str()));
+            head = "\n[[repeat.tag]]".to_owned();
+            if before != Some(repeat) {
+                head = format!("\n[[repeat]]\ncount = {}\nstep = {}\n{head}", repeat.count, repeat.step);
+            }
+        }
+        before = named.repeat.as_ref();
+        line += head.matches('\n').count() + 1;
+        lines.push(line);
+        line += keys.len();
+        let _ = writeln!(out, "{head}\n{}", keys.join("\n"));
     }
     (out, lines)
 }

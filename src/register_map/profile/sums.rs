@@ -53,7 +53,9 @@ pub(super) fn add(
 fn value_of(sum: &Named, of: &Named, rows: &mut Vec<Row>, taken: &mut BTreeSet<String>) -> Result<String, String> {
     let of = Named { group: sum.group.clone(), poll: sum.poll, ..of.clone() };
     let registers = || rows.iter().filter(|row| row.expr.is_none());
-    if let Some(row) = registers().find(|row| row.named.point() == of.point() && row.named.bad_if == of.bad_if) {
+    // What is no value of the row is none of the sum either.
+    let is_it = |row: &&Row| row.named.point() == of.point() && (of.bad_if.is_empty() || of.bad_if == row.named.bad_if);
+    if let Some(row) = registers().find(is_it) {
         let is_same = (row.named.scale, row.named.offset) == (of.scale, of.offset);
         let short = &row.tag.short;
         return match is_same {

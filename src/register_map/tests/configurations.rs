@@ -229,7 +229,7 @@ fn solarman_numbers_outside_their_range_are_no_value() {
     let text = "parameters:
   - group: Settings
     items:
-      - { name: Charge, rule: 1, registers: [10], scale: 0.1, range: { min: 0, max: 1000 }, platform: number }
+      - { name: Charge, rule: 1, registers: [10], scale: 0.1, range: { min: 0000, max: 1000 }, platform: number }
       - { name: Float, rule: 2, registers: [11], range: { min: 38, max: 61 } }
       - { name: Energy, rule: 3, registers: [13, 12], range: { max: 0xFFFFFFF9 } }
       - { name: Size, rule: 2, registers: [14], magnitude: true, range: { min: 5 } }
@@ -334,7 +334,7 @@ fn a_model_of_sunspec_follows_its_sizes_and_factors() {
     ];
     assert_eq!((named, problems), (expect.map(str::to_owned).to_vec(), Vec::new()));
     let warnings = list_of(text).warnings;
-    assert!(warnings[0].contains("40070") && warnings[1].contains("it is taken once"), "{warnings:?}");
+    assert!(warnings[0].contains("40070") && warnings[1].contains("16 at most are taken"), "{warnings:?}");
 }
 
 #[test]
