@@ -10,6 +10,7 @@
 //! ```
 
 mod clock;
+mod digits;
 
 use crate::plant::{
     exact::Exact,
@@ -69,6 +70,10 @@ pub const UNPRINTABLE: char = '·';
 pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
     if let DataType::Clock(clock) = point.kind {
         return clock::text(clock, &in_order(point.order, words));
+    } else if let DataType::Version(_) = point.kind {
+        return Some(digits::version(&in_order(point.order, words)));
+    } else if let DataType::NetworkAddress(address) = point.kind {
+        return digits::address(address, &to_bytes(point.order, words));
     }
     let count = point.kind.length().filter(|_| point.kind.is_text())?;
     let bytes = to_bytes(point.order, words);
@@ -95,7 +100,8 @@ pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
 /// The words that hold a text, filled with NULs; `None` if it is too long, ends in what would be taken for filling, or
 /// has characters that cannot be printed.
 pub fn encode_text(point: Point, text: &str) -> Option<Vec<u16>> {
-    let count = point.kind.length().filter(|_| point.kind.is_text())?;
+    let is_words = matches!(point.kind, DataType::Text(_) | DataType::TextToNul(_) | DataType::Chars(_));
+    let count = point.kind.length().filter(|_| is_words)?;
     let fits = text.len() <= usize::from(count) && !text.ends_with(' ') && text.chars().all(is_printable);
     let mut bytes = text.as_bytes().to_vec();
     if let DataType::Chars(_) = point.kind {

@@ -61,6 +61,33 @@ pub enum DataType {
     Chars(u8),
     /// Date and time, shown as text.
     Clock(Clock),
+    /// So many registers of four hexadecimal digits each, as versions are written: `1.0.A.2`.
+    Version(u8),
+    /// An address in a network, shown as text.
+    NetworkAddress(NetworkAddress),
+}
+
+keyword_enum! {
+    /// How a device keeps an address.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+    pub enum NetworkAddress: "network address" {
+        /// Of an Ethernet port, in the lower six bytes of four registers.
+        Eui48 => "eui48",
+        /// Two registers.
+        Ipv4 => "ipv4",
+        /// Eight registers.
+        Ipv6 => "ipv6",
+    }
+}
+
+impl NetworkAddress {
+    fn registers(self) -> u16 {
+        match self {
+            NetworkAddress::Eui48 => 4,
+            NetworkAddress::Ipv4 => 2,
+            NetworkAddress::Ipv6 => 8,
+        }
+    }
 }
 
 /// How a device keeps date and time.
@@ -74,11 +101,28 @@ pub enum Clock {
     Bytes,
     /// The same with two decimal digits a byte.
     Bcd,
+    /// Hour times 100 and minute, as `2359`.
+    TimeDecimal,
+    /// Hour and minute, a byte each.
+    TimeBytes,
+    /// The same with two decimal digits a byte.
+    TimeBcd,
+    /// The same, a register each.
+    TimeWords,
 }
 
 impl Clock {
     /// All of them.
-    pub const ALL: [Clock; 4] = [Clock::Epoch, Clock::Words, Clock::Bytes, Clock::Bcd];
+    pub const ALL: [Clock; 8] = [
+        Clock::Epoch,
+        Clock::Words,
+        Clock::Bytes,
+        Clock::Bcd,
+        Clock::TimeDecimal,
+        Clock::TimeBytes,
+        Clock::TimeBcd,
+        Clock::TimeWords,
+    ];
 
     /// Name in profiles and registers.
     fn row(self) -> (&'static str, u16) {
@@ -87,6 +131,10 @@ impl Clock {
             Clock::Words => ("clock_words", 6),
             Clock::Bytes => ("clock_bytes", 3),
             Clock::Bcd => ("clock_bcd", 3),
+            Clock::TimeDecimal => ("time_decimal", 1),
+            Clock::TimeBytes => ("time_bytes", 1),
+            Clock::TimeBcd => ("time_bcd", 1),
+            Clock::TimeWords => ("time_words", 2),
         }
     }
 }
@@ -144,7 +192,7 @@ impl DataType {
     ];
     /// Longest text, bytes: what one read of 125 registers holds.
     pub const TEXT_MAX: u8 = 250;
-    /// Most registers of one character each: what one read holds.
+    /// Most registers of one character, or one version, each: what one read holds.
     pub const CHARS_MAX: u8 = 125;
 
     /// Name in profiles, registers, encoding.
@@ -179,6 +227,8 @@ impl DataType {
                 let (name, registers) = clock.row();
                 (name, registers, Encoding::Text)
             }
+            DataType::Version(registers) => ("version", registers.into(), Encoding::Text),
+            DataType::NetworkAddress(address) => (address.word(), address.registers(), Encoding::Text),
         }
     }
 
@@ -210,12 +260,18 @@ impl DataType {
         self.encoding() == Encoding::Text
     }
 
+    /// Is it a text of which the words may come in the other order?
+    pub fn is_reversible(self) -> bool {
+        matches!(self, DataType::Clock(Clock::Epoch) | DataType::Version(_) | DataType::NetworkAddress(_))
+    }
+
     /// The number that stands behind its name: bytes or characters of a text, registers.
     pub fn length(self) -> Option<u8> {
         match self {
             DataType::Text(length)
             | DataType::TextToNul(length)
             | DataType::Chars(length)
+            | DataType::Version(length)
             | DataType::Mod10k(length)
             | DataType::SignedMod10k(length) => Some(length),
             _ => None,
@@ -262,10 +318,16 @@ impl FromStr for DataType {
         if let Some(clock) = Clock::ALL.into_iter().find(|clock| clock.row().0 == word) {
             return Ok(DataType::Clock(clock));
         }
+        if let Some(address) = NetworkAddress::ALL.iter().find(|address| address.word() == word) {
+            return Ok(DataType::NetworkAddress(*address));
+        }
         let (name, rest) = word.split_at(word.find('(').unwrap_or(word.len()));
-        let texts: [fn(u8) -> DataType; 3] = [DataType::Text, DataType::TextToNul, DataType::Chars];
+        let texts: [fn(u8) -> DataType; 4] = [DataType::Text, DataType::TextToNul, DataType::Chars, DataType::Version];
         let of_length = texts.into_iter().find(|of| of(1).name() == name).ok_or(UnknownType::Name)?;
-        let most = if of_length(1) == DataType::Chars(1) { DataType::CHARS_MAX } else { DataType::TEXT_MAX };
+        let most = match of_length(1) {
+            DataType::Chars(_) | DataType::Version(_) => DataType::CHARS_MAX,
+            _ => DataType::TEXT_MAX,
+        };
         let length = rest.strip_prefix('(').and_then(|rest| rest.strip_suffix(')')?.trim().parse().ok());
         length.filter(|length| (1..=most).contains(length)).map(of_length).ok_or(UnknownType::Length(most))
     }

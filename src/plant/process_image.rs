@@ -2,6 +2,7 @@
 
 mod factor;
 mod fault_effect;
+mod presence;
 mod redefine;
 
 use std::{sync::Arc, time::Duration};
@@ -20,7 +21,7 @@ use super::{
     scale,
     tag::{Access, Decimals, Poll, StorePolicy, TagDef},
 };
-use crate::plant::time::elapsed;
+use crate::plant::time::{elapsed, is_later_hour};
 
 /// A value is uncertain after this many poll periods without an answer, and bad after [`PERIODS_BAD`].
 pub const PERIODS_UNCERTAIN: u32 = 3;
@@ -349,6 +350,7 @@ impl ProcessImage {
     fn set(&mut self, tag: TagId, sample: Sample) {
         let before = self.samples[tag.index()];
         let sample = self.stated.instead_of(self.def.tag(tag), sample);
+        let sample = self.if_present(tag, sample);
         let lasts = (sample.quality.is_bad() || sample.is_stated()) && sample.quality == before.quality;
         self.samples[tag.index()] = if lasts { Sample { at: before.at, ..sample } } else { sample };
         self.touched.push(tag);
@@ -357,7 +359,9 @@ impl ProcessImage {
     /// Makes the sample of a tag from its reading and all that it depends on. It stays uncertain until the tag itself
     /// is read again.
     fn recompute_sample(&mut self, tag: TagId) {
-        let Some(reading @ Reading { raw, at, uncertain, .. }) = self.raw[tag.index()] else { return };
+        let Some(reading @ Reading { raw, at, uncertain, .. }) = self.raw[tag.index()] else {
+            return self.look_for(tag);
+        };
         let def = self.def.clone();
         let tag = def.tag(tag);
         let scaling = self.decimals_of(tag, reading);
@@ -387,11 +391,6 @@ impl ProcessImage {
         };
         self.set(tag.id, sample);
     }
-}
-
-/// Whether an hour has begun since.
-fn is_later_hour(stored: Timestamp, at: Timestamp) -> bool {
-    stored.as_second().div_euclid(3_600) < at.as_second().div_euclid(3_600)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Raw numbers as a manual gives them, as numbers or as patterns of bits: for `bad_if`, `enum`, signatures and states.
 
+use serde::{Deserialize, Serialize};
+
 use super::{
     exact::Exact,
     half,
@@ -49,6 +51,36 @@ impl Point {
     /// Lowest and highest raw number; `None` for floats and texts.
     pub fn raw_range(self) -> Option<(i128, i128)> {
         self.kind.raw_range(self.field.map(|(_, bits)| bits))
+    }
+
+    /// The raw numbers among these whose bits, read without a sign, are outside a range.
+    pub fn outside(self, least: Option<i128>, most: Option<i128>) -> Vec<BadSpan> {
+        let (modulus, half) = (1_i128 << self.kind.bits(), 1_i128 << (self.kind.bits() - 1));
+        let below = (0, least.unwrap_or(0).min(modulus) - 1);
+        let above = (most.unwrap_or(modulus).max(-1) + 1, modulus - 1);
+        // Where the sign bit is set the numbers are others, and may go the other way.
+        let with_sign = |pattern: i128| match self.kind.encoding() {
+            Encoding::Signed => pattern - modulus,
+            Encoding::SignMagnitude => half - pattern,
+            Encoding::Bit
+            | Encoding::Unsigned
+            | Encoding::Bcd
+            | Encoding::Float
+            | Encoding::Mod10k
+            | Encoding::Text => pattern,
+        };
+        let mut spans: Vec<(i128, i128)> = Vec::new();
+        for (first, last) in [below, above] {
+            let plain = (first, last.min(half - 1));
+            let signed = (first.max(half), last);
+            spans.extend((plain.0 <= plain.1).then_some(plain));
+            let ends = [with_sign(signed.0), with_sign(signed.1)];
+            spans.extend((signed.0 <= signed.1).then(|| (ends[0].min(ends[1]), ends[0].max(ends[1]))));
+        }
+        joined(spans)
+            .into_iter()
+            .map(|(first, last)| BadSpan { first: Exact::whole(first), last: Exact::whole(last) })
+            .collect()
     }
 
     /// A raw number as a profile and a list write it: one that is not whole as the pattern of its bits.
@@ -132,10 +164,51 @@ impl Point {
     }
 }
 
+/// Raw numbers that mean "no value": one, or all from the first to the last.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BadSpan {
+    /// The lowest.
+    pub first: Exact,
+    /// The highest.
+    pub last: Exact,
+}
+
+impl BadSpan {
+    /// Is it one of them?
+    pub fn holds(self, raw: Exact) -> bool {
+        is_same(self.first, raw) || is_same(self.last, raw) || self.first < raw && raw < self.last
+    }
+
+    /// The number, where it is only one.
+    pub fn single(self) -> Option<Exact> {
+        (self.first == self.last).then_some(self.first)
+    }
+}
+
+impl<N: Into<Exact>> From<N> for BadSpan {
+    fn from(number: N) -> BadSpan {
+        let number = number.into();
+        BadSpan { first: number, last: number }
+    }
+}
+
 /// Do the bits of both say the same? −0 of a float is a mark of its own, 0 is either.
-pub fn is_same(mark: Exact, raw: Exact) -> bool {
+fn is_same(mark: Exact, raw: Exact) -> bool {
     let is_minus_zero = |number: Exact| number.near() == 0.0 && number.near().is_sign_negative();
     mark == raw && (!is_minus_zero(mark) || is_minus_zero(raw))
+}
+
+/// The same numbers in as few spans as hold them.
+pub fn joined(mut spans: Vec<(i128, i128)>) -> Vec<(i128, i128)> {
+    spans.sort_unstable();
+    let mut all: Vec<(i128, i128)> = Vec::new();
+    for (first, last) in spans {
+        match all.last_mut().filter(|before| first <= before.1 + 1) {
+            Some(before) => before.1 = before.1.max(last),
+            None => all.push((first, last)),
+        }
+    }
+    all
 }
 
 /// The number in words of four decimal digits each, the first the highest; `None` where one has more, or another sign.

@@ -67,6 +67,8 @@ keyword_enum! {
         Unproven = 19 => "heard, not proven",
         /// It is read on request only, and that was some time ago or never.
         OnRequest = 20 => "read on request",
+        /// The device says that it does not have it: what a profile makes depend on another value.
+        NotPresent = 21 => "not present",
     }
 }
 
@@ -99,7 +101,8 @@ impl Cause {
             | Cause::Stated
             | Cause::Reloaded
             | Cause::Unproven
-            | Cause::OnRequest => true,
+            | Cause::OnRequest
+            | Cause::NotPresent => true,
         }
     }
 }

@@ -15,9 +15,10 @@ pub use super::{
 };
 use super::{
     exact::Exact,
+    expr::Expr,
     id::{DeviceId, TagId},
     keyword::keyword_enum,
-    raw_number::is_same,
+    raw_number::BadSpan,
     role::{Reauthentication, Role},
     sample::Sample,
     simulate::Simulate,
@@ -69,9 +70,11 @@ pub struct TagDef {
     /// Names of the bits of a status word.
     pub bit_labels: Vec<(u8, String)>,
     /// Raw numbers (before scaling) that mean "no value".
-    pub bad_if: Vec<Exact>,
+    pub bad_if: Vec<BadSpan>,
     /// Another tag that makes this one bad while `value & mask != 0` (PXR 31008 for PV).
     pub quality_from: Option<(TagId, u64)>,
+    /// What must hold for its device to have it at all; it is read from the device. A condition of tags without one.
+    pub when: Option<Arc<Expr>>,
     /// Function code to write with; `None` picks 5/6 for one word, 16 for more.
     pub write_fc: Option<u8>,
     /// Where it is written, if not where it is read.
@@ -145,6 +148,7 @@ impl TagDef {
             bit_labels: Vec::new(),
             bad_if: Vec::new(),
             quality_from: None,
+            when: None,
             write_fc: None,
             write_at: None,
             read_modify_write: false,
@@ -192,9 +196,10 @@ impl TagDef {
         let bounds = [self.min, self.max].map(|bound| bound.and_then(Bound::source));
         self.value_needs().chain(unit).chain(bounds.into_iter().flatten())
     }
-    /// The tags without which its value is not known: decimals and quality.
+    /// The tags without which its value is not known: decimals, quality and whether it is there.
     pub fn value_needs(&self) -> impl Iterator<Item = TagId> + use<> {
-        self.decimals.source().into_iter().chain(self.quality_from.map(|(tag, _)| tag))
+        let when = self.when.as_ref().map_or(Vec::new(), |when| when.tags());
+        self.decimals.source().into_iter().chain(self.quality_from.map(|(tag, _)| tag)).chain(when)
     }
     /// Decimals that scale its raw number, as its device announces them, below 0 for a multiple of ten; 0 where the profile
     /// fixes them, `None` while they are not known.
@@ -250,7 +255,7 @@ impl TagDef {
     }
     /// Does this raw number mean "no value"?
     pub fn is_bad(&self, raw: Exact) -> bool {
-        self.bad_if.iter().any(|bad| is_same(*bad, raw))
+        self.bad_if.iter().any(|bad| bad.holds(raw))
     }
 }
 

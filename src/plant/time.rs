@@ -14,3 +14,8 @@ pub fn instant_of_grid(from: Timestamp, every: Duration, number: usize) -> Optio
     let nanos = i128::try_from(every.as_nanos()).ok()?.checked_mul(number as i128)?;
     from.checked_add(SignedDuration::from_nanos_i128(nanos)).ok()
 }
+
+/// Whether an hour has begun since.
+pub fn is_later_hour(stored: Timestamp, at: Timestamp) -> bool {
+    stored.as_second().div_euclid(3_600) < at.as_second().div_euclid(3_600)
+}

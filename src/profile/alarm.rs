@@ -16,6 +16,7 @@ use crate::plant::{
     def::{
         AlarmClass, AlarmDef, AlarmId, AlarmRules, Condition, DeviceDef, Framing, Guidance, LineDef, Priority, Subject,
     },
+    expr::Expr,
     number::to_u16,
     station::StationFault,
     tag::TagDef,
@@ -153,7 +154,7 @@ fn alarm(
         re_alarm: table.re_alarm.map(|re_alarm| re_alarm.value),
         latch: flag(table.latch),
         ack_comment: table.ack_comment.is_some_and(|note| note.value == Requirement::Required),
-        enabled_when: table.enabled_when.as_ref().and_then(|words| expr::expr(words, defs, problems)),
+        enabled_when: enabled_when(table, subject, defs, problems),
         guidance: Guidance {
             cause: text(&table.cause),
             effect: text(&table.effect),
@@ -161,6 +162,17 @@ fn alarm(
             response_time: table.response_time.map(|time| time.value),
         },
         ..AlarmDef::new(id, subject, condition, text(&table.message))
+    }
+}
+
+/// The condition of the file, and that of a tag which its device may not have: what is not there raises no alarm.
+fn enabled_when(table: &AlarmTable, subject: Subject, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
+    let written = table.enabled_when.as_ref().and_then(|words| expr::expr(words, defs, problems));
+    let tag = if let Subject::Tag(tag) = subject { defs.tags.get(tag.index()) } else { None };
+    let present = tag.and_then(|tag| tag.when.as_deref()).cloned();
+    match (present, written) {
+        (Some(present), Some(written)) => Some(Expr::All(vec![present, written])),
+        (present, written) => present.or(written),
     }
 }
 

@@ -1,20 +1,68 @@
-//! What calculated tags are.
+//! What calculated tags are, and under which conditions a device has a tag.
 
 use std::sync::Arc;
 
-use super::{diagnostic::Problems, expr, names::Defs, reader::At};
+use super::{diagnostic::Problems, expr, names::Defs, reader::At, tag::Defined};
 use crate::plant::{
     calculation::{self, OverTime},
     def::TagId,
-    tag::{Calculation, TagDef},
+    tag::{Access, Calculation, Poll, TagDef},
 };
 
-/// Reads what the calculated tags are, when all tags are known.
-pub(super) fn calculate(exprs: Vec<(TagId, At<String>)>, tags: &mut [TagDef], defs: Defs, problems: &mut Problems) {
+/// Expressions over tags as they are written, by the tag that has them.
+pub(super) struct Exprs {
+    calculated: Vec<(TagId, At<String>)>,
+    conditions: Vec<(TagId, At<String>)>,
+}
+
+impl Exprs {
+    /// Those of these tags.
+    pub fn of(defined: &[Defined]) -> Exprs {
+        let all = |written: fn(&Defined) -> &Option<At<String>>| {
+            let rows = defined.iter().filter_map(|defined| Some((defined.tag.id, written(defined).clone()?)));
+            rows.collect()
+        };
+        Exprs { calculated: all(|defined| &defined.expr), conditions: all(|defined| &defined.when) }
+    }
+}
+
+/// The device of a tag: its name has no dot.
+fn device_of(tag: &TagDef) -> Option<&str> {
+    tag.name.split_once('.').map(|(device, _)| device)
+}
+
+/// Under which conditions devices have their tags: by values that they have in any case.
+fn conditions(written: &[(TagId, At<String>)], tags: &mut [TagDef], defs: &Defs, problems: &mut Problems) {
+    let mut found = Vec::new();
+    for (id, words) in written {
+        let tag = &tags[id.index()];
+        let Some(when) = expr::near(words, device_of(tag), &Defs { tags: &*tags, ..*defs }, problems) else { continue };
+        for source in when.tags().into_iter().map(|source| &tags[source.index()]) {
+            let is_unread = source.poll == Poll::Never || source.access == Access::Write;
+            if written.iter().any(|(of, _)| *of == source.id) {
+                let problem = problems.add(words.at, format!("{} has a condition itself", source.name));
+                problem.label("expected a tag that the device has in any case");
+            } else if source.device != tag.device || source.calculation.is_some() {
+                let problem = problems.add(words.at, format!("{} is not read from the same device", source.name));
+                problem.label("expected a tag of the device that says what it has");
+            } else if is_unread && tag.poll != Poll::Never {
+                let problem = problems.add(words.at, format!("{} is never read", source.name));
+                problem.label("it decides nothing").help(format!("give {} poll = \"slow\"", source.short));
+            }
+        }
+        found.push((*id, Arc::new(when)));
+    }
+    for (id, when) in found {
+        tags[id.index()].when = Some(when);
+    }
+}
+
+/// Reads what the calculated tags are, and the conditions of tags, when all tags are known.
+pub(super) fn calculate(exprs: Exprs, tags: &mut [TagDef], defs: Defs, problems: &mut Problems) {
+    let Exprs { calculated: exprs, conditions: of_tags } = exprs;
     let mut found = Vec::new();
     for (id, words) in &exprs {
-        // A name of a device has no dot.
-        let device = tags[id.index()].name.split_once('.').map(|(device, _)| device);
+        let device = device_of(&tags[id.index()]);
         let calculated = expr::calculated(words, device, &Defs { tags: &*tags, ..defs }, problems);
         found.extend(
             calculated.map(|(over_time, expr)| (*id, Calculation { text: words.value.clone(), over_time, expr })),
@@ -34,6 +82,7 @@ pub(super) fn calculate(exprs: Vec<(TagId, At<String>)>, tags: &mut [TagDef], de
         }
         tag.calculation = Some(Arc::new(calculation));
     }
+    conditions(&of_tags, tags, &defs, problems);
     let Some(cycle) = calculation::order(tags).1 else { return };
     let at = exprs.iter().find(|(id, _)| cycle.first() == Some(id)).map(|(_, words)| words.at);
     let names: Vec<&str> = cycle.iter().chain(cycle.first()).map(|id| tags[id.index()].name.as_str()).collect();

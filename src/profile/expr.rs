@@ -36,7 +36,12 @@ const COMPARES: [(&str, Compare); 6] = [
 
 /// The condition that is written in a string. `None` after the problem was added.
 pub(super) fn expr(words: &At<String>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
-    let expr = read(words, None, defs, problems, |reader| reader.any())?;
+    near(words, None, defs, problems)
+}
+
+/// The same for tags of `device`, which may be named without it.
+pub(super) fn near(words: &At<String>, device: Option<&str>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
+    let expr = read(words, device, defs, problems, |reader| reader.any())?;
     if !is_condition(&expr) {
         no_condition(words.at, problems);
         return None;

@@ -146,7 +146,7 @@ struct Devices {
     /// The classes that are written, by tag.
     classes: Vec<Option<PollClass>>,
     /// What is calculated.
-    exprs: Vec<(TagId, At<String>)>,
+    exprs: calculated::Exprs,
     /// Those of their profiles.
     alarms: Vec<At<AlarmTable>>,
 }
@@ -194,7 +194,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     let unclear = unclear.filter_map(|one| Some((one.address_at?, one.tag.point.table, one.tag.point.address)));
     warn_unclear(unclear, problems);
     let classes = defined.iter().map(|defined| defined.class).collect();
-    let exprs = defined.iter().filter_map(|defined| Some((defined.tag.id, defined.expr.clone()?))).collect();
+    let exprs = calculated::Exprs::of(&defined);
     let written = defined.iter().map(|defined| defined.in_sets).collect::<Vec<_>>();
     let mut tags = device::link(defined, &names, problems);
     check_broadcasts(&devices, &known, lines, &tags, problems);

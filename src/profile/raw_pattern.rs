@@ -6,8 +6,7 @@ use super::{
     schema::TypeName,
 };
 use crate::plant::{
-    exact::Exact,
-    raw_number::RawNumber,
+    raw_number::{BadSpan, RawNumber},
     tag::{DataType, Point},
 };
 
@@ -32,16 +31,38 @@ pub(super) fn is_pattern(at: Span, problems: &Problems) -> bool {
     ["0x", "0o", "0b"].iter().any(|prefix| text.starts_with(prefix))
 }
 
+/// A raw number, or all from the first to the last: `[1001, 65535]`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mark {
+    first: RawPattern,
+    last: RawPattern,
+}
+
+impl Value for Mark {
+    fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
+        let Node::Array(ends) = value else {
+            return RawPattern::read(value, at, problems).map(|number| Mark { first: number, last: number });
+        };
+        let mut end = |n: usize| {
+            let Some(end) = ends.get(n).filter(|_| ends.len() == 2) else {
+                return wrong_type(value, at, "the lowest and the highest of these numbers", problems);
+            };
+            RawPattern::read(&end.value, end.at, problems)
+        };
+        Some(Mark { first: end(0)?, last: end(1)? })
+    }
+}
+
 /// The raw numbers that mean "no value": of every tag that has this key, or by type, for `[default]`.
 #[derive(Debug, Clone)]
-pub(crate) struct BadIf(pub Vec<(Option<DataType>, Vec<At<RawPattern>>)>);
+pub(crate) struct BadIf(pub Vec<(Option<DataType>, Vec<At<Mark>>)>);
 
 impl Value for BadIf {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
         let numbers = |value: &Node, at: Span, problems: &mut Problems| match value {
             Node::Array(items) => {
                 let read = items.iter().filter_map(|item| {
-                    RawPattern::read(&item.value, item.at, problems).map(|value| At { value, at: item.at })
+                    Mark::read(&item.value, item.at, problems).map(|value| At { value, at: item.at })
                 });
                 Some(read.collect())
             }
@@ -82,23 +103,30 @@ fn sunspec(word: &str, at: Span, problems: &mut Problems) -> Option<BadIf> {
         problems.add(at, format!("`{word}` stands for no raw numbers")).label("expected \"sunspec\", or an array");
         return None;
     }
-    let mark = |number| At { value: RawPattern { number, is_pattern: true }, at };
-    Some(BadIf(SUNSPEC.map(|(kind, number)| (Some(kind), vec![mark(number)])).into()))
+    let mark = |number| {
+        let pattern = RawPattern { number, is_pattern: true };
+        vec![At { value: Mark { first: pattern, last: pattern }, at }]
+    };
+    Some(BadIf(SUNSPEC.map(|(kind, number)| (Some(kind), mark(number))).into()))
 }
 
 impl BadIf {
     /// The raw numbers of a tag. One that it can never hold is a warning, unless it is for all tags of the profile.
-    pub fn of(&self, point: Point, is_default: bool, problems: &mut Problems) -> Vec<Exact> {
+    pub fn of(&self, point: Point, is_default: bool, problems: &mut Problems) -> Vec<BadSpan> {
         let of_type = self.0.iter().filter(|(kind, _)| kind.is_none_or(|kind| kind == point.kind));
         let mut found = Vec::new();
         for mark in of_type.flat_map(|(_, marks)| marks) {
-            let RawPattern { number, is_pattern } = mark.value;
-            let meant = point.raw_number(number, is_pattern);
-            if meant == RawNumber::Impossible && !is_default {
+            let meant = [mark.value.first, mark.value.last].map(|end| point.raw_number(end.number, end.is_pattern));
+            if meant.contains(&RawNumber::Impossible) && !is_default {
                 let problem = problems.warn(mark.at, format!("{} never reads as this", type_of(point)));
                 problem.label(held_words(point));
             }
-            found.extend(meant.number());
+            let [Some(first), Some(last)] = meant.map(RawNumber::number) else { continue };
+            if last < first {
+                let problem = problems.add(mark.at, format!("these numbers begin at {first} and end at {last}"));
+                problem.label(format!("as {} reads them; expected [lowest, highest]", type_of(point)));
+            }
+            found.push(BadSpan { first, last });
         }
         found
     }

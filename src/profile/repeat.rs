@@ -3,6 +3,7 @@
 //! ```toml
 //! [[repeat]]
 //! names = ["1", "2", "3"]     # or count = 3
+//! count_from = "N"            # the tag that says how many of them the device has
 //! step = 20                   # added to `address` and `modicon` from one to the next
 //!
 //! [[repeat.tag]]
@@ -37,6 +38,7 @@ pub(super) fn all_rows(
         if repeat.tags.is_empty() && repeat.valid {
             problems.add(repeat.at, "a repeat needs rows").label("expected [[repeat.tag]] below it");
         }
+        let count_from = repeat.count_from.as_ref();
         let step = repeat.step.map_or(0, |step| i128::from(step.value));
         for (place, name) in names.iter().enumerate() {
             let which = format!("`{name}`, {} of {} of a repeat", place + 1, names.len());
@@ -45,7 +47,10 @@ pub(super) fn all_rows(
             if TAGS_MAX < rows.len() {
                 break;
             }
-            let row = |tag: &At<Raw>| (repeated(tag, name, place, by, scheme), Some(which.clone()));
+            let row = |tag: &At<Raw>| {
+                let row = repeated(tag, name, place, by, scheme);
+                (count_from.map_or(row.clone(), |from| with_count(row, from, place)), Some(which.clone()))
+            };
             rows.extend(repeat.tags.iter().map(row));
         }
     }
@@ -85,6 +90,21 @@ fn repeated(row: &At<Raw>, name: &str, place: usize, by: i128, scheme: Scheme) -
         substitute(&mut node.value, name, place);
         if matches!(key.as_str(), "address" | "modicon") && by != 0 {
             node.value = moved(&node.value, by, scheme);
+        }
+    }
+    row
+}
+
+/// The row as the device has it while it says that it has more than those before.
+fn with_count(mut row: At<Raw>, from: &At<String>, place: usize) -> At<Raw> {
+    let counted = format!("{} > {place}", from.value);
+    let table = &mut row.value.table;
+    match table.get_mut("when").map(|(_, node)| &mut node.value) {
+        Some(Node::Text(own)) => *own = format!("({own}) and {counted}"),
+        // What is no text is reported where it is read.
+        Some(_) => {}
+        None => {
+            table.insert("when".to_owned(), (from.at, At { value: Node::Text(counted), at: from.at }));
         }
     }
     row

@@ -27,6 +27,7 @@ use super::{
 use crate::plant::{
     def::{DeviceId, Limits, Role, TagId},
     exact::Exact,
+    raw_number::BadSpan,
     tag::{
         Access, Bound, ByteOrder, Confidence, DataType, Decimals, Encoding, Point, Poll, PollClass, STORE_EVERY_MAX,
         StorePolicy, Table, TagDef,
@@ -75,6 +76,8 @@ pub(super) struct Defined {
     pub unlock: Option<(TagId, At<Choice>)>,
     /// What it is calculated from, which may be any tag of the plant.
     pub expr: Option<At<String>>,
+    /// What must hold for its device to have it.
+    pub when: Option<At<String>>,
     /// How it is simulated, which may ask any tag of the plant.
     pub simulate: Option<SimulateTable>,
 }
@@ -143,6 +146,7 @@ pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, probl
         is_unclear: !context.has_base && is_unclear(&row, point, problems),
         address_at: point.and(row.address.map(|address| address.at)),
         expr: row.expr,
+        when: row.when,
         needs: links.needs,
         unlock: links.unlock,
         simulate: row.simulate.map(|simulate| simulate.value),
@@ -173,7 +177,7 @@ fn row_of(mut layers: Vec<Raw>, context: &DeviceContext, problems: &mut Problems
     (row, has_default_marks)
 }
 
-fn bad_if(row: &TagTable, point: Option<Point>, is_default: bool, problems: &mut Problems) -> Vec<Exact> {
+fn bad_if(row: &TagTable, point: Option<Point>, is_default: bool, problems: &mut Problems) -> Vec<BadSpan> {
     let Some((marks, point)) = row.bad_if.as_ref().zip(point) else { return Vec::new() };
     marks.value.of(point, is_default, problems)
 }

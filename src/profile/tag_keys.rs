@@ -8,7 +8,6 @@ use super::{
 };
 use crate::plant::{
     address::{in_table, table_named},
-    data_type::Clock,
     tag::{Access, ByteOrder, DataType, Point, StorePolicy},
 };
 
@@ -21,10 +20,10 @@ const FOR_NUMBERS: [&str; 17] = [
 
 /// Keys that belong to a register.
 #[rustfmt::skip]
-const FOR_REGISTERS: [&str; 29] = [
+const FOR_REGISTERS: [&str; 30] = [
     "table", "address", "modicon", "type", "order", "field", "scale", "offset", "decimals_from", "scale_from", "unit_from", "access", "verify",
     "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_address", "write", "write_unlock", "poll",
-    "poll_class", "simulate", "default", "set",
+    "poll_class", "simulate", "default", "set", "when",
 ];
 
 /// The defaults of a profile without those that its kind of tag does not have: a type of registers is no coil's, a scale no
@@ -78,7 +77,7 @@ pub(super) fn check_text(row: &TagTable, point: Point, problems: &mut Problems) 
         problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
     }
     let is_reversed = |order: &At<ByteOrder>| matches!(order.value, ByteOrder::Cdab | ByteOrder::Dcba);
-    if let Some(order) = row.order.filter(|order| is_reversed(order) && point.kind != DataType::Clock(Clock::Epoch)) {
+    if let Some(order) = row.order.filter(|order| is_reversed(order) && !point.kind.is_reversible()) {
         let problem = problems.add(order.at, "the words of a text cannot be reversed");
         problem.label("expected \"ABCD\", high byte first, or \"BADC\", low byte first");
     }

@@ -3,6 +3,7 @@
 use toml_edit::Value;
 
 use crate::plant::{
+    raw_number::BadSpan,
     tag::{Access, Bound, ByteOrder, Decimals, TagDef},
     visible::visible,
 };
@@ -35,6 +36,18 @@ pub fn tag_keys(tag: &TagDef) -> Vec<String> {
     keys
 }
 
+/// The keys of a tag that is calculated.
+pub fn calculated_keys(tag: &TagDef, expr: &str) -> Vec<String> {
+    let mut keys = vec![format!("name = {}", quoted(&tag.short)), format!("expr = {}", quoted(expr))];
+    if let Decimals::Fixed(decimals) = tag.decimals {
+        keys.push(format!("decimals = {decimals}"));
+    }
+    for (key, text) in [("unit", &tag.unit), ("group", &tag.group), ("label", &tag.label)] {
+        keys.extend((!text.is_empty()).then(|| format!("{key} = {}", quoted(text))));
+    }
+    keys
+}
+
 fn number(key: &str, value: f64) -> String {
     format!("{key} = {}", Value::from(value).to_string().trim())
 }
@@ -56,7 +69,12 @@ fn number_keys(tag: &TagDef, keys: &mut Vec<String>) {
         keys.push(format!("bits = {{ {} }}", labels.collect::<Vec<_>>().join(", ")));
     }
     if !tag.bad_if.is_empty() {
-        let numbers = tag.bad_if.iter().map(|bad| tag.point.raw_text(*bad)).collect::<Vec<_>>();
+        let number = |raw| tag.point.raw_text(raw);
+        let of_span = |bad: &BadSpan| match bad.single() {
+            Some(bad) => number(bad),
+            None => format!("[{}, {}]", number(bad.first), number(bad.last)),
+        };
+        let numbers = tag.bad_if.iter().map(of_span).collect::<Vec<_>>();
         keys.push(format!("bad_if = [{}]", numbers.join(", ")));
     }
     for (key, bound) in [("min", tag.min), ("max", tag.max)] {

@@ -112,7 +112,8 @@ fn exactly(written: &str) -> Option<String> {
 
 /// In other letters, where only one unit can be meant: `KW`, `kwh`, `VAR`, `Seconds`. Never milli for mega.
 fn roughly(written: &str) -> Option<String> {
-    let same = |a: &str, b: &str| 2 <= a.chars().count() && a.to_lowercase() == b.to_lowercase();
+    // `In` is a nominal current, no inch.
+    let same = |a: &str, b: &str| 2 <= a.chars().count() && a.to_lowercase() == b.to_lowercase() && b != "In";
     let named = |atom: &&Atom| atom.spellings.iter().any(|spelling| same(spelling, written));
     if let Some(unit) = exactly(written).or_else(|| ATOMS.iter().find(named).map(|atom| atom.spellings[0].to_owned())) {
         return Some(unit);
@@ -147,7 +148,7 @@ mod tests {
             ("m3/hr", "m³/h"), ("m3/h", "m³/h"), ("m^3/h", "m³/h"), ("L/min", "l/min"), ("lpm", "l/min"), ("gal/min", "gal/min"),
             ("kVArh", "kvarh"), ("kVAr", "kvar"), ("VAR", "var"), ("KW", "kW"), ("kw", "kW"), ("kwh", "kWh"), ("KWH", "kWh"), ("KVA", "kVA"),
             ("MVAr", "Mvar"), ("MWh", "MWh"), ("MWH", "MWh"), ("GWh", "GWh"), ("Watts", "W"), ("Volts", "V"), ("Amps", "A"),
-            ("Seconds", "s"), ("seconds", "s"), ("sec", "s"), ("hours", "h"), ("Hours", "h"), ("Hz", "Hz"), ("HZ", "Hz"), ("percent", "%"),
+            ("%/In", "%/In"), ("%In/s", "%In/s"), ("In", "In"), ("Seconds", "s"), ("seconds", "s"), ("sec", "s"), ("hours", "h"), ("Hours", "h"), ("Hz", "Hz"), ("HZ", "Hz"), ("percent", "%"),
             ("mg/m3", "mg/m³"), ("W/m2", "W/m²"), ("W/m²", "W/m²"), ("m³/d", "m³/d"), ("kg/m3", "kg/m³"), ("uS/cm", "µS/cm"), ("μS/cm", "µS/cm"),
             ("ohm", "Ω"), ("kohm", "kΩ"), ("mL", "ml"), ("msec", "ms"), ("mΩ", "mΩ"), ("MΩ", "MΩ"), ("Ah", "Ah"), ("mAh", "mAh"), ("GJ", "GJ"), ("ft", "ft"), ("inHg", "inHg"), ("%RH", "% RH"),
             ("1/min", "1/min"), ("rpm", "rpm"), ("RPM", "rpm"), ("Nm", "Nm"), ("mW", "mW"), ("MW", "MW"), ("mWh", "mWh"), (" kWh ", "kWh"), ("", ""),

@@ -2,6 +2,7 @@
 //! heading or, without one, by their form. What is not sure is not taken, and said by line.
 
 mod base;
+pub mod calculated;
 pub mod cells;
 mod columns;
 mod form;
@@ -22,6 +23,7 @@ pub use self::{
     sections::titled,
 };
 use self::{
+    calculated::Calculated,
     cells::Cells,
     columns::{Columns, first_of, is_address, is_heading},
     row::{Assumed, Row, Taken},
@@ -79,6 +81,8 @@ impl Default for ListContext {
 pub struct List {
     /// In the order of the list.
     pub named: Vec<Named>,
+    /// What is calculated from registers.
+    pub calculated: Vec<Calculated>,
     /// `line 7: no address`.
     pub problems: Vec<String>,
     /// It is no list at all: why.
@@ -156,6 +160,7 @@ impl List {
             let at = format!("{place}{}", t!("line {number}", number = named.line));
             self.push(&at, Ok(named));
         }
+        self.calculated.extend(other.calculated);
         self.warnings.extend(other.warnings);
         self.problems.extend(other.problems.into_iter().map(|problem| format!("{place}{problem}")));
         self.unclear = self.unclear.take().or(other.unclear);
@@ -219,7 +224,7 @@ impl List {
 }
 
 /// Why a register cannot be taken beside another one.
-fn conflict(old: &Named, new: &Named) -> Option<String> {
+pub fn conflict(old: &Named, new: &Named) -> Option<String> {
     let end = |named: &Named| u32::from(named.address) + u32::from(named.count());
     if old.table != new.table || end(old) <= u32::from(new.address) || end(new) <= u32::from(old.address) {
         return None;

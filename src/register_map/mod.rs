@@ -75,7 +75,7 @@ pub fn read(bytes: &[u8], context: &ListContext) -> List {
 
 /// A file of a known form without a row is none.
 fn nothing(list: &List) -> Option<String> {
-    let is_empty = list.named.is_empty() && list.problems.is_empty();
+    let is_empty = list.named.is_empty() && list.calculated.is_empty() && list.problems.is_empty();
     is_empty.then(|| t!("there is nothing in it").to_owned())
 }
 

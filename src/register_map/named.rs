@@ -9,7 +9,7 @@ use crate::{
         exact::Exact,
         id::{DeviceId, TagId},
         number::digits,
-        raw_number::is_same,
+        raw_number::BadSpan,
         scale,
         tag::{Access, Bound, ByteOrder, DataType, Decimals, Encoding, Point, Poll, Table, TagDef},
     },
@@ -46,7 +46,7 @@ pub struct Named {
     /// Names of the bits of a status word.
     pub bit_labels: Vec<(u8, String)>,
     /// Raw numbers that mean "no value".
-    pub bad_if: Vec<Exact>,
+    pub bad_if: Vec<BadSpan>,
     /// `Battery`; empty for none.
     pub group: String,
     /// Least and greatest value that may be written, in its unit.
@@ -63,8 +63,23 @@ pub struct Named {
     pub poll: Option<Poll>,
     /// Where a power of ten stands by which it is multiplied besides.
     pub power_at: Option<u16>,
+    /// It is the first of several, of which the device says how many it has.
+    pub repeat: Option<Repeat>,
     /// The line of the file that it comes from; 0 for none.
     pub line: usize,
+}
+
+/// Rows that stand in a device many times.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Repeat {
+    /// What the names of the first of them begin with, without its number: `module` of `module1.W`.
+    pub prefix: String,
+    /// From one to the next.
+    pub step: u16,
+    /// The most of them.
+    pub count: u16,
+    /// The register that says how many there are, or how long they are together with so many registers in front.
+    pub counted_by: (u16, Option<u16>),
 }
 
 impl Named {
@@ -93,6 +108,7 @@ impl Named {
             write_at: None,
             poll: None,
             power_at: None,
+            repeat: None,
             line: 0,
         }
     }
@@ -163,7 +179,7 @@ impl Named {
     }
 
     fn is_bad(&self, raw: Exact) -> bool {
-        self.bad_if.iter().any(|bad| is_same(*bad, raw))
+        self.bad_if.iter().any(|bad| bad.holds(raw))
     }
 
     /// `70.0 °C`, `RUN`, `no value`; `None` where there are too few words or they hold no number.
@@ -251,7 +267,7 @@ mod tests {
         assert_eq!(scaled.text(&[]), None);
         let state = Named { enum_labels: vec![(0, "RUN".into())], ..plain.clone() };
         assert_eq!((state.text(&[0]).as_deref(), state.text(&[7]).as_deref()), (Some("RUN"), Some("7")));
-        let marked = Named { bad_if: vec![Exact::whole(-1)], ..scaled };
+        let marked = Named { bad_if: vec![Exact::whole(-1).into()], ..scaled };
         assert_eq!((marked.text(&[0xFFFF]).as_deref(), marked.value(&[0xFFFF])), (Some("no value"), None));
         let float = Named { kind: DataType::F32, decimals: 2, ..plain.clone() };
         assert_eq!((float.text(&[0x42D1, 0x6353]).as_deref(), float.text(&[0x42D1])), (Some("104.69"), None));

@@ -1,5 +1,7 @@
 //! A register map as a device profile: what its check refuses is left out, and said.
 
+mod sums;
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt::Write,
@@ -7,14 +9,14 @@ use std::{
 
 use super::{
     list::{List, words::poll_text},
-    named::Named,
+    named::{Named, Repeat},
 };
 use crate::{
     plant::tag::{Access, TagDef},
     profile::{
         self, Checked,
         new_plant::plain_name,
-        tag_text::{quoted, tag_keys},
+        tag_text::{calculated_keys, quoted, tag_keys},
     },
     t,
 };
@@ -30,6 +32,8 @@ pub struct Written {
     pub checked: Checked,
     /// What was left out of it, by line of the file that was read.
     pub problems: Vec<String>,
+    /// Rows of the list that it has.
+    pub rows: usize,
 }
 
 /// A row on its way into the profile.
@@ -38,6 +42,8 @@ struct Row {
     tag: TagDef,
     /// Its limits and how it is written were refused.
     is_bare: bool,
+    /// What it is calculated from, if it has no register.
+    expr: Option<String>,
 }
 
 /// The profile of a list, called so; `Err` says why there is none.
@@ -45,6 +51,7 @@ pub fn written(list: &List, name: &str, source: &str) -> Result<Written, String>
     let mut taken = BTreeSet::new();
     let mut rows: Vec<Row> = list.named.iter().map(|named| row(named, &mut taken)).collect();
     let mut problems = Vec::new();
+    let parts = sums::add(&list.calculated, &mut rows, &mut taken, &mut problems);
     for _ in 0..ROUNDS_MAX {
         without_power(&mut rows, &mut problems);
         if rows.is_empty() {
@@ -52,7 +59,9 @@ pub fn written(list: &List, name: &str, source: &str) -> Result<Written, String>
         }
         let (text, lines) = text(list, &rows, name, source);
         let errors = match profile::check_text(name, &text) {
-            Ok(checked) => return Ok(Written { text, checked, problems }),
+            Ok(checked) => {
+                return Ok(Written { text, checked, problems, rows: rows.len().saturating_sub(parts) });
+            }
             Err(errors) => errors,
         };
         let mut refused: Vec<(usize, String)> = Vec::new();
@@ -77,7 +86,7 @@ pub fn written(list: &List, name: &str, source: &str) -> Result<Written, String>
 
 /// Leaves out the rows whose power of ten is left out: without it they would be another value.
 fn without_power(rows: &mut Vec<Row>, problems: &mut Vec<String>) {
-    let places: BTreeSet<_> = rows.iter().map(|row| (row.named.table, row.named.address)).collect();
+    let places: BTreeSet<_> = with_register(rows).map(|row| (row.named.table, row.named.address)).collect();
     rows.retain(|Row { named, .. }| {
         let is_whole = named.power_at.is_none_or(|at| places.contains(&(named.table, at)));
         if !is_whole {
@@ -114,7 +123,25 @@ fn row(named: &Named, taken: &mut BTreeSet<String>) -> Row {
     let numbered = (2..).map(|n| format!("{plain}_{n}"));
     let mut names = [Some(plain.clone()), Some(place), bit, Some(table)].into_iter().flatten().chain(numbered);
     let short = names.find(|name| taken.insert(name.clone())).expect("the numbers do not end");
-    Row { tag: named.tag(&short), named: named.clone(), is_bare: false }
+    Row { tag: named.tag(&short), named: named.clone(), is_bare: false, expr: None }
+}
+
+/// The keys of a row that stands for many: names of the first are those of each, and which of them a device has another tag
+/// says.
+fn repeated(keys: Vec<String>, repeat: &Repeat, counted_by: Option<&str>) -> Vec<String> {
+    let first = format!("\"{}1.", plain_name(&repeat.prefix));
+    let each = format!("\"{}{{n}}.", plain_name(&repeat.prefix));
+    let is_name = |key: &str| ["name = ", "scale_from = "].iter().any(|name| key.starts_with(name));
+    let of_each = |key: String| if is_name(&key) { key.replacen(&first, &each, 1) } else { key };
+    let when = counted_by.map(|short| match repeat.counted_by.1 {
+        None => format!("when = \"{short} >= {{n}}\""),
+        Some(fixed) => format!("when = \"({short} - {fixed}) / {} >= {{n}}\"", repeat.step),
+    });
+    keys.into_iter().map(of_each).chain(when).collect()
+}
+
+fn with_register(rows: &[Row]) -> impl Iterator<Item = &Row> {
+    rows.iter().filter(|row| row.expr.is_none())
 }
 
 /// The text, and the line in which each row begins.
@@ -137,18 +164,30 @@ fn text(list: &List, rows: &[Row], name: &str, source: &str) -> (String, Vec<usi
         quoted(&format!("imported from {source}"))
     );
     let powers: BTreeMap<_, _> =
-        rows.iter().map(|row| ((row.named.table, row.named.address), &row.tag.short)).collect();
+        with_register(rows).map(|row| ((row.named.table, row.named.address), &row.tag.short)).collect();
     let mut line = out.matches('\n').count();
-    for Row { named, tag, .. } in rows {
-        let mut keys = tag_keys(tag);
-        keys.extend(named.poll.map(|poll| format!("poll = \"{}\"", poll_text(poll))));
+    let mut before = None;
+    for Row { named, tag, expr, .. } in rows {
+        let mut keys = expr.as_ref().map_or_else(|| tag_keys(tag), |expr| calculated_keys(tag, expr));
+        keys.extend(named.poll.filter(|_| expr.is_none()).map(|poll| format!("poll = \"{}\"", poll_text(poll))));
         if let Some(power) = named.power_at.and_then(|at| powers.get(&(named.table, at))) {
             keys.retain(|key| !key.starts_with("decimals = "));
             keys.push(format!("scale_from = {}", quoted(power)));
         }
-        lines.push(line + 2);
-        line += keys.len() + 2;
-        let _ = writeln!(out, "\n[[tag]]\n{}", keys.join("\n"));
+        let mut head = "\n[[tag]]".to_owned();
+        if let Some(repeat) = &named.repeat {
+            let counted_by = powers.get(&(named.table, repeat.counted_by.0));
+            keys = repeated(keys, repeat, counted_by.map(|short| short.as_str()));
+            head = "\n[[repeat.tag]]".to_owned();
+            if before != Some(repeat) {
+                head = format!("\n[[repeat]]\ncount = {}\nstep = {}\n{head}", repeat.count, repeat.step);
+            }
+        }
+        before = named.repeat.as_ref();
+        line += head.matches('\n').count() + 1;
+        lines.push(line);
+        line += keys.len();
+        let _ = writeln!(out, "{head}\n{}", keys.join("\n"));
     }
     (out, lines)
 }

@@ -25,6 +25,8 @@ pub(crate) mod experiment;
 mod random;
 pub(crate) mod model;
 pub mod simulator;
+#[cfg(test)]
+mod library;
 pub mod faults;
 pub(crate) mod scenario;
 pub(crate) mod ground_truth;

@@ -185,7 +185,7 @@ impl Theme {
         match quality {
             Quality::Good => self.normal(),
             Quality::Uncertain(_) => self.fg(Role::Uncertain).add_modifier(Modifier::ITALIC),
-            Quality::Bad(Cause::NotRead | Cause::OnRequest) => self.dim(),
+            Quality::Bad(Cause::NotRead | Cause::OnRequest | Cause::NotPresent) => self.dim(),
             Quality::Bad(_) => self.trouble(),
         }
     }

@@ -7,6 +7,7 @@ Units 1 to 3 are an inverter, a meter and a battery; those behind them have ever
 values, valid ones and markers of what is not implemented. Their marker stands at 40000, 0 and 50000 in turn.
 """
 
+import ipaddress
 import json
 import os
 import random
@@ -149,13 +150,12 @@ def rows(name, point):
     elif kind.startswith("enum"):
         seen = {symbol["value"]: symbol["name"] for symbol in point.pdef.get("symbols", [])}.get(seen, seen)
     elif kind == "eui48":
-        seen = int(seen.replace(":", ""), 16)
-    if kind == "ipv6addr":
-        digits = seen.replace(":", "")
-        yield {"name": name + ".high", "seen": int(digits[:16], 16)}
-        yield {"name": name + ".low", "seen": int(digits[16:], 16)}
-    else:
-        yield {"name": name, "seen": seen}
+        seen = seen.upper()
+    elif kind == "ipaddr":
+        seen = str(ipaddress.IPv4Address(seen))
+    elif kind == "ipv6addr":
+        seen = ipaddress.IPv6Address(int(seen.replace(":", ""), 16)).exploded
+    yield {"name": name, "seen": seen}
 
 
 def read(port, unit):

@@ -22,7 +22,17 @@ pub(super) fn text(clock: Clock, words: &[u16]) -> Option<String> {
         let parts = bytes()?.into_iter().enumerate();
         of_parts(parts.map(|(place, byte)| Some(number(byte)? + if place == 0 { 2_000 } else { 0 })).collect())
     };
+    // Midnight at the end of a day has a number of its own.
+    let of_time = |hour: u16, minute: u16| {
+        let is_time = hour < 24 && minute < 60 || (hour, minute) == (24, 0);
+        is_time.then(|| format!("{hour:02}:{minute:02}"))
+    };
+    let digits = |byte: u16| (byte & 0xF <= 9).then_some(10 * (byte >> 4) + (byte & 0xF));
     match clock {
+        Clock::TimeDecimal => of_time(words.first()? / 100, words.first()? % 100),
+        Clock::TimeBytes => of_time(words.first()? >> 8, words.first()? & 0xFF),
+        Clock::TimeBcd => of_time(digits(words.first()? >> 8)?, digits(words.first()? & 0xFF)?),
+        Clock::TimeWords => of_time(*words.first()?, *words.get(1)?),
         Clock::Epoch => {
             let [high, low] = *words.first_chunk::<2>()?;
             Some(Timestamp::from_second(i64::from(high) << 16 | i64::from(low)).ok()?.to_string())
@@ -53,5 +63,13 @@ mod tests {
         check(Clock::Bcd, &[0x2611, 0x2817, 0x032A], None);
         check(Clock::Bcd, &[0, 0, 0], None);
         check(Clock::Bytes, &[0x1A0B], None);
+        check(Clock::TimeDecimal, &[2_359], Some("23:59"));
+        check(Clock::TimeDecimal, &[1_260], None);
+        check(Clock::TimeDecimal, &[2_400], Some("24:00"));
+        check(Clock::TimeBytes, &[0x173B], Some("23:59"));
+        check(Clock::TimeBcd, &[0x2359], Some("23:59"));
+        check(Clock::TimeBcd, &[0x235A], None);
+        check(Clock::TimeWords, &[7, 5], Some("07:05"));
+        check(Clock::TimeWords, &[24, 1], None);
     }
 }

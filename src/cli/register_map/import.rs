@@ -218,8 +218,8 @@ fn question(question: &Question) -> String {
 /// What was taken, each row that was not, and what is lost of others.
 fn say_rows(title: &str, list: &List, written: Option<&Written>) {
     let lost = written.map_or(&[][..], |written| &written.problems);
-    let taken = written.map_or(0, |written| written.checked.plant.tags.len());
-    let all = list.named.len() + list.problems.len();
+    let taken = written.map_or(0, |written| written.rows);
+    let all = list.named.len() + list.calculated.len() + list.problems.len();
     let format = list.format.map_or("", Format::word);
     say(&format!("{title}: {format}, {taken} of {all} rows"));
     list.warnings.iter().for_each(|warning| say(&format!("  {warning}")));

@@ -11,7 +11,7 @@ use crate::plant::{
     ne107::{Reason, Signal},
     process_image::ProcessImage,
     record::{AlarmEvent, AlarmRecord, Record},
-    sample::Quality,
+    sample::{Cause, Quality},
     snapshot::{DeviceState, DeviceStatus, LineStatus},
     station::{STATION, StationFault, StationFaults},
 };
@@ -171,8 +171,9 @@ fn value_of(def: &crate::plant::PlantDef, image: &ProcessImage, alarm: AlarmId) 
 
 /// Has no tag of a device that is read a value, not even an uncertain one?
 fn has_only_bad(def: &PlantDef, image: &ProcessImage, device: DeviceId) -> bool {
-    let mut read = def.tags_of(device).filter(|tag| tag.is_read() && tag.calculation.is_none());
-    read.all(|tag| matches!(image.sample(tag.id).quality, Quality::Bad(_)))
+    let read = def.tags_of(device).filter(|tag| tag.is_read() && tag.calculation.is_none());
+    let mut there = read.filter(|tag| image.sample(tag.id).quality != Quality::Bad(Cause::NotPresent));
+    there.all(|tag| matches!(image.sample(tag.id).quality, Quality::Bad(_)))
 }
 
 /// A device that refuses everything is as good as silent.

@@ -58,6 +58,8 @@ toml_tables! {
     RepeatTable, "a repeat" {
         opt "count" count: u16,
         list "names" names: String,
+        /// The tag that says how many of them the device has.
+        opt "count_from" count_from: String,
         /// From the address of one to that of the next.
         opt "step" step: u16,
         list "tag" tags: Raw,
@@ -143,6 +145,8 @@ toml_tables! {
         opt "bad_if" bad_if: BadIf,
         opt "quality_from" quality_from: String,
         opt "quality_mask" quality_mask: u64,
+        /// What must hold for the device to have it.
+        opt "when" when: String,
         opt "write_fc" write_fc: u8,
         /// Where it is written, if not where it is read.
         opt "write_address" write_address: Location,

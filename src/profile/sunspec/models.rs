@@ -2,7 +2,10 @@
 
 use std::str::Lines;
 
-use crate::{plant::tag::DataType, profile::sunspec_models};
+use crate::{
+    plant::{data_type::NetworkAddress, tag::DataType},
+    profile::sunspec_models,
+};
 
 /// A model, or a part of one that repeats.
 #[derive(Debug, Default, PartialEq)]
@@ -61,7 +64,7 @@ pub(crate) struct ModelPoint {
 pub(crate) enum Kind {
     /// A number.
     Number(DataType),
-    /// A counter, or an address: 0 means that there is none.
+    /// A counter: 0 means that there is none.
     NotZero(DataType),
     /// A number with names.
     Enum(DataType),
@@ -71,10 +74,17 @@ pub(crate) enum Kind {
     Power,
     /// Text, two characters a register.
     Text,
-    /// 128 bits.
-    Wide,
+    /// An address in a network.
+    Address(NetworkAddress),
     /// Nothing.
     Pad,
+}
+
+impl Kind {
+    /// Is it shown as text?
+    pub fn is_text(self) -> bool {
+        matches!(self, Kind::Text | Kind::Address(_))
+    }
 }
 
 /// A model by its number; `None` for one that is not known.
@@ -140,15 +150,17 @@ pub(crate) fn kind_of(word: &str) -> (Kind, u16) {
         "float32" => Kind::Number(DataType::F32),
         "float64" => Kind::Number(DataType::F64),
         "acc16" => Kind::NotZero(DataType::U16),
-        "acc32" | "ipaddr" => Kind::NotZero(DataType::U32),
-        "acc64" | "eui48" => Kind::NotZero(DataType::U64),
+        "acc32" => Kind::NotZero(DataType::U32),
+        "acc64" => Kind::NotZero(DataType::U64),
+        "eui48" => Kind::Address(NetworkAddress::Eui48),
+        "ipaddr" => Kind::Address(NetworkAddress::Ipv4),
         "enum16" => Kind::Enum(DataType::U16),
         "enum32" => Kind::Enum(DataType::U32),
         "bitfield16" => Kind::Bits(DataType::U16),
         "bitfield32" => Kind::Bits(DataType::U32),
         "bitfield64" => Kind::Bits(DataType::U64),
         "sunssf" => Kind::Power,
-        "ipv6addr" => Kind::Wide,
+        "ipv6addr" => Kind::Address(NetworkAddress::Ipv6),
         _ => {
             let registers = |name| word.strip_prefix(name).and_then(|count| count.parse().ok());
             let text = registers("string").map(|count| (Kind::Text, count));
@@ -157,7 +169,7 @@ pub(crate) fn kind_of(word: &str) -> (Kind, u16) {
     };
     let registers = match kind {
         Kind::Number(kind) | Kind::NotZero(kind) | Kind::Enum(kind) | Kind::Bits(kind) => kind.registers(),
-        Kind::Wide => 8,
+        Kind::Address(address) => DataType::NetworkAddress(address).registers(),
         Kind::Power | Kind::Text | Kind::Pad => 1,
     };
     (kind, registers)

@@ -48,7 +48,7 @@ fn is_marked(point: &ModelPoint, address: u32, place: &Place) -> bool {
         Kind::Number(_) | Kind::Enum(_) | Kind::Bits(_) => all(u16::MAX),
         // It may count, or be set, from now on.
         Kind::NotZero(_) => false,
-        Kind::Wide | Kind::Text => all(0),
+        Kind::Address(_) | Kind::Text => all(0),
         Kind::Power => *first == 0x8000,
         Kind::Pad => true,
     }

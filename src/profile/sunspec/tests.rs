@@ -54,7 +54,6 @@ fn extent(group: &Group, n: u16) -> (u16, usize) {
     let mut registers: u16 = group.points.iter().map(|point| point.registers).sum();
     let tags = |kind: Kind| match kind {
         Kind::Pad => 0,
-        Kind::Wide => 2,
         _ => 1,
     };
     let mut points = group.points.iter().map(|point| tags(point.kind)).sum();

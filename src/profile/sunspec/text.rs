@@ -131,13 +131,9 @@ impl Rows {
         let mut keys = Vec::new();
         let kind = match point.kind {
             Kind::Pad => return,
-            Kind::Wide => {
-                let half = |at| vec![format!("bad_if = []"), format!("label = {}", quoted(at))];
-                self.row(place, &format!("{name}.high"), address, "uint64", &half("upper half"));
-                return self.row(place, &format!("{name}.low"), address + 4, "uint64", &half("lower half"));
-            }
             Kind::Text => format!("cstring({})", 2 * point.registers.min(READ_REGISTERS_MAX)),
             Kind::Power => "int16".to_owned(),
+            Kind::Address(address) => address.word().to_owned(),
             Kind::Number(kind) | Kind::NotZero(kind) | Kind::Enum(kind) | Kind::Bits(kind) => kind.to_string(),
         };
         if let Kind::NotZero(_) = point.kind {
@@ -155,12 +151,12 @@ impl Rows {
         }
         keys.extend((!point.label.is_empty()).then(|| format!("label = {}", quoted(point.label))));
         keys.extend(
-            (!point.unit.is_empty() && point.kind != Kind::Text).then(|| format!("unit = {}", quoted(point.unit))),
+            (!point.unit.is_empty() && !point.kind.is_text()).then(|| format!("unit = {}", quoted(point.unit))),
         );
         keys.extend(self.symbols(point, &name));
         let poll = poll_of(point, address, place);
         self.missing += usize::from(poll == Some(NEVER));
-        if point.is_writable && point.kind != Kind::Text && poll != Some(NEVER) {
+        if point.is_writable && !point.kind.is_text() && poll != Some(NEVER) {
             keys.push("access = \"rw\"".to_owned());
             if self.writable.last().map(String::as_str) != Some(place.model) {
                 self.writable.push(place.model.to_owned());
@@ -192,7 +188,7 @@ impl Rows {
                 }
                 Some(format!("bits = {{ {rows} }}"))
             }
-            Kind::Number(_) | Kind::NotZero(_) | Kind::Power | Kind::Text | Kind::Wide | Kind::Pad => None,
+            Kind::Number(_) | Kind::NotZero(_) | Kind::Power | Kind::Text | Kind::Address(_) | Kind::Pad => None,
         }
     }
 

@@ -78,6 +78,15 @@ fn a_pattern_of_bits_means_no_value_whatever_the_type() {
         assert!(!tag.is_bad(0.0.into()), "{kind} {mark}");
         assert_eq!(warnings(&meter(&text)), Vec::<String>::new(), "{kind} {mark}");
     }
+    let span = |ends: &str| {
+        format!("[[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 2000\ntype = \"int16\"\nbad_if = [{ends}]\n")
+    };
+    let found = tag(&meter(&span("[0x8000, -100], 7")), "D1.X");
+    let bad = [-32_768, -100, 7].map(|raw| found.is_bad(Exact::whole(raw)));
+    assert_eq!((bad, found.is_bad(Exact::whole(-99))), ([true; 3], false), "{:?}", found.bad_if);
+    let refused = errors(&meter(&span("[5, 0x8000]")));
+    assert!(refused.contains("begin at 5 and end at -32768"), "{refused}");
+    assert!(errors(&meter(&span("[5]"))).contains("the lowest and the highest"));
     let never =
         meter("[[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 2000\ntype = \"int16\"\nbad_if = [0x18000]\n");
     let said = warnings(&never);
@@ -94,8 +103,8 @@ fn marks_of_a_profile_are_those_of_each_type() {
         format!("{}{map}{}{tags}", &METER[..METER.find("[[tag]]").unwrap()], &METER[METER.find("[[tag]]").unwrap()..]);
     let plant = loaded(&meter);
     let bad = |name: &str| plant.tag(plant.tag_named(name).unwrap()).bad_if.clone();
-    assert_eq!(bad("D1.A"), [Exact::whole(-32_768)]);
-    assert_eq!(bad("D1.B"), [Exact::whole(65_535)], "0x8000 is a value of this type");
+    assert_eq!(bad("D1.A"), [Exact::whole(-32_768).into()]);
+    assert_eq!(bad("D1.B"), [Exact::whole(65_535).into()], "0x8000 is a value of this type");
     assert_eq!((bad("D1.C"), bad("D1.S")), (Vec::new(), Vec::new()));
     assert_eq!(warnings(&meter), Vec::<String>::new());
 }

@@ -118,7 +118,7 @@ fn whole_as_number(text: &str) -> Option<f64> {
     whole(text).map(|number| number as f64)
 }
 
-/// `10`, `-5`, `0x1F`, `0o17`, `0b11`, `1_000`; a number with a leading zero is octal to some and decimal to others.
+/// `10`, `-5`, `0x1F`, `0o17`, `0b11`, `1_000`; a number with a leading zero, but `0000`, is octal to some and decimal to others.
 pub fn whole(text: &str) -> Option<i64> {
     let text = text.trim();
     let (sign, digits) = text.strip_prefix('-').map_or((1, text), |digits| (-1, digits));
@@ -127,7 +127,7 @@ pub fn whole(text: &str) -> Option<i64> {
     let radix = |prefix: &str, radix| lower.strip_prefix(prefix).map(|digits| (digits, radix));
     let (digits, radix) = radix("0x", 16).or_else(|| radix("0o", 8)).or_else(|| radix("0b", 2)).unwrap_or((&lower, 10));
     let is_plain = digits.chars().all(|sign| sign.is_digit(radix));
-    let is_octal = radix == 10 && 1 < digits.len() && digits.starts_with('0');
+    let is_octal = radix == 10 && 1 < digits.len() && digits.starts_with('0') && digits.contains(|digit| digit != '0');
     let number = i64::from_str_radix(digits, radix).ok().filter(|_| is_plain && !is_octal)?;
     number.checked_mul(sign)
 }

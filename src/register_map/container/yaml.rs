@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use saphyr_parser::{Event, Parser, Span};
 
 use super::node::{DEPTH_MAX, NODES_MAX, Node, Tree, Value, broken, doubled, too_much};
+use crate::t;
 
 /// What is still open.
 enum Open {
@@ -21,15 +22,12 @@ struct Builder {
     nodes: usize,
 }
 
-/// Reads the first document of a text.
+/// Reads a text of one document; a second one is none of what is read here, and refused rather than lost.
 pub fn parse(text: &str) -> Result<Tree, String> {
     let mut builder = Builder::default();
     for event in Parser::new_from_str(text) {
         let (event, span) = event.map_err(|error| broken(error.marker().line(), error.info()))?;
         builder.on(event, span)?;
-        if builder.root.is_some() {
-            break;
-        }
     }
     let root = builder.root.unwrap_or(Node { line: 1, value: Value::Empty });
     Ok(Tree { root, twice: builder.twice })
@@ -81,6 +79,8 @@ impl Builder {
             self.anchors.insert(anchor, node.clone());
         }
         match self.open.last_mut() {
+            None if node.value == Value::Empty => {}
+            None if self.root.is_some() => return Err(t!("line {line}: a second document begins", line = node.line)),
             None => self.root = Some(node),
             Some(Open::List(_, _, items)) => items.push(node),
             Some(Open::Map { entries, key, merged, .. }) => match key.take() {
@@ -136,5 +136,14 @@ mod tests {
         assert!(parse(&"[".repeat(100_000)).is_err());
         assert!(parse(&"- ".repeat(3_000)).is_err());
         assert!(parse("a: [1\nb: }").is_err());
+    }
+
+    #[test]
+    fn a_second_document_is_refused_by_its_line() {
+        assert_eq!(parse("a: 1\n---\nb: 2\n").unwrap_err(), "line 3: a second document begins");
+        let root = |text: &str| parse(text).expect("it is one document").root;
+        for text in ["---\na: 1\n", "a: 1\n---\n", "a: 1\n...\n", "---\n# none\n---\na: 1\n---\n"] {
+            assert_eq!(root(text).get("a").and_then(Node::whole), Some(1), "{text}");
+        }
     }
 }

@@ -3,8 +3,9 @@
 use super::{Exported, decimals};
 use crate::{
     plant::{
+        raw_number::BadSpan,
         role::Role,
-        tag::{Access, Bound, TagDef},
+        tag::{Access, Bound, Point, TagDef},
     },
     register_map::list::{
         Column, cells,
@@ -12,6 +13,14 @@ use crate::{
         words::{labels_text, poll_text},
     },
 };
+
+/// `-32768`, `1001..65535`.
+fn bad_text(point: Point, bad: BadSpan) -> String {
+    match bad.single() {
+        Some(bad) => point.raw_text(bad),
+        None => format!("{}..{}", point.raw_text(bad.first), point.raw_text(bad.last)),
+    }
+}
 
 /// Writes it: addresses are as they are sent, and say so.
 pub fn write(tags: &[&TagDef], exported: &mut Exported) {
@@ -25,6 +34,7 @@ pub fn write(tags: &[&TagDef], exported: &mut Exported) {
             tag,
             &[
                 (tag.quality_from.is_some(), "its quality from another tag"),
+                (tag.when.is_some(), "when the device has it"),
                 (tag.unit_from.is_some(), "its unit from another tag"),
                 (tag.writable() && !is_kept(tag), "writing it, which needs more than a list can say"),
                 (is_open(tag.min) || is_open(tag.max), "limits from another tag"),
@@ -80,7 +90,7 @@ fn cell(tag: &TagDef, column: Column) -> String {
         Column::Max => bound(tag.max),
         Column::Labels => labels_text(tag.enum_labels.iter().map(|(number, text)| (*number, text.as_str()))),
         Column::Bits => labels_text(tag.bit_labels.iter().map(|(bit, text)| (i128::from(*bit), text.as_str()))),
-        Column::Bad => tag.bad_if.iter().map(|bad| point.raw_text(*bad)).collect::<Vec<_>>().join(" "),
+        Column::Bad => tag.bad_if.iter().map(|bad| bad_text(point, *bad)).collect::<Vec<_>>().join(" "),
         Column::Group => tag.group.clone(),
         Column::WriteAt => match tag.write_at.filter(|_| is_written) {
             Some((table, address)) => format!("{}:{address}", table.word()),

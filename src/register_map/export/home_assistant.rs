@@ -92,7 +92,9 @@ fn register(tag: &TagDef, keys: &mut Vec<String>) -> Result<(), &'static str> {
         | DataType::Mod10k(_)
         | DataType::SignedMod10k(_)
         | DataType::Chars(_)
-        | DataType::Clock(_) => return Err("its type"),
+        | DataType::Clock(_)
+        | DataType::Version(_)
+        | DataType::NetworkAddress(_) => return Err("its type"),
     };
     keys.push(format!("data_type: {kind}"));
     let swap = match point.order {
@@ -116,11 +118,12 @@ fn register(tag: &TagDef, keys: &mut Vec<String>) -> Result<(), &'static str> {
 
 /// It takes whole numbers alone for "no value", and by itself what is not a number.
 fn whole_bad(tag: &TagDef) -> impl Iterator<Item = i128> {
-    tag.bad_if.iter().filter_map(|bad| bad.as_whole())
+    tag.bad_if.iter().filter_map(|bad| bad.single()?.as_whole())
 }
 
 fn lose(tag: &TagDef, exported: &mut Exported) {
-    let is_fraction = tag.bad_if.iter().any(|bad| bad.as_whole().is_none() && !bad.near().is_nan());
+    let is_fraction =
+        tag.bad_if.iter().filter_map(|bad| bad.single()).any(|bad| bad.as_whole().is_none() && !bad.near().is_nan());
     let is_written = tag.writable() && tag.point.table != Table::Coil;
     exported.lose(
         tag,
@@ -129,8 +132,10 @@ fn lose(tag: &TagDef, exported: &mut Exported) {
             (!tag.enum_labels.is_empty(), "names of its numbers"),
             (!tag.bit_labels.is_empty(), "names of its bits"),
             (1 < whole_bad(tag).count(), "all numbers that are no value but the first"),
+            (tag.bad_if.iter().any(|bad| bad.single().is_none()), "ranges of numbers that are no value"),
             (is_fraction, "a number that is no value and not whole"),
             (tag.quality_from.is_some(), "its quality from another tag"),
+            (tag.when.is_some(), "when the device has it"),
             (tag.unit_from.is_some(), "its unit from another tag"),
         ],
     );

@@ -20,6 +20,7 @@ use crate::{
     plant::{
         exact::Exact,
         number::to_u8,
+        raw_number::BadSpan,
         tag::{ByteOrder, DataType},
     },
     t,
@@ -119,7 +120,7 @@ impl Named {
     /// The same with a number that means "no value", written as a pattern of its bits or as the number.
     pub fn bad_at(mut self, written: i64, is_pattern: bool) -> Named {
         let number = self.point().raw_number(i128::from(written), is_pattern).number();
-        let number = number.filter(|number| !self.bad_if.contains(number));
+        let number = number.map(BadSpan::from).filter(|number| !self.bad_if.contains(number));
         self.bad_if.extend(number);
         self
     }

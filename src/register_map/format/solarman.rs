@@ -1,5 +1,8 @@
 //! Inverters of ha-solarman: <https://github.com/davidrapan/ha-solarman/wiki>.
 
+mod bounds;
+mod sums;
+
 use std::time::Duration;
 
 use super::{apart, field_of, missing, unsaid, wrong};
@@ -11,7 +14,7 @@ use crate::{
     profile::unit_of,
     register_map::{
         container::node::{Node, Tree, Value},
-        list::{List, ListContext},
+        list::{List, ListContext, calculated::Calculated},
         named::Named,
     },
     t,
@@ -68,6 +71,8 @@ const KNOWN: &[&str] = &[
     "hex",
     "delimiter",
     "remove",
+    "range",
+    "validation",
 ];
 
 /// The tables of registers that the requests of an older file state.
@@ -104,7 +109,20 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
                 poll.and_then(|seconds| u64::try_from(seconds).ok()).filter(|seconds| (1..=86_400).contains(seconds));
             let poll = poll.map(Duration::from_secs).map(Poll::Every);
             let title = item.word("name").unwrap_or("?");
-            let named = named.map(|named| Named { line: item.line, group: name.to_owned(), poll, ..named });
+            let with_place = |named| Named { line: item.line, group: name.to_owned(), poll, ..named };
+            if let Ok(item) = &chosen
+                && item.get("sensors").is_some()
+            {
+                match sums::sum_of(item, own, &tables) {
+                    Ok(sum) => {
+                        list.note_keys(item, &[KNOWN, &["sensors"]]);
+                        list.calculated.push(Calculated { named: with_place(sum.named), ..sum });
+                    }
+                    Err(why) => list.push_of(context, None, item.line, Err(format!("{title}: {why}"))),
+                }
+                continue;
+            }
+            let named = named.map(with_place);
             let named = named.map_err(|why| format!("{title}: {why}"));
             if named.is_ok() {
                 list.note_keys(item, &[KNOWN]);
@@ -132,14 +150,15 @@ fn of_variant(item: &Node, variant: Option<usize>) -> Result<Node, String> {
         _ => false,
     };
     let mut chosen = entries.clone();
-    // Where it is not said which, nothing is written: see `with_limits`.
+    // Where it is not said which, nothing is written: see `with_limits`; nor is a value bad that one of them may have.
     let of_limit = |(key, node): &(String, Node)| match (variant, &node.value) {
         (Some(n), Value::List(items)) if matches!(key.as_str(), "min" | "max") => {
             (key.clone(), items.get(n).unwrap_or(node).clone())
         }
         _ => (key.clone(), node.clone()),
     };
-    for (_, node) in chosen.iter_mut().filter(|(key, node)| key == "configurable" && !node.entries().is_empty()) {
+    let has_limits = |key: &str| matches!(key, "configurable" | "range" | "validation");
+    for (_, node) in chosen.iter_mut().filter(|(key, node)| has_limits(key) && !node.entries().is_empty()) {
         node.value = Value::Map(node.entries().iter().map(of_limit).collect());
     }
     for (key, node) in chosen.iter_mut().filter(|(key, node)| is_many(key, node)) {
@@ -174,9 +193,6 @@ fn code_of(node: &Node) -> Option<Table> {
 
 fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Result<Named, String> {
     let name = item.word("name").filter(|name| !name.trim().is_empty()).ok_or_else(|| missing("name"))?;
-    if item.get("sensors").is_some() {
-        return Err(t!("it is calculated from several registers").to_owned());
-    }
     let rule = item.opt_whole("rule")?.ok_or_else(|| missing("rule"))?;
     let nodes = item.all("registers");
     let registers: Vec<u16> = nodes.iter().map(|node| node.address("registers")).collect::<Result<_, _>>()?;
@@ -187,7 +203,9 @@ fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Resul
         1..=4 => (number(item, rule, registers.len())?, order(&registers)?),
         5 => (text(&registers)?, ByteOrder::Abcd),
         6 if registers.len() == 1 => (DataType::U16, ByteOrder::Abcd),
+        7 => version(&registers)?,
         8 => (clock(&registers)?, ByteOrder::Abcd),
+        9 => (time(item, &registers)?, ByteOrder::Abcd),
         _ => return Err(unsaid(&format!("rule: {rule}"))),
     };
     let kind = if table.is_bits() { DataType::Bool } else { kind };
@@ -201,7 +219,8 @@ fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Resul
         Some(lookup) if !lookup.items().is_empty() && rule % 2 == 1 => labelled(item, lookup, named)?,
         _ => scaled(item, named, rule)?,
     };
-    Ok(with_limits(item, named))
+    let named = bounds::without_value(item, named)?;
+    Ok(bounds::with_limits(item, named))
 }
 
 /// What rule 1 and 3 read without a sign, 2 and 4 with one.
@@ -248,6 +267,28 @@ fn clock(registers: &[u16]) -> Result<DataType, String> {
         (3, ByteOrder::Cdab) => Ok(DataType::Clock(Clock::Bytes)),
         // Six registers may have a year of two digits, which would be another one.
         _ => Err(unsaid("rule: 8")),
+    }
+}
+
+/// The first that is listed is shown first.
+fn version(registers: &[u16]) -> Result<(DataType, ByteOrder), String> {
+    let order = if order(registers)? == ByteOrder::Cdab { ByteOrder::Abcd } else { ByteOrder::Cdab };
+    let count = u8::try_from(registers.len()).map_err(|_| unsaid("registers"))?;
+    Ok((DataType::Version(count), if count == 1 { ByteOrder::Abcd } else { order }))
+}
+
+/// Hour and minute, apart by `dec` in one register; with `hex` of two decimal digits each, or of their characters.
+fn time(item: &Node, registers: &[u16]) -> Result<DataType, String> {
+    let is_hex = item.entries().iter().any(|(key, _)| key == "hex");
+    let apart = item.opt_whole(if is_hex { "hex" } else { "dec" })?.unwrap_or(if is_hex { 0x100 } else { 100 });
+    let characters = i64::from(u16::from_be_bytes(*b"00"));
+    match (registers.len(), order(registers)?, is_hex, apart, item.opt_whole("offset")?.unwrap_or(0)) {
+        (1, _, false, 100, _) => Ok(DataType::Clock(Clock::TimeDecimal)),
+        (1, _, false, 0x100, _) => Ok(DataType::Clock(Clock::TimeBytes)),
+        (1, _, true, 0x100, _) => Ok(DataType::Clock(Clock::TimeBcd)),
+        (2, ByteOrder::Cdab, false, 100, _) => Ok(DataType::Clock(Clock::TimeWords)),
+        (2, ByteOrder::Cdab, true, 0x100, offset) if offset == characters => Ok(DataType::Text(4)),
+        _ => Err(unsaid("rule: 9")),
     }
 }
 
@@ -349,15 +390,4 @@ fn access(item: &Node, table: Table) -> Access {
     let platform = item.word("platform").is_some_and(|platform| is_written.contains(&platform));
     let is_written = platform || item.get("configurable").is_some();
     if is_written && matches!(table, Table::Holding | Table::Coil) { Access::ReadWrite } else { Access::Read }
-}
-
-/// The limits of what is set are those of the value.
-fn with_limits(item: &Node, named: Named) -> Named {
-    let limits = item.get("configurable").filter(|_| named.access == Access::ReadWrite);
-    let is_open = |key: &str| limits.and_then(|limits| limits.get(key)).is_some_and(|node| node.text().is_none());
-    if is_open("min") || is_open("max") {
-        return Named { access: Access::Read, ..named };
-    }
-    let limit = |key: &str| limits.and_then(|limits| limits.get(key)).and_then(Node::number);
-    Named { min: limit("min"), max: limit("max"), ..named }
 }

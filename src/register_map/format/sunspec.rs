@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use super::{missing, unsaid, wrong};
 use crate::{
     plant::{
-        number::to_u8,
+        number::{to_u8, to_u16},
         tag::{Access, ByteOrder, DataType, Table},
     },
     profile::{
@@ -16,7 +16,7 @@ use crate::{
     register_map::{
         container::node::{Node, Tree},
         list::{List, ListContext, words::power_of_ten},
-        named::Named,
+        named::{Named, Repeat},
     },
     t,
 };
@@ -24,6 +24,9 @@ use crate::{
 /// Where the common model begins behind `SunS` at 40000, and the first one behind it.
 const COMMON: u16 = 40_002;
 const FIRST: u16 = 40_070;
+
+/// Most parts of one kind that are taken of which the device says how many it has.
+const REPEATS_MAX: u16 = 16;
 
 /// Where the points of a group stand.
 struct Reader<'a> {
@@ -36,7 +39,7 @@ struct Reader<'a> {
 /// The scale factors in sight: of the group and those around it.
 type Factors = HashMap<String, u16>;
 
-/// Reads a model; a repeated group whose number only the device knows is taken once.
+/// Reads a model; of a repeated group whose number only the device knows the first is read, see [`Repeat`].
 pub fn read(tree: &Tree, context: &ListContext) -> List {
     let mut list = List::of_tree(tree);
     let Some(group) = tree.root.get("group") else { return List::refused(missing("group")) };
@@ -59,10 +62,15 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
 impl Reader<'_> {
     fn group(&mut self, group: &Node, prefix: &str, outer: &Factors) {
         let mut factors = outer.clone();
+        let mut places = HashMap::new();
+        let start = self.next;
         let mut at = self.next;
         for point in group.all("points") {
             if let (Some("sunssf"), Some(name), Ok(at)) = (point.word("type"), point.word("name"), u16::try_from(at)) {
                 factors.insert(name.to_owned(), at);
+            }
+            if let (Some(name), Ok(at)) = (point.word("name"), u16::try_from(at)) {
+                places.insert(name.to_owned(), u32::from(at));
             }
             at += size_of(point);
         }
@@ -83,20 +91,32 @@ impl Reader<'_> {
             let count = inner.get("count").map(Node::shown);
             let times = count.as_deref().map_or(Some(1), |count| count.parse::<u32>().ok());
             let (count, times) = (count.unwrap_or_default(), times.filter(|times| (1..=200).contains(times)));
-            if times.is_none() {
-                self.list.warnings.push(t!(
-                    "line {line}: how often `{name}` stands there ({count}) only the device knows: it is taken once",
-                    line = inner.line,
-                    name,
-                    count
-                ));
-            }
+            let (first, begun) = (self.list.named.len(), self.next);
             for n in 1..=times.unwrap_or(1) {
                 let number = if inner.get("count").is_some() { n.to_string() } else { String::new() };
                 self.group(inner, &format!("{prefix}{name}{number}."), &factors);
             }
+            let is_last = std::ptr::eq(inner, group.all("groups").last().unwrap_or(inner));
+            if times.is_none() {
+                let is_by_length = count == "0" && prefix.is_empty() && is_last;
+                let counted_by = match places.get(&*count) {
+                    Some(at) => Some((*at, None)),
+                    // Its own number and length are no part of the length.
+                    None => is_by_length.then(|| (start + 1, Some(begun - start - 2))),
+                };
+                let counted_by = counted_by.filter(|_| !has_open_part(inner));
+                let most = counted_by
+                    .map_or(1, |counted_by| self.repeat(first, begun, &format!("{prefix}{name}"), counted_by));
+                self.list.warnings.push(t!(
+                    "line {line}: how often `{name}` stands there ({count}) only the device knows: {most} at most are taken",
+                    line = inner.line,
+                    name,
+                    count,
+                    most
+                ));
+            }
             // Where the next group stands depends on how many these are.
-            if times.is_none() && !std::ptr::eq(inner, group.all("groups").last().unwrap_or(inner)) {
+            if times.is_none() && !is_last {
                 self.list.warnings.push(t!(
                     "line {line}: what follows `{name}` has no fixed place",
                     line = inner.line,
@@ -106,6 +126,30 @@ impl Reader<'_> {
             }
         }
     }
+}
+
+impl Reader<'_> {
+    /// What was read since is the first of several; how many of them are taken.
+    fn repeat(&mut self, first: usize, begun: u32, prefix: &str, (counted_at, fixed): (u32, Option<u32>)) -> u16 {
+        let step = self.next - begun;
+        let most =
+            (0x1_0000_u32.saturating_sub(begun)).checked_div(step).map_or(1, |most| most.min(REPEATS_MAX.into()));
+        // Of what stands beyond the last register its address has said so.
+        let counted_by = (to_u16(counted_at), fixed.map(to_u16));
+        let repeat = Repeat { prefix: prefix.to_owned(), step: to_u16(step), count: to_u16(most), counted_by };
+        for named in self.list.named.iter_mut().skip(first).filter(|_| 1 < most) {
+            named.repeat = Some(repeat.clone());
+        }
+        repeat.count
+    }
+}
+
+/// Has a group parts of which only the device knows how many there are?
+fn has_open_part(group: &Node) -> bool {
+    group.all("groups").iter().any(|part| {
+        let is_fixed = part.get("count").is_none_or(|count| count.whole().is_some_and(|count| 0 < count));
+        !is_fixed || has_open_part(part)
+    })
 }
 
 fn size_of(point: &Node) -> u32 {
@@ -125,7 +169,7 @@ fn point_of(point: &Node, prefix: &str, at: u32, factors: &Factors) -> Result<Na
         return Ok(named);
     }
     let bad = bad.and_then(|pattern| named.point().raw_number(pattern, true).number());
-    let mut named = Named { bad_if: bad.into_iter().collect(), ..named };
+    let mut named = Named { bad_if: bad.into_iter().map(Into::into).collect(), ..named };
     named.unit = unit_of(point.word("units").unwrap_or_default());
     if let Some(node) = point.get("sf") {
         match (node.whole(), node.text().and_then(|name| factors.get(name))) {
@@ -172,8 +216,9 @@ fn kind_of(word: &str, size: i64) -> Result<(DataType, Option<i128>), String> {
     Ok(match kind {
         Kind::Number(kind) | Kind::Enum(kind) | Kind::Bits(kind) => (kind, sunspec_marker(kind)),
         Kind::NotZero(kind) => (kind, Some(0)),
+        Kind::Address(address) => (DataType::NetworkAddress(address), None),
         Kind::Power => (DataType::I16, sunspec_marker(DataType::I16)),
         Kind::Text => (DataType::TextToNul(to_u8(2 * size)), None),
-        Kind::Wide | Kind::Pad => return Err(t!("`{word}` is not a known type", word)),
+        Kind::Pad => return Err(t!("`{word}` is not a known type", word)),
     })
 }

@@ -80,7 +80,12 @@ fn row(line: usize, cells: Vec<String>) -> Cells {
     Cells { line, cells, is_unclosed: false }
 }
 
+/// Stands for a bar of Markdown that is part of its cell, `\|`; no text has it.
+const ESCAPED_BAR: &str = "\u{1F}";
+
 fn separated(text: &str, separator: char) -> Vec<Cells> {
+    let bars = (separator == '|' && text.contains("\\|")).then(|| text.replace("\\|", ESCAPED_BAR));
+    let text = bars.as_deref().unwrap_or(text);
     let mut reader = csv::ReaderBuilder::new();
     let delimiter = u8::try_from(separator).unwrap_or(b',');
     let reader = reader.has_headers(false).flexible(true).delimiter(delimiter).trim(csv::Trim::All);
@@ -106,7 +111,7 @@ fn separated(text: &str, separator: char) -> Vec<Cells> {
 }
 
 fn one_line(cell: &str) -> String {
-    cell.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ")
+    cell.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ").replace(ESCAPED_BAR, "|")
 }
 
 /// The cells of a line of a PDF: at two blanks, else at every blank; or at what separates them in this line alone.
@@ -152,6 +157,9 @@ mod tests {
         let text = "| Address | Name |\n|---|:--|\n| 5 | Run |\n";
         let rows = rows(text, separator(text));
         assert_eq!(rows.iter().map(|row| row.cells.join("+")).collect::<Vec<_>>(), ["Address+Name", "5+Run"]);
+        let escaped = "| Address | Name | Notes |\n|---|---|---|\n| 5 | `A\\|B` | one \\| two |\n";
+        let cells = super::rows(escaped, separator(escaped)).pop().expect("it has rows").cells;
+        assert_eq!(cells, ["5", "`A|B`", "one | two"], "a bar that is part of its cell");
         assert_eq!(separator("40010 Tank 0,1 cm\n40011 Flow 0,1 l\n"), None, "a decimal comma");
     }
 }

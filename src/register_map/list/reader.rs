@@ -28,7 +28,7 @@ pub struct More {
     pub labels: Vec<(i128, String)>,
     pub bits: Vec<(i128, String)>,
     pub field: Option<(u8, u8)>,
-    pub bad: Vec<BadNumber>,
+    pub bad: Vec<(BadNumber, BadNumber)>,
     pub group: String,
     pub label: String,
     pub write_at: Option<(Table, u16)>,

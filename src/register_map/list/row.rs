@@ -5,7 +5,7 @@ use super::{
     columns::{Column, Columns, first_of, is_address, span_of},
     formula::Formula,
     reader::{More, Reader, with_unit},
-    words::{area, length_of, number_of, order_of, table_of, type_of, unit_with_factor, width_of, yes_or_no},
+    words::{area, bad_span, length_of, number_of, order_of, table_of, type_of, unit_with_factor, width_of, yes_or_no},
 };
 use crate::{
     plant::{
@@ -333,7 +333,7 @@ impl Row {
             }
             named.field = Some((low, width));
         }
-        named.bad_if = more.bad.iter().filter_map(|bad| bad.of(named.point())).collect();
+        named.bad_if = more.bad.iter().filter_map(|bad| bad_span(*bad, named.point())).collect();
         let bits = more.bits.iter().map(|(bit, label)| Some((u8::try_from(*bit).ok()?, label.clone())));
         let bits: Option<_> = bits.collect();
         named.bit_labels = bits.ok_or_else(|| t!("it has no such bit").to_owned())?;

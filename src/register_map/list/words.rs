@@ -5,6 +5,7 @@ use crate::{
         address::TABLES,
         exact::Exact,
         number::to_f32,
+        raw_number::BadSpan,
         tag::{Access, ByteOrder, DataType, Point, Poll, Table},
     },
     profile::{duration_of, is_known_unit, unit_of},
@@ -338,13 +339,18 @@ pub enum BadNumber {
 
 impl BadNumber {
     /// What it is as a raw number of a point; `None` where it can never occur.
-    pub fn of(self, point: Point) -> Option<Exact> {
+    fn of(self, point: Point) -> Option<Exact> {
         match self {
             BadNumber::Whole(number, is_pattern) => point.raw_number(number, is_pattern).number(),
             BadNumber::Float(number) if point.kind == DataType::F32 => Some(f64::from(to_f32(number)).into()),
             BadNumber::Float(number) => Some(Exact::plain(number)),
         }
     }
+}
+
+/// The raw numbers of a point from one such number to another; `None` where they can never occur.
+pub fn bad_span((first, last): (BadNumber, BadNumber), point: Point) -> Option<BadSpan> {
+    Some(BadSpan { first: first.of(point)?, last: last.of(point)? })
 }
 
 /// `30s`, `500ms`, `once`, `never`: how often a register is read.
@@ -366,8 +372,8 @@ pub fn poll_text(poll: Poll) -> String {
     }
 }
 
-/// Numbers with a blank between them.
-pub fn bad_of(cell: &str) -> Option<Vec<BadNumber>> {
+/// Numbers with a blank between them; `1001..65535` are all of these.
+pub fn bad_of(cell: &str) -> Option<Vec<(BadNumber, BadNumber)>> {
     let number = |word: &str| {
         let pattern = word.strip_prefix("0x").or_else(|| word.strip_prefix("0X"));
         if let Some(digits) = pattern {
@@ -376,7 +382,11 @@ pub fn bad_of(cell: &str) -> Option<Vec<BadNumber>> {
         let whole = word.parse().ok().map(|number| BadNumber::Whole(number, false));
         whole.or_else(|| word.parse().ok().map(BadNumber::Float))
     };
-    cell.split_whitespace().map(number).collect()
+    let span = |word: &str| {
+        let (first, last) = word.split_once("..").unwrap_or((word, word));
+        Some((number(first)?, number(last)?))
+    };
+    cell.split_whitespace().map(span).collect()
 }
 
 #[cfg(test)]

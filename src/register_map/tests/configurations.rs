@@ -182,6 +182,12 @@ parameters:
       - { name: Clock, rule: 8, registers: [0x22, 0x23, 0x24] }
       - { name: Limit, rule: 1, registers: [0x30], platform: number, code: { read: 3, write: 16 }, configurable: { max: 9 } }
       - { name: Version, rule: 7, registers: [0x31] }
+      - { name: Parts, rule: 7, registers: [0x35, 0x34], hex: }
+      - { name: Start, rule: 9, registers: [0x36] }
+      - { name: Stop, rule: 9, registers: [0x37], dec: 256 }
+      - { name: Charge, rule: 9, registers: [0x38, 0x39] }
+      - { name: Signs, rule: 9, registers: [0x3A, 0x3B], hex: , offset: 0x3030 }
+      - { name: Odd, rule: 9, registers: [0x3C], dec: 60 }
       - { name: Sum, rule: 1, sensors: [{ registers: [1] }] }
       - { name: Gap, rule: 3, registers: [0x40, 0x42] }
       - { name: Model, rule: 1, registers: [[0x50], [0x51]], scale: [1, 10] }
@@ -198,10 +204,17 @@ parameters:
         "30033 Serial string(4) ABCD x1",
         "30035 Clock clock_bytes ABCD x1",
         "40049 Limit uint16 ABCD x1 rw max9",
+        "30050 Version version(1) ABCD x1",
+        "30053 Parts version(2) CDAB x1",
+        "30055 Start time_decimal ABCD x1",
+        "30056 Stop time_bytes ABCD x1",
+        "30057 Charge time_words ABCD x1",
+        "30059 Signs string(4) ABCD x1",
     ];
     assert_eq!(named, expect);
-    assert_eq!(problems.len(), 4, "{problems:?}");
-    assert!(problems[3].contains("differs between 2 models"), "{problems:?}");
+    assert_eq!(problems.len(), 3, "{problems:?}");
+    assert!(problems[0].contains("`rule: 9` cannot be said"), "{problems:?}");
+    assert!(problems[2].contains("differs between 2 models"), "{problems:?}");
     let second = super::ListContext { variant: Some(1), ..Default::default() };
     let list = crate::register_map::read(text.as_bytes(), &second);
     assert_eq!(list.named.last().map(super::shown).as_deref(), Some("30082 Model uint16 ABCD x10"));
@@ -209,6 +222,41 @@ parameters:
         (list.named[0].group.as_str(), list.named[0].poll),
         ("Battery", Some(Poll::Every(Duration::from_secs(60))))
     );
+}
+
+#[test]
+fn solarman_numbers_outside_their_range_are_no_value() {
+    let text = "parameters:
+  - group: Settings
+    items:
+      - { name: Charge, rule: 1, registers: [10], scale: 0.1, range: { min: 0000, max: 1000 }, platform: number }
+      - { name: Float, rule: 2, registers: [11], range: { min: 38, max: 61 } }
+      - { name: Energy, rule: 3, registers: [13, 12], range: { max: 0xFFFFFFF9 } }
+      - { name: Size, rule: 2, registers: [14], magnitude: true, range: { min: 5 } }
+      - { name: Mode, rule: 1, registers: [15], range: { min: 0, max: 5 }, lookup: [{ key: 0, value: Off }] }
+      - { name: Part, rule: 1, registers: [16], mask: 0x0F, range: { min: 257 } }
+      - { name: Heat, rule: 2, registers: [17], scale: 0.1, offset: 1000, validation: { min: -40, max: 99.5, invalidate_all: } }
+      - { name: Turned, rule: 2, registers: [18], inverted: true, validation: { min: 1 } }
+      - { name: Open, rule: 1, registers: [19], range: { min: 1, max: [5, 9] } }
+";
+    let (named, problems) = read(text);
+    let expect = [
+        "40011 Charge uint16 ABCD x0.1 !1001..65535 rw min0 max100",
+        "40012 Float int16 ABCD x1 !-32768..37 !62..32767",
+        "40013 Energy uint32 ABCD x1 !4294967290..4294967295",
+        "40015 Size sm16 ABCD x1 !0..4",
+        "40016 Mode uint16 ABCD x1 0=Off !6..65535",
+        "40018 Heat int16 ABCD x0.1 -100 !-32768..599 !1996..32767",
+        "40019 Turned int16 ABCD x-1 !0..32767",
+        "40020 Open uint16 ABCD x1 !0",
+    ];
+    assert_eq!(named, expect);
+    assert_eq!(problems, ["line 9: Part: `range` cannot be said in a profile"]);
+    let list = list_of(text);
+    let written = crate::register_map::profile::written(&list, "inverter", "a file").expect("it is a profile");
+    let charge = &written.checked.plant.tags[0];
+    assert!(charge.is_bad(1_001.0.into()) && !charge.is_bad(1_000.0.into()), "{}", written.text);
+    assert!(written.text.contains("bad_if = [[1001, 65535]]"), "{}", written.text);
 }
 
 #[test]
@@ -286,7 +334,7 @@ fn a_model_of_sunspec_follows_its_sizes_and_factors() {
     ];
     assert_eq!((named, problems), (expect.map(str::to_owned).to_vec(), Vec::new()));
     let warnings = list_of(text).warnings;
-    assert!(warnings[0].contains("40070") && warnings[1].contains("it is taken once"), "{warnings:?}");
+    assert!(warnings[0].contains("40070") && warnings[1].contains("16 at most are taken"), "{warnings:?}");
 }
 
 #[test]

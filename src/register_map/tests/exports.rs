@@ -4,7 +4,6 @@ use super::list_of;
 use crate::{
     plant::{
         PlantDef,
-        exact::Exact,
         tag::{Access, Bound, DataType, TagDef},
     },
     profile::{self, Kind, Search},
@@ -116,7 +115,7 @@ fn essence(tag: &TagDef, target: Target) -> String {
         tag.offset
     );
     if target != Target::Telegraf && point.kind != DataType::Bool {
-        let bad: Vec<Exact> = tag.bad_if.clone();
+        let bad = &tag.bad_if;
         words.push_str(&format!(" {} {:?} {bad:?}", tag.unit, tag.decimals));
     }
     if target == Target::Csv {
@@ -185,7 +184,7 @@ scale = 10
 unit = "=A1"
 label = "@odd; 'label', and more"
 group = "+x"
-bad_if = [0x7FC00000, 0x7F7FFFFF, -9999]
+bad_if = [0x7FC00000, 0x7F7FFFFF, -9999, [10000, 20000]]
 poll = "once"
 [[tag]]
 name = "SET"

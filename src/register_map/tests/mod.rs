@@ -43,7 +43,10 @@ fn shown(named: &Named) -> String {
     let labels = named.enum_labels.iter().map(|(number, label)| format!("{number}={label}"));
     words.extend(labels);
     words.extend(named.bit_labels.iter().map(|(bit, label)| format!("#{bit}={label}")));
-    words.extend(named.bad_if.iter().map(|bad| format!("!{bad}")));
+    words.extend(named.bad_if.iter().map(|bad| match bad.single() {
+        Some(bad) => format!("!{bad}"),
+        None => format!("!{}..{}", bad.first, bad.last),
+    }));
     words.extend((named.access != Access::Read).then(|| named.access.word().to_owned()));
     words.extend(named.min.map(|min| format!("min{min}")));
     words.extend(named.max.map(|max| format!("max{max}")));

@@ -66,3 +66,68 @@ fn a_power_of_ten_is_followed_or_its_value_is_left_out() {
     let refused = super::super::profile::written(&list, "made_up", "a test").err();
     assert!(refused.is_some_and(|why| why.contains("power of ten")));
 }
+
+#[test]
+fn a_calculated_row_is_an_expression_over_its_registers() {
+    let text = "parameters:
+  - group: Power
+    items:
+      - { name: PV1, rule: 1, registers: [10], uom: W, validation: { max: 9000 } }
+      - { name: PV Power, rule: 1, uom: W, sensors: [{ registers: [10] }, { registers: [11] }] }
+      - { name: Losses, rule: 1, scale: 0.1, uint: enforce, sensors: [{ registers: [10] }, { operator: subtract, signed: , registers: [12] }] }
+      - { name: Ratio, rule: 1, sensors: [{ registers: [10] }, { registers: [11] }, { operator: divide, registers: [13], multiply: { registers: [14], scale: 2 } }] }
+      - { name: Turned, rule: 2, inverted: true, sensors: [{ signed: , registers: [12], scale: 0.1 }] }
+      - { name: Unlike, rule: 1, sensors: [{ signed: , registers: [10] }] }
+      - { name: Checked, rule: 1, sensors: [{ registers: [10], validation: { min: 1 } }] }
+      - { name: Chosen, rule: 1, sensors: [{ registers: [10], enabled_lookup: { a: [b] } }] }
+";
+    let list = super::list_of(text);
+    let why = |key: &str| format!("`{key}` cannot be said in a profile");
+    let expect =
+        [format!("line 10: Checked: {}", why("validation")), format!("line 11: Chosen: {}", why("enabled_lookup"))];
+    assert_eq!(list.problems, expect);
+    let written = written(&list, "sums", "a file").expect("it is a profile");
+    assert_eq!(written.problems, ["line 9: Unlike: Unlike part 1: this address has a name already"]);
+    assert_eq!((written.checked.plant.tags.len(), written.rows), (9, 5), "{}", written.text);
+    for expr in [
+        "\"PV1 + PV_Power_part_2\"",
+        "\"max(0, (PV1 * 0.1) - Losses_part_2)\"",
+        "\"(PV1 + PV_Power_part_2) / (Ratio_part_3 * Ratio_factor_3)\"",
+        "\"0 - Losses_part_2\"",
+    ] {
+        assert!(written.text.contains(&format!("expr = {expr}")), "no {expr} in {}", written.text);
+    }
+}
+
+#[test]
+fn parts_of_a_model_that_the_device_counts_are_a_repeat() {
+    let text = |count: &str| {
+        format!(
+            r#"{{ "id": 902, "group": {{ "name": "m", "points": [
+  {{ "name": "ID", "type": "uint16", "size": 1 }}, {{ "name": "L", "type": "uint16", "size": 1 }},
+  {{ "name": "N", "type": "count", "size": 1 }}, {{ "name": "V_SF", "type": "sunssf", "size": 1 }} ],
+ "groups": [{{ "name": "module", "count": {count}, "points": [{{ "name": "V", "type": "uint16", "size": 1, "sf": "V_SF" }},
+  {{ "name": "A", "type": "int16", "size": 1, "sf": "A_SF" }}, {{ "name": "A_SF", "type": "sunssf", "size": 1 }}] }}] }} }}"#
+        )
+    };
+    for (count, counted_by, first, second) in [("\"N\"", "N", 1.0, 2.0), ("0", "L", 5.0, 8.0)] {
+        let list = list_of(&text(count));
+        let written = written(&list, "model", "a file").unwrap_or_else(|why| panic!("{why}"));
+        let plant = &written.checked.plant;
+        assert_eq!((plant.tags.len(), written.rows), (4 + 16 * 3, 7), "{}", written.text);
+        let tag =
+            |short: &str| plant.tags.iter().find(|tag| tag.short == short).unwrap_or_else(|| panic!("no {short}"));
+        let last = tag("module16.A");
+        assert_eq!(last.point.address, tag("module1.A").point.address + 15 * 3);
+        assert_eq!(last.decimals, Decimals::PowerFrom(tag("module16.A_SF").id));
+        assert_eq!(tag("module2.V").decimals, Decimals::PowerFrom(tag("V_SF").id), "a factor of all of them");
+        let counted = tag(counted_by).id;
+        let has = |short: &str, number: f64| {
+            tag(short).when.as_ref().unwrap().holds(&|of| (of == counted).then_some(number.into()))
+        };
+        assert_eq!(
+            [has("module1.V", first), has("module2.V", first), has("module2.V", second)],
+            [Some(true), Some(false), Some(true)]
+        );
+    }
+}

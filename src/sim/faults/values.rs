@@ -49,7 +49,7 @@ impl Values {
             if !tag.point.table.is_bits() && tag.point.len() == 2 {
                 values.pairs.push(tag.point);
             }
-            let mark = tag.bad_if.first().and_then(|mark| codec::encode(tag.point, *mark));
+            let mark = tag.bad_if.first().and_then(|mark| codec::encode(tag.point, mark.first));
             values.marks.extend(mark.map(|words| (tag.point, words)));
         }
         values

@@ -18,7 +18,7 @@ fn counting() -> Plant {
         (tag.point.kind, tag.scale, tag.decimals) = (DataType::U64, 1.0, Decimals::Fixed(0));
         (tag.quality_from, tag.deadband) = (None, Some(0.0));
     }
-    def.tags[PV.index()].bad_if = vec![Exact::whole(u64::MAX.into())];
+    def.tags[PV.index()].bad_if = vec![Exact::whole(u64::MAX.into()).into()];
     def.tags[SV.index()].max = Some(Bound::Fixed(Exact::whole(LEAST + 1)));
     let alarm = &mut def.alarms[0];
     alarm.condition = Condition::Limit { level: crate::plant::def::Level::High, limit: LEAST as f64, deadband: 0.0 };

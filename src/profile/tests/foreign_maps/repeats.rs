@@ -73,3 +73,46 @@ fn an_error_names_the_row_of_the_repeat_once() {
         assert!(found.contains(expect), "{found}");
     }
 }
+
+#[test]
+fn a_device_says_how_many_of_a_repeat_it_has() {
+    let text = |from: &str, more: &str| {
+        meter(&format!(
+            "[[tag]]\nname = \"N\"\ntable = \"holding\"\naddress = 2000\ntype = \"uint16\"\n{more}\n\
+             [[repeat]]\ncount = 3\ncount_from = \"{from}\"\nstep = 1\n\
+             [[repeat.tag]]\nname = \"S{{n}}\"\ntable = \"holding\"\naddress = 2010\ntype = \"uint16\"\n\
+             [[repeat.tag]]\nname = \"T{{n}}\"\ntable = \"holding\"\naddress = 2020\ntype = \"uint16\"\nwhen = \"N < 9\"\n"
+        ))
+    };
+    let plant = loaded(&text("N", ""));
+    let of = |name: &str| plant.tag(plant.tag_named(name).unwrap());
+    let holds = |name: &str, count: f64| {
+        let when = of(name).when.as_ref().expect("a condition");
+        when.holds(&|tag| (tag == of("D1.N").id).then_some(count.into()))
+    };
+    assert_eq!([1.0, 2.0, 3.0].map(|count| holds("D1.S3", count)), [Some(false), Some(false), Some(true)]);
+    assert_eq!([0.0, 1.0].map(|count| holds("D1.S1", count)), [Some(false), Some(true)]);
+    assert_eq!([3.0, 9.0].map(|count| holds("D1.T3", count)), [Some(true), Some(false)], "and its own condition");
+    assert_eq!(of("D1.N").when, None);
+    for (from, more, expect) in
+        [("M", "", "M"), ("S1", "", "D1.S1 has a condition itself"), ("N", "poll = \"never\"", "D1.N is never read")]
+    {
+        let refused = errors(&text(from, more));
+        assert!(refused.contains(expect), "{refused}");
+    }
+}
+
+#[test]
+fn what_is_not_there_has_no_alarm() {
+    let text = meter(
+        "[[tag]]\nname = \"FW\"\ntable = \"holding\"\naddress = 2000\ntype = \"uint16\"\n\
+         [[tag]]\nname = \"X\"\ntable = \"holding\"\naddress = 2001\ntype = \"uint16\"\nwhen = \"FW >= 210\"\n\
+         [[alarm]]\ntag = \"X\"\nhigh = 5\ndeadband = 1\npriority = \"low\"\nmessage = \"X is high\"\n",
+    );
+    let plant = loaded(&text);
+    let alarm = plant.alarms.iter().find(|alarm| &*alarm.message == "X is high").expect("an alarm of the profile");
+    let fw = plant.tag_named("D1.FW").unwrap();
+    let enabled =
+        |version: f64| alarm.enabled_when.as_ref().unwrap().holds(&|tag| (tag == fw).then_some(version.into()));
+    assert_eq!((enabled(209.0), enabled(210.0)), (Some(false), Some(true)));
+}

@@ -105,6 +105,10 @@ fn because(
             Poll::Once | Poll::Never => Some(t!("it is read on request only").to_owned()),
         },
         Cause::OnRequest => Some(t!("it is read on request only").to_owned()),
+        Cause::NotPresent => {
+            let needs: Vec<String> = def.when.iter().flat_map(|when| when.tags()).map(words_of).collect();
+            Some(t!("the device does not have it: {words_of}", words_of = needs.join(", ")))
+        }
         Cause::NotHeard => {
             let heard = exchange.map_or(cx.snapshot.sample(def.id).at, |exchange| exchange.at);
             Some(t!("not heard for {seconds} s", seconds = crate::plant::time::elapsed(heard, cx.now).as_secs()))
@@ -162,7 +166,12 @@ fn advice(cx: &ViewContext, def: &TagDef, cause: Cause, exchange: Option<&Exchan
             Some(t!("compare it with the device: the other master of this line has not read it").to_owned())
         }
         Cause::Undefined => Some(t!("see its inputs: a division by zero, or a number that is too large").to_owned()),
-        Cause::StationOff | Cause::Reloaded | Cause::Unreadable | Cause::NotStored | Cause::NotReadBack => None,
+        Cause::StationOff
+        | Cause::Reloaded
+        | Cause::Unreadable
+        | Cause::NotStored
+        | Cause::NotReadBack
+        | Cause::NotPresent => None,
     }
 }
 

@@ -153,7 +153,8 @@ fn is_trouble(cause: Cause) -> bool {
         | Cause::Reloaded
         | Cause::NotAuthorised
         | Cause::NotStored
-        | Cause::OnRequest => false,
+        | Cause::OnRequest
+        | Cause::NotPresent => false,
     }
 }
 

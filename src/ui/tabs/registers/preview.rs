@@ -167,6 +167,9 @@ impl Registers {
         list.named = named;
         let only = |named: Named| t!("{name}: only a profile has several at one address", name = named.name);
         list.problems.extend(Vec::into_iter(others).map(only));
+        let sums =
+            list.calculated.iter().map(|sum| t!("{name}: only a profile has calculated values", name = sum.named.name));
+        list.problems.extend(sums);
         let taken = t!("names taken: {count}", count = list.named.len());
         if let Some(first) = list.named.first() {
             (self.table, self.first, self.selected) = (first.table, first.address, first.address);
