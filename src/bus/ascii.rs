@@ -2,7 +2,10 @@
 
 use std::ops::Range;
 
-use super::{frame, framing::FrameMatch};
+use super::{
+    frame::{self, Request},
+    framing::FrameMatch,
+};
 use crate::plant::{
     def::Framing,
     event::Fault,
@@ -61,7 +64,8 @@ pub fn open(frame: &[u8]) -> Result<Vec<u8>, Fault> {
 }
 
 /// What the bytes that have come over an ASCII line are.
-pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
+pub fn find_answer<'a>(message: impl Into<Request<'a>>, buffer: &[u8]) -> FrameMatch {
+    let message = message.into();
     let mut corrupt = None;
     for frame in frames(buffer) {
         let answer = match open(&buffer[frame.clone()]) {
@@ -87,7 +91,7 @@ pub fn find_answer(message: &[u8], buffer: &[u8]) -> FrameMatch {
 }
 
 /// Names what is left at the deadline.
-pub fn left_over(message: &[u8], buffer: &[u8]) -> Fault {
+pub fn left_over<'a>(message: impl Into<Request<'a>>, buffer: &[u8]) -> Fault {
     let corrupt = frames(buffer).find_map(|frame| open(&buffer[frame]).err());
     let expected = 2 * frame::expected_length(message).unwrap_or(3) + 5;
     let cut =

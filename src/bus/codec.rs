@@ -22,7 +22,7 @@ use crate::plant::{
 };
 
 /// The number that the words of a point hold; `None` for what is not a number: BCD with a digit above 9, NaN, infinity.
-/// `words` has [`Point::len`] words.
+/// `words` has [`Point::words`] words.
 #[expect(clippy::cast_possible_truncation, reason = "each kind takes the bits of its own width")]
 pub fn decode(point: Point, words: &[u16]) -> Option<Exact> {
     let bytes = to_bytes(point.order, words);
@@ -57,7 +57,7 @@ fn whole(kind: DataType, bits: u64) -> Option<i128> {
     let unsigned = i128::from(bits & mask(kind.bits()));
     let number = if kind.encoding() == Encoding::Signed { signed } else { unsigned };
     let beyond = bits.checked_shr(size).unwrap_or(0);
-    let is_filling = beyond == 0 || number < 0 && beyond == mask(to_u8(16 * u32::from(kind.registers()) - size));
+    let is_filling = beyond == 0 || number < 0 && beyond == mask(to_u8(16 * u32::from(kind.words()) - size));
     (kind.is_half() || is_filling).then_some(number)
 }
 
@@ -107,7 +107,7 @@ pub fn encode_text(point: Point, text: &str) -> Option<Vec<u16>> {
     if let DataType::Chars(_) = point.kind {
         bytes = bytes.iter().flat_map(|byte| [0, *byte]).collect();
     }
-    bytes.resize(usize::from(point.kind.registers()) * 2, 0);
+    bytes.resize(usize::from(point.kind.words()) * 2, 0);
     fits.then(|| from_bytes(point.order, &bytes))
 }
 
@@ -131,21 +131,21 @@ pub fn encode(point: Point, value: impl Into<Exact>) -> Option<Vec<u16>> {
         }
         Encoding::Mod10k => return whole().map(|_| to_mod10k(point, exact)),
         Encoding::Bcd => to_bcd(whole()?),
-        Encoding::Float if point.kind.registers() == 1 => half::bits(value)?.into(),
-        Encoding::Float if point.kind.registers() == 2 => {
+        Encoding::Float if point.kind.words() == 1 => half::bits(value)?.into(),
+        Encoding::Float if point.kind.words() == 2 => {
             u64::from(Some(to_f32(value)).filter(|value| value.is_finite())?.to_bits())
         }
         Encoding::Float => value.to_bits(),
         Encoding::Text => return None,
     };
-    let count = usize::from(point.kind.registers()) * 2;
+    let count = usize::from(point.kind.words()) * 2;
     Some(from_bytes(point.order, &bits.to_be_bytes()[8 - count..]))
 }
 
 /// The masks of a mask write (function 22: result = (word AND and) OR (or AND NOT and)) that sets a field of bits inside
 /// a word and leaves the other bits to the device (V1.1b3, 6.16).
 pub fn field_masks(point: Point, value: impl Into<Exact>) -> Option<(u16, u16)> {
-    let (low, width) = point.part().filter(|_| point.kind.registers() == 1)?;
+    let (low, width) = point.part().filter(|_| point.kind.words() == 1)?;
     let field = mask(width);
     let (least, most) = point.raw_range()?;
     let value = value.into().as_whole().filter(|value| (least..=most).contains(value))?;
@@ -162,7 +162,7 @@ pub fn modified(point: Point, held: &[u16], value: impl Into<Exact>) -> Option<V
     let bits = bytes.iter().fold(0u64, |bits, byte| (bits << 8) | u64::from(*byte));
     let own = mask(width) << low;
     let set = bits & !own | (Exact::whole(value).bits() << low) & own;
-    (bytes.len() == 2 * usize::from(point.kind.registers()))
+    (bytes.len() == 2 * usize::from(point.kind.words()))
         .then(|| from_bytes(point.order, &set.to_be_bytes()[8 - bytes.len()..]))
 }
 
@@ -174,7 +174,7 @@ fn mask(width: u8) -> u64 {
 fn to_mod10k(point: Point, number: Exact) -> Vec<u16> {
     let number = number.as_whole().unwrap_or(0);
     let part = |place: u16| (number / 10_000_i128.pow(place.into())) % 10_000;
-    let words: Vec<u16> = (0..point.kind.registers()).rev().map(|place| to_i16(part(place)).cast_unsigned()).collect();
+    let words: Vec<u16> = (0..point.kind.words()).rev().map(|place| to_i16(part(place)).cast_unsigned()).collect();
     in_order(point.order, &words)
 }
 

@@ -11,7 +11,9 @@ use super::{
 };
 use crate::plant::{def::Framing, event::Fault, number::to_u16};
 
-pub use answer::{ResponseSignature, answers, begins_answer, check_answer, expected_length, response_signature};
+pub use answer::{
+    Request, ResponseSignature, answers, begins_answer, check_answer, expected_length, response_signature,
+};
 pub use mbap::{Mbap, ShortException, is_out_of_sync, mbap, short_exception};
 
 /// Longest message: unit and 253 bytes of PDU.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::{
     ascii,
-    frame::{self, Mbap, ShortException},
+    frame::{self, Mbap, Request, ShortException},
     pdu::{self, Length},
 };
 use crate::plant::{
@@ -135,7 +135,8 @@ fn ended_by_silence(request: &[u8], bytes: &[u8]) -> Option<Range<usize>> {
 }
 
 /// Looks for the answer to a message on a line without transaction ids.
-pub fn find_answer(framing: Framing, message: &[u8], buffer: &[u8]) -> FrameMatch {
+pub fn find_answer<'a>(framing: Framing, message: impl Into<Request<'a>>, buffer: &[u8]) -> FrameMatch {
+    let message = message.into();
     match framing {
         Framing::Ascii => ascii::find_answer(message, buffer),
         Framing::Rtu | Framing::Mbap => in_bytes(message, buffer),
@@ -148,25 +149,25 @@ fn beginnings<'a>(message: &[u8], buffer: &'a [u8]) -> impl Iterator<Item = &'a 
 }
 
 /// What is wrong with bytes that begin as the answer and end with a good CRC, but not where they say.
-fn misfit(message: &[u8], buffer: &[u8]) -> Option<Fault> {
+fn misfit(message: Request, buffer: &[u8]) -> Option<Fault> {
     let checked = |rest| frame::check_answer(Framing::Rtu, message, frame::without_crc(rest).ok()?).err();
-    beginnings(message, buffer).find_map(checked)
+    beginnings(message.message, buffer).find_map(checked)
 }
 
 /// Looks for a frame with a good CRC at the beginning, then behind noise.
-fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
+fn in_bytes(message: Request, buffer: &[u8]) -> FrameMatch {
     for start in 0..buffer.len() {
         let Some(answer) = good_frame(message, &buffer[start..]) else { continue };
         let end = start + answer.len() + 2;
         match frame::check_answer(Framing::Rtu, message, answer) {
             Ok(()) | Err(Fault::Exception(_)) => return FrameMatch::Answer(start..end),
             // Inside what may be the answer a chance check is no frame: it would cut the answer in two.
-            Err(_) if (0..start).any(|earlier| frame::begins_answer(message, &buffer[earlier..])) => {}
+            Err(_) if (0..start).any(|earlier| frame::begins_answer(message.message, &buffer[earlier..])) => {}
             Err(fault) => return FrameMatch::Foreign(end, fault),
         }
     }
     // No good frame yet. Is there one of the right beginning and full length, but corrupt?
-    let mut beginnings = beginnings(message, buffer).peekable();
+    let mut beginnings = beginnings(message.message, buffer).peekable();
     if beginnings.peek().is_none() {
         return FrameMatch::Nothing;
     }
@@ -183,10 +184,10 @@ fn in_bytes(message: &[u8], buffer: &[u8]) -> FrameMatch {
 }
 
 /// The message of the frame that bytes begin with, if its check fits: as long as its own bytes or the request say.
-fn good_frame<'a>(request: &[u8], bytes: &'a [u8]) -> Option<&'a [u8]> {
+fn good_frame<'a>(request: Request, bytes: &'a [u8]) -> Option<&'a [u8]> {
     let good = |frame: &'a [u8]| frame::without_crc(frame).ok();
     // A loopback echoes data of any length, and does not say how much.
-    let echo = || match (bytes, request) {
+    let echo = || match (bytes, request.message) {
         ([unit, 0x08, ..], [asked, 0x08, ..]) if unit == asked => bytes.get(..frame::expected_length(request)? + 2),
         _ => None,
     };
@@ -199,12 +200,13 @@ fn full_frame(bytes: &[u8]) -> Option<&[u8]> {
 }
 
 /// Length of the frame that answers a message.
-fn expected_length(framing: Framing, message: &[u8]) -> usize {
+fn expected_length(framing: Framing, message: Request) -> usize {
     frame::wrapped_length(framing, frame::expected_length(message).unwrap_or(3))
 }
 
 /// Names what is left at the deadline.
-pub fn left_over(framing: Framing, message: &[u8], buffer: &[u8]) -> Fault {
+pub fn left_over<'a>(framing: Framing, message: impl Into<Request<'a>>, buffer: &[u8]) -> Fault {
+    let message = message.into();
     if framing == Framing::Ascii {
         return ascii::left_over(message, buffer);
     }

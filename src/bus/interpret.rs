@@ -10,7 +10,7 @@ use crate::plant::{
 /// Words as a number of a type; `None` where there are too few of them or they hold none.
 pub fn number(kind: DataType, order: ByteOrder, words: &[u16]) -> Option<Exact> {
     let point = Point { table: Table::Holding, address: 0, kind, order, field: None };
-    codec::decode(point, words.get(..usize::from(kind.registers()))?)
+    codec::decode(point, words.get(..usize::from(kind.words()))?)
 }
 
 /// Words as text: `·` for what cannot be printed.

@@ -19,9 +19,10 @@ pub use unit::Proof;
 use unit::Unit;
 
 use super::{
-    frame::{ResponseSignature, response_signature},
+    frame::{Request, ResponseSignature, response_signature},
     pdu::Pdu,
     plan::Block,
+    wide_addresses::WideAddresses,
 };
 use crate::plant::number::{to_u8, to_u32};
 
@@ -102,7 +103,8 @@ impl OutstandingReplies {
     pub fn probe<'a>(&self, blocks: impl Iterator<Item = &'a Block>) -> Option<Vec<u8>> {
         blocks
             .flat_map(probes)
-            .find(|request| response_signature(request).is_some_and(|signature| !self.is_ambiguous(signature)))
+            .find(|probe| signature_of(probe).is_some_and(|signature| !self.is_ambiguous(signature)))
+            .map(|probe| probe.request())
     }
 }
 
@@ -112,13 +114,18 @@ pub fn loopback(unit: u8, number: u16) -> Vec<u8> {
     Pdu::loopback(number).to(unit)
 }
 
+/// The signature of the answer to a block.
+fn signature_of(block: &Block) -> Option<ResponseSignature> {
+    response_signature(Request { message: &block.request(), address_words: block.address_words })
+}
+
 /// Reads of the first part of a block, the shortest first: each has a signature of its own.
-fn probes(block: &Block) -> impl Iterator<Item = Vec<u8>> {
+fn probes(block: &Block) -> impl Iterator<Item = Block> {
     let first = block.alignment.max(1);
     let step = if block.table.is_bits() { first.max(8) } else { first };
     let counts = (first..block.count).step_by(usize::from(step)).chain([block.count]);
     let block = block.clone();
-    counts.map(move |count| Block { count, ..block.clone() }.request())
+    counts.map(move |count| Block { count, ..block.clone() })
 }
 
 /// Outstanding replies of all units of a line, and how late they have ever been. It outlives an opening: what was asked before a port
@@ -132,12 +139,30 @@ pub struct LineReplies {
     loopbacks: u16,
     /// Frames carry transaction ids: no answer is mistaken for another, and nothing is ever outstanding.
     has_ids: bool,
+    /// What the requests do not say of their answers.
+    wide: WideAddresses,
 }
 
 impl LineReplies {
     /// Nothing is outstanding. The numbers of loopbacks begin behind `seed`, which differs from process to process.
     pub fn new(timeout: Duration, seed: u16) -> LineReplies {
-        LineReplies { units: vec![Unit::default(); 256], timeout, loopbacks: seed, has_ids: false }
+        LineReplies {
+            units: vec![Unit::default(); 256],
+            timeout,
+            loopbacks: seed,
+            has_ids: false,
+            wide: WideAddresses::default(),
+        }
+    }
+
+    /// These addresses hold 32 bits each from now on.
+    pub fn set_wide(&mut self, wide: WideAddresses) {
+        self.wide = wide;
+    }
+
+    /// A request message with how its answer counts.
+    pub fn request<'a>(&self, message: &'a [u8]) -> Request<'a> {
+        self.wide.request(message)
     }
 
     /// These blocks are asked for from now on; a unit that was asked for none before is unproven.
@@ -146,11 +171,7 @@ impl LineReplies {
             let outstanding = &mut known.outstanding;
             let first = outstanding.usual.is_empty();
             outstanding.usual.clear();
-            for signature in blocks
-                .iter()
-                .filter(|block| block.unit == unit)
-                .filter_map(|block| response_signature(&block.request()))
-            {
+            for signature in blocks.iter().filter(|block| block.unit == unit).filter_map(signature_of) {
                 if !outstanding.usual.contains(&signature) && outstanding.usual.len() < USUAL_MAX {
                     outstanding.usual.push(signature);
                 }
@@ -165,6 +186,7 @@ impl LineReplies {
         let Some(unit) = request.first().map(|unit| usize::from(*unit)) else { return };
         let unsettled = self.is_unsettled(to_u8(unit), now);
         let timeout = self.timeout;
+        let signature = response_signature(self.request(request));
         let unit = &mut self.units[unit];
         if proof && !unsettled {
             unit.prove(unit.quarantine(timeout), now);
@@ -172,7 +194,7 @@ impl LineReplies {
             unit.settles_from = Some(now);
         }
         answer.clone_into(&mut unit.answer);
-        let is_usual = response_signature(request).is_some_and(|signature| unit.outstanding.usual.contains(&signature));
+        let is_usual = signature.is_some_and(|signature| unit.outstanding.usual.contains(&signature));
         if is_usual && std::mem::take(&mut unit.repeats) {
             unit.outstanding.unproven = true;
             unit.unsolicited_at = Some(now);
@@ -260,7 +282,7 @@ impl LineReplies {
     pub fn is_ambiguous(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first() else { return false };
         let outstanding = self.of(*unit);
-        match (response_signature(message), message.get(1)) {
+        match (response_signature(self.request(message)), message.get(1)) {
             (Some(signature), _) => outstanding.is_ambiguous(signature),
             (None, Some(function)) => outstanding.unproven || outstanding.functions.contains(function),
             (None, None) => false,
@@ -276,8 +298,8 @@ impl LineReplies {
 
     /// A request was not answered, or only by something corrupt.
     pub fn failed(&mut self, message: &[u8], now: Duration) {
+        let signature = response_signature(self.request(message));
         let Some(unit) = message.first().map(|unit| &mut self.units[usize::from(*unit)]) else { return };
-        let signature = response_signature(message);
         match (signature, message.get(1)) {
             (Some(signature), _) => unit.outstanding.add(signature),
             (None, Some(function)) => unit.outstanding.add_function(*function),
@@ -320,7 +342,8 @@ impl LineReplies {
     /// Can only time, or the outstanding reply, make sure that the answer to this message is no older one?
     pub fn must_wait(&self, message: &[u8]) -> bool {
         let Some(unit) = message.first().map(|unit| &self.units[usize::from(*unit)]) else { return false };
-        unit.reorders && response_signature(message).is_some_and(|signature| unit.outstanding.contains(signature))
+        unit.reorders
+            && response_signature(self.request(message)).is_some_and(|signature| unit.outstanding.contains(signature))
     }
 
     /// The next loopback of a unit, with a number of its own.

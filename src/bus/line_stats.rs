@@ -127,7 +127,7 @@ impl LineStats {
 
     /// A good read was on the wire for so long, from the first byte of the request to the last of the answer.
     pub fn took(&mut self, index: Option<usize>, block: &Block, wire: Wire, on_wire: Duration) {
-        let frames = wire.frames(block.table, u32::from(block.count));
+        let frames = wire.frames(block.table, block.words());
         if let Some((_, seen)) = self.seen.iter_mut().find(|(id, _)| *id == block.device) {
             seen.add(on_wire.saturating_sub(frames));
         }

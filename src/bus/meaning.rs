@@ -22,6 +22,8 @@ pub(super) struct Span {
     count: u16,
     /// What is written there, or was read; a bit is 0 or 1.
     words: Option<Vec<u16>>,
+    /// Words that each address holds.
+    address_words: u16,
     pub writes: bool,
 }
 
@@ -39,8 +41,10 @@ impl Span {
 
     /// The words of a point, if all of them are there.
     pub fn words_of(&self, point: Point) -> Option<&[u16]> {
-        let from = usize::from(point.address.checked_sub(self.address)?);
-        self.words.as_ref()?.get(from..from + usize::from(point.len()))
+        let each = point.kind.address_words();
+        let from = usize::from(point.address.checked_sub(self.address)?) * usize::from(each);
+        let words = self.words.as_ref().filter(|_| each == self.address_words)?;
+        words.get(from..from + usize::from(point.words()))
     }
 }
 
@@ -88,11 +92,14 @@ pub(super) fn spans(message: &[u8], answer: Option<&[u8]>) -> Option<Vec<Span>> 
     let word = |at: usize| Some(u16::from_be_bytes([*message.get(at)?, *message.get(at + 1)?]));
     let read = |table: Table, at: usize| -> Option<Span> {
         let (address, count) = (word(at)?, word(at + 2)?);
-        let words = answer.and_then(|answer| unpacked(table, answer.get(3..)?, count));
-        Some(Span { table, address, count, words, writes: false })
+        let bytes = answer.and_then(|answer| answer.get(3..));
+        let address_words = bytes.map_or(1, |bytes| address_words(table, bytes, count));
+        let words = bytes.and_then(|bytes| unpacked(table, bytes, count * address_words));
+        Some(Span { table, address, count, words, address_words, writes: false })
     };
     let write = |table: Table, at: usize, words: Option<Vec<u16>>, count: u16| -> Option<Span> {
-        Some(Span { table, address: word(at)?, count, words, writes: true })
+        let address_words = if words.as_ref().is_some_and(|words| usize::from(count) < words.len()) { 2 } else { 1 };
+        Some(Span { table, address: word(at)?, count, words, address_words, writes: true })
     };
     Some(match message.get(1)? {
         0x01 => vec![read(Table::Coil, 2)?],
@@ -102,7 +109,11 @@ pub(super) fn spans(message: &[u8], answer: Option<&[u8]>) -> Option<Vec<Span>> 
         0x05 => vec![write(Table::Coil, 2, Some(vec![u16::from(word(4)? == 0xFF00)]), 1)?],
         0x06 => vec![write(Table::Holding, 2, Some(vec![word(4)?]), 1)?],
         0x0F => vec![write(Table::Coil, 2, unpacked(Table::Coil, message.get(7..)?, word(4)?), word(4)?)?],
-        0x10 => vec![write(Table::Holding, 2, unpacked(Table::Holding, message.get(7..)?, word(4)?), word(4)?)?],
+        0x10 => {
+            let (bytes, count) = (message.get(7..)?, word(4)?);
+            let words = unpacked(Table::Holding, bytes, count * address_words(Table::Holding, bytes, count));
+            vec![write(Table::Holding, 2, words, count)?]
+        }
         // What comes of a mask hangs on what the register holds by then.
         0x16 => vec![write(Table::Holding, 2, None, 1)?],
         0x17 => {
@@ -111,6 +122,11 @@ pub(super) fn spans(message: &[u8], answer: Option<&[u8]>) -> Option<Vec<Span>> 
         }
         _ => Vec::new(),
     })
+}
+
+/// Words that each address holds: two where four bytes came for each.
+fn address_words(table: Table, bytes: &[u8], count: u16) -> u16 {
+    if !table.is_bits() && (1..=62).contains(&count) && bytes.len() == 4 * usize::from(count) { 2 } else { 1 }
 }
 
 /// The words of registers, or the bits of coils; `None` if there are fewer.

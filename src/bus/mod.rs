@@ -27,6 +27,7 @@ pub(crate) mod pdu;
 pub mod ascii;
 pub mod frame;
 pub mod framing;
+pub mod wide_addresses;
 mod frame_boundaries;
 pub mod names;
 pub mod request_lint;

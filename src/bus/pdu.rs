@@ -240,15 +240,25 @@ fn measure(message: &[u8], items: &[Item]) -> Option<usize> {
 /// What a response to a read of one table holds, both as PDUs: the table, the first address and a word each; bits are 0 or 1.
 /// `None` for any other exchange, and for a response of a wrong length.
 pub fn values_read(request: &[u8], response: &[u8]) -> Option<(Table, u16, Vec<u16>)> {
+    words_read(request, response, 1)
+}
+
+/// The same where each register address holds so many words.
+pub fn words_read(request: &[u8], response: &[u8], address_words: u16) -> Option<(Table, u16, Vec<u16>)> {
     let [code, a, b, c, d] = *request else { return None };
     let (address, count) = (u16::from_be_bytes([a, b]), usize::from(u16::from_be_bytes([c, d])));
+    let words_expected = count * usize::from(address_words);
     let table = function(code).filter(|_| response.first() == Some(&code))?.table;
     let values = match Response::try_from(Bytes::copy_from_slice(response)).ok()? {
         // The last byte is filled up.
         Response::ReadCoils(bits) | Response::ReadDiscreteInputs(bits) if bits.len() == count.next_multiple_of(8) => {
             bits.into_iter().take(count).map(u16::from).collect()
         }
-        Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words) if words.len() == count => words,
+        Response::ReadHoldingRegisters(words) | Response::ReadInputRegisters(words)
+            if words.len() == words_expected =>
+        {
+            words
+        }
         _ => return None,
     };
     Some((table, address, values))

@@ -31,7 +31,7 @@ use std::{sync::Arc, time::Duration};
 use super::pdu::Pdu;
 use crate::plant::{
     PlantDef,
-    def::{DeviceDef, DeviceId, LineId, TagId},
+    def::{DeviceDef, DeviceId, LineId, READ_REGISTERS_MAX, TagId},
     number::to_u16,
     tag::{Access, Point, Poll, PollClass, Table, TagDef},
 };
@@ -60,12 +60,19 @@ pub struct Block {
     pub class: PollClass,
     /// Address and count are multiples of this (registers only).
     pub alignment: u16,
+    /// Words that each register address holds.
+    pub address_words: u16,
 }
 
 impl Block {
     /// The request message: unit, function, address, count.
     pub fn request(&self) -> Vec<u8> {
         Pdu::read(self.table, self.address, self.count).to(self.unit)
+    }
+
+    /// Words of registers, or bits, that its answer has.
+    pub fn words(&self) -> u32 {
+        u32::from(self.count) * u32::from(self.address_words)
     }
 
     /// First address, and the one behind the last.
@@ -103,8 +110,9 @@ fn blocks_of(def: &PlantDef, device: &DeviceDef, unreadable: &UnreadableRanges, 
     let (refused, mut tags): (Vec<&TagDef>, Vec<&TagDef>) =
         readable(def, device, unpolled).partition(|tag| is_refused(device, tag, unreadable));
     tags.sort_by_key(|tag| (tag.poll, tag.point.table, tag.point.address, tag.point.len(), tag.id));
+    let alike = |tag: &TagDef| (tag.poll, tag.point.table, tag.point.kind.address_words());
     let wire = Wire::new(def.line(device.line), device);
-    let groups = tags.chunk_by(|a, b| (a.poll, a.point.table) == (b.poll, b.point.table));
+    let groups = tags.chunk_by(|a, b| alike(a) == alike(b));
     let cut = |group| factor::join(cheapest::cut(group, device, wire, unreadable), device, unreadable);
     let runs = groups.flat_map(cut);
     runs.map(|run| together(device, &run)).chain(refused.iter().map(|tag| asked_again(device, tag))).collect()
@@ -157,6 +165,7 @@ fn together(device: &DeviceDef, tags: &[&TagDef]) -> Block {
         poll: first.poll,
         class: tags.iter().map(|tag| tag.class).min().unwrap_or(first.class),
         alignment: device.limits.step(extent.table),
+        address_words: extent.address_words,
     }
 }
 
@@ -176,22 +185,35 @@ struct Extent {
     table: Table,
     start: u32,
     end: u32,
+    address_words: u16,
 }
 
 impl Extent {
     fn new(first: Point, end: u32, device: &DeviceDef) -> Extent {
         let (table, start) = (first.table, u32::from(first.address));
         let step = u32::from(device.limits.step(table));
-        Extent { table, start: start - start % step, end: end.next_multiple_of(step).min(0x1_0000) }
+        let address_words = first.kind.address_words();
+        Extent { table, start: start - start % step, end: end.next_multiple_of(step).min(0x1_0000), address_words }
     }
 
     fn count(self) -> u32 {
         self.end - self.start
     }
 
+    /// Words of registers, or bits, that its answer has.
+    fn words(self) -> u32 {
+        self.count() * u32::from(self.address_words)
+    }
+
+    /// Within the limits of one request.
+    fn fits(self, device: &DeviceDef, unreadable: &UnreadableRanges) -> bool {
+        // An answer holds no more words for counting others as one.
+        let is_short = self.address_words == 1 || self.words() <= READ_REGISTERS_MAX.into();
+        is_short && self.count() <= most(device, self.table, unreadable)
+    }
+
     /// Within the limits of one request, and free of unreadable registers.
     fn allowed(self, device: &DeviceDef, unreadable: &UnreadableRanges) -> bool {
-        self.count() <= most(device, self.table, unreadable)
-            && !unreadable.touch(device.unit, self.table, self.start, self.end)
+        self.fits(device, unreadable) && !unreadable.touch(device.unit, self.table, self.start, self.end)
     }
 }

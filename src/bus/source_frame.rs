@@ -42,7 +42,7 @@ pub fn find(point: Point, exchange: &Exchange) -> Option<TagBytes> {
     // Unit, function and byte count come first.
     let (first, bytes) = match point.table.is_bits() {
         true => (3 + offset / 8, 1),
-        false => (3 + 2 * offset, 2 * usize::from(point.len())),
+        false => (3 + 2 * offset * usize::from(point.kind.address_words()), 2 * usize::from(point.words())),
     };
     let own = answer.get(first..first + bytes)?;
     let words: Vec<u16> = match point.table.is_bits() {
@@ -159,6 +159,15 @@ mod tests {
         };
         check(point(Table::Holding, 1_000, DataType::U16), &refused);
         check(point(Table::Holding, 1_000, DataType::U16), &Exchange { answer: [].into(), ..read });
+    }
+
+    #[test]
+    fn an_address_of_32_bits_is_found_by_its_own_count() {
+        let came = [1, 3, 8, 0, 0, 0, 7, 0x43, 0x66, 0x33, 0x33];
+        let exchange = exchange(Framing::Rtu, &[1, 3, 0x1B, 0x59, 0, 2], &came);
+        let found = find(point(Table::Holding, 7_002, DataType::EnronF32), &exchange).expect("it is there");
+        assert_eq!((found.range, found.raw), (7..11, Some(f64::from(230.2f32).into())));
+        assert_eq!(find(point(Table::Holding, 7_003, DataType::EnronF32), &exchange), None);
     }
 
     #[test]

@@ -65,6 +65,12 @@ pub enum DataType {
     Version(u8),
     /// An address in a network, shown as text.
     NetworkAddress(NetworkAddress),
+    /// 32 bits in one address, as Enron and Daniel count: two's complement.
+    EnronI32,
+    /// 32 bits in one address.
+    EnronU32,
+    /// IEEE 754 single in one address.
+    EnronF32,
 }
 
 keyword_enum! {
@@ -162,7 +168,7 @@ pub enum Encoding {
 
 impl DataType {
     /// Every type that holds a number.
-    pub const NUMBERS: [DataType; 26] = [
+    pub const NUMBERS: [DataType; 29] = [
         DataType::I16,
         DataType::U16,
         DataType::I32,
@@ -189,13 +195,16 @@ impl DataType {
         DataType::SignedMod10k(2),
         DataType::SignedMod10k(3),
         DataType::SignedMod10k(4),
+        DataType::EnronI32,
+        DataType::EnronU32,
+        DataType::EnronF32,
     ];
     /// Longest text, bytes: what one read of 125 registers holds.
     pub const TEXT_MAX: u8 = 250;
     /// Most registers of one character, or one version, each: what one read holds.
     pub const CHARS_MAX: u8 = 125;
 
-    /// Name in profiles, registers, encoding.
+    /// Name in profiles, words of 16 bits, encoding.
     fn row(self) -> (&'static str, u16, Encoding) {
         match self {
             DataType::Bool => ("bool", 1, Encoding::Bit),
@@ -229,6 +238,9 @@ impl DataType {
             }
             DataType::Version(registers) => ("version", registers.into(), Encoding::Text),
             DataType::NetworkAddress(address) => (address.word(), address.registers(), Encoding::Text),
+            DataType::EnronI32 => ("enron_int32", 2, Encoding::Signed),
+            DataType::EnronU32 => ("enron_uint32", 2, Encoding::Unsigned),
+            DataType::EnronF32 => ("enron_float32", 2, Encoding::Float),
         }
     }
 
@@ -237,16 +249,26 @@ impl DataType {
         self.row().0
     }
 
-    /// Registers it takes.
+    /// Addresses it takes.
     pub fn registers(self) -> u16 {
+        self.words() / self.address_words()
+    }
+
+    /// Words of 16 bits that it has on the wire.
+    pub fn words(self) -> u16 {
         self.row().1
+    }
+
+    /// Words that each of its addresses holds: two where a device has 32 bits in one.
+    pub fn address_words(self) -> u16 {
+        if let DataType::EnronI32 | DataType::EnronU32 | DataType::EnronF32 = self { 2 } else { 1 }
     }
 
     /// Bits of the value: those of its registers, or fewer.
     pub fn bits(self) -> u8 {
         match self {
             DataType::I24 | DataType::U24 => 24,
-            kind => to_u8(if kind.is_half() { 8 } else { 16 * kind.registers() }),
+            kind => to_u8(if kind.is_half() { 8 } else { 16 * kind.words() }),
         }
     }
 

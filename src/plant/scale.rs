@@ -28,7 +28,7 @@ pub fn to_raw(tag: &TagDef, value: impl Into<Exact>, decimals: i8) -> Option<Exa
     let raw = match tag.point.kind.encoding() {
         Encoding::Float => {
             let held = as_stored(tag, unscaled(value, tag.scale, tag.offset, decimals));
-            let max = match tag.point.kind.registers() {
+            let max = match tag.point.kind.words() {
                 1 => half::MAX,
                 2 => f64::from(f32::MAX),
                 _ => f64::MAX,
@@ -90,7 +90,7 @@ pub fn is_sent_as(tag: &TagDef, value: Exact, other: Exact, decimals: i8) -> boo
 pub fn same_raw(tag: &TagDef, one: Exact, other: Exact) -> bool {
     match tag.point.kind.encoding() {
         // What was lost in scaling forth and back is lost in the value, which an offset makes much larger than the raw number.
-        Encoding::Float if tag.point.kind.registers() == 4 => {
+        Encoding::Float if tag.point.kind.words() == 4 => {
             alike(one.near(), other.near()) || alike(to_value(tag, one, 0).near(), to_value(tag, other, 0).near())
         }
         Encoding::Float => as_stored(tag, one.near()) == as_stored(tag, other.near()),
@@ -104,7 +104,7 @@ pub fn same_raw(tag: &TagDef, one: Exact, other: Exact) -> bool {
 
 /// A float in the precision of its type.
 fn as_stored(tag: &TagDef, exact: f64) -> f64 {
-    match tag.point.kind.registers() {
+    match tag.point.kind.words() {
         1 => half::rounded(exact),
         2 => f64::from(to_f32(exact)),
         _ => exact,

@@ -227,7 +227,7 @@ impl TagDef {
     /// The function code that it is written with: the profile's, else 5 or 6 for one bit or word, 16 for more.
     pub fn write_function(&self) -> Option<u8> {
         let point = self.write_point();
-        let usual = match (point.table.is_bits(), point.len()) {
+        let usual = match (point.table.is_bits(), point.words()) {
             (true, _) => 5,
             (false, 1) => 6,
             (false, _) => 16,
@@ -278,6 +278,10 @@ impl Point {
     /// Registers (or bits, for the bit tables) that it takes.
     pub fn len(self) -> u16 {
         if self.table.is_bits() { 1 } else { self.kind.registers() }
+    }
+    /// Words of 16 bits that it has on the wire; one for a bit.
+    pub fn words(self) -> u16 {
+        if self.table.is_bits() { 1 } else { self.kind.words() }
     }
     /// The bits of its register that are its own, lowest and number; `None` where all are.
     pub fn part(self) -> Option<(u8, u8)> {

@@ -78,7 +78,7 @@ fn bits_of(of: &TagDef) -> u16 {
     match of.point.field {
         _ if !is_raw || !is_binary => 0,
         Some((_, bits)) => u16::from(bits),
-        None => of.point.len() * 16,
+        None => of.point.words() * 16,
     }
 }
 

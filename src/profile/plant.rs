@@ -13,6 +13,7 @@ use super::{
     batch, calculated,
     condition::AlarmTable,
     device, device_alarms,
+    device_line::check_lines,
     diagnostic::{Errors, Problems},
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
@@ -30,7 +31,7 @@ use crate::plant::{
     number::to_u16,
     poll_class,
     record::hex,
-    tag::{Access, PollClass, TagDef},
+    tag::{PollClass, TagDef},
 };
 
 /// A text and the name the user knows it by.
@@ -197,7 +198,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     let exprs = calculated::Exprs::of(&defined);
     let written = defined.iter().map(|defined| defined.in_sets).collect::<Vec<_>>();
     let mut tags = device::link(defined, &names, problems);
-    check_broadcasts(&devices, &known, lines, &tags, problems);
+    check_lines(&devices, known.iter().map(|known| known.table), lines, &tags, problems);
     let (mut stated, mut alarms) = (Vec::new(), Vec::new());
     for (def, device) in devices.iter_mut().zip(&known) {
         let scope = Scope { names: &names, tags: &tags, device: device.name };
@@ -220,26 +221,6 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     stated.into_iter().for_each(|(tag, value)| tags[tag.index()].stated = Some(value));
     sets::mark(&devices, &mut tags, &written, problems);
     Some(Devices { devices, tags, names, classes, exprs, alarms })
-}
-
-/// Unit 0 of a serial line is a broadcast: it can be written, and no unit answers a read.
-fn check_broadcasts(
-    devices: &[DeviceDef],
-    known: &[ResolvedDevice],
-    lines: &[LineDef],
-    tags: &[TagDef],
-    problems: &mut Problems,
-) {
-    for (device, known) in devices.iter().zip(known) {
-        let line = lines.iter().find(|line| line.id == device.line);
-        let to_all = line.is_some_and(|line| line.transport.framing().is_broadcast(device.unit));
-        let readable = tags.iter().find(|tag| tag.device == device.id && tag.access != Access::Write);
-        if let (true, Some(unit), Some(tag)) = (to_all, known.table.unit, readable) {
-            problems
-                .add(unit.at, format!("unit 0 is a broadcast, which no unit answers: {} can never be read", tag.name))
-                .label("expected 1 to 247, or a profile whose tags all have access = \"w\"");
-        }
-    }
 }
 
 fn known_devices<'a>(

@@ -19,6 +19,10 @@ pub(super) fn probes(table: &SignatureTable, scope: &Scope, problems: &mut Probl
     for At { value: probe, at } in &table.probes {
         let Some(tag) = probe.tag.as_ref().and_then(|name| scope.tag(name, problems)) else { continue };
         check_number(*at, tag, problems);
+        if tag.point.kind.address_words() != 1 {
+            let problem = problems.add(*at, format!("{} is no register of 16 bits", tag.name));
+            problem.label("a device is recognised before it is known how it counts");
+        }
         let bits = probe.bits.as_ref().and_then(|name| scope.tag(name, problems));
         if let Some(bit) = bits.filter(|bit| !bit.point.table.is_bits() || tag.point.len() != 1) {
             problems.add(*at, format!("{} and {} are no word and bit", tag.name, bit.name)).label("bits");

@@ -95,11 +95,11 @@ fn odd_value(tag: &TagDef, simulator: &Simulator) -> Option<f64> {
 fn answer(def: &PlantDef, block: &Block, simulator: &mut Simulator) -> Option<Event> {
     let request = block.request();
     let response = simulator.respond(def.device(block.device).line, block.unit, &request[1..])?;
-    let (.., words) = pdu::values_read(&request[1..], &response)?;
+    let (.., words) = pdu::words_read(&request[1..], &response, block.address_words)?;
     let own = |tag: TagId| {
         let point = def.tag(tag).point;
-        let start = usize::from(point.address - block.address);
-        (point, &words[start..start + usize::from(point.len())])
+        let start = usize::from(point.address - block.address) * usize::from(block.address_words);
+        (point, &words[start..start + usize::from(point.words())])
     };
     let number = |tag: &TagId| {
         let (point, words) = own(*tag);

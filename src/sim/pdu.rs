@@ -9,7 +9,12 @@ use crate::{
         names,
         pdu::{self, Item, MEI_IDENTIFICATION},
     },
-    plant::{def::Limits, event::ExceptionCode, number::to_u8, tag::Table},
+    plant::{
+        def::{Limits, READ_REGISTERS_MAX},
+        event::ExceptionCode,
+        number::to_u8,
+        tag::Table,
+    },
 };
 
 /// What a device has behind its addresses. A write of several is tried on a copy, so one bad value refuses the whole block.
@@ -27,6 +32,14 @@ pub trait Registers: Clone {
     fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode>;
     /// Writes one coil.
     fn write_bit(&mut self, address: u16, on: bool) -> Result<(), ExceptionCode>;
+    /// Words that a register address holds: two where the device has 32 bits in one.
+    fn address_words(&self, _table: Table, _address: u16) -> u16 {
+        1
+    }
+    /// One word of a holding or input register; `place` is 0 but for the second one of an address.
+    fn word_at(&self, table: Table, address: u16, _place: u16) -> Result<u16, ExceptionCode> {
+        self.word(table, address)
+    }
     /// One holding or input register.
     fn word(&self, table: Table, address: u16) -> Result<u16, ExceptionCode>;
     /// Writes one holding register.
@@ -98,8 +111,9 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Exception
             Ok(pdu[..5].to_vec())
         }
         (0x10, &[address, count]) => {
-            let values = registers(span(function, 0, address, count, limits.write_registers_max)?, data)?;
-            write_words(device, address, &values)?;
+            let each = device.address_words(Table::Holding, address);
+            let addresses = span(function, 0, address, count, limits.write_registers_max / each)?;
+            write_words(device, address, &registers(addresses, each, data)?)?;
             Ok(pdu[..5].to_vec())
         }
         (0x11, []) => Ok(identity::report(&device.identity(), device.running())),
@@ -108,8 +122,9 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Exception
             device.write_word(address, value)?;
             Ok(pdu.to_vec())
         }
+        (0x17, &[_, _, to, _]) if device.address_words(Table::Holding, to) != 1 => Err(ExceptionCode::ILLEGAL_ADDRESS),
         (0x17, &[from, count, to, written]) => {
-            let values = registers(span(function, 1, to, written, limits.write_registers_max)?, data)?;
+            let values = registers(span(function, 1, to, written, limits.write_registers_max)?, 1, data)?;
             let mut trial = device.clone();
             write_words(&mut trial, to, &values)?;
             let reply = read_words(&trial, function, from, count)?;
@@ -149,11 +164,18 @@ fn read_words<D: Registers>(device: &D, function: u8, address: u16, count: u16) 
     let table = names::table(function);
     let limits = device.limits();
     let most = limits.most(table);
-    let mut reply = vec![function, to_u8(count.min(most) * 2)];
-    let addresses = span(function, 0, address, count, most)?;
+    let each = device.address_words(table, address);
+    let addresses = span(function, 0, address, count, most.min(READ_REGISTERS_MAX / each))?;
+    let mut reply = vec![function, to_u8(count * each * 2)];
     check_step(&limits, table, address, count)?;
     for at in addresses {
-        reply.extend_from_slice(&device.word(table, at)?.to_be_bytes());
+        // What counts in another way is not in the same read.
+        if device.address_words(table, at) != each {
+            return Err(ExceptionCode::ILLEGAL_ADDRESS);
+        }
+        for place in 0..each {
+            reply.extend_from_slice(&device.word_at(table, at, place)?.to_be_bytes());
+        }
     }
     Ok(reply)
 }
@@ -170,10 +192,10 @@ fn write_bits<D: Registers>(device: &mut D, addresses: Addresses, packed: &[u8])
     Ok(())
 }
 
-/// The registers of a write, which must be as many as its addresses.
-fn registers(addresses: Addresses, packed: &[u8]) -> Result<Vec<u16>, ExceptionCode> {
+/// The words of a write, which must be as many as its addresses hold.
+fn registers(addresses: Addresses, each: u16, packed: &[u8]) -> Result<Vec<u16>, ExceptionCode> {
     let values: Vec<u16> = packed.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect();
-    (packed.len() == 2 * addresses.len()).then_some(values).ok_or(ExceptionCode::ILLEGAL_VALUE)
+    (packed.len() == 2 * usize::from(each) * addresses.len()).then_some(values).ok_or(ExceptionCode::ILLEGAL_VALUE)
 }
 
 fn write_words<D: Registers>(device: &mut D, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {

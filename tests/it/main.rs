@@ -61,6 +61,7 @@ mod crashes;
 mod devices;
 mod durability;
 mod endings;
+mod enron;
 mod exact;
 mod formats;
 mod guarded;

@@ -156,7 +156,7 @@ proptest! {
         let count = u8::try_from(text.len()).unwrap_or(u8::MAX).saturating_add(spare).max(1);
         let point = point(DataType::Text(count), order);
         if let Some(words) = encode_text(point, text) {
-            prop_assert_eq!(words.len(), usize::from(point.len()));
+            prop_assert_eq!(words.len(), usize::from(point.words()));
             let back = decode_text(point, &words);
             prop_assert_eq!(back.as_deref(), Some(text));
         } else {
@@ -177,7 +177,7 @@ proptest! {
         words in prop::array::uniform4(any::<u16>()),
     ) {
         let point = point(kind, order);
-        let words = &words[..usize::from(kind.registers())];
+        let words = &words[..usize::from(kind.words())];
         if let Some(value) = decode(point, words) {
             let written = encode(point, value).expect("what is read can be written");
             prop_assert_eq!(decode(point, &written), Some(value));
@@ -197,7 +197,7 @@ proptest! {
         if let Some((low, high)) = kind.whole_range() {
             let value = Exact::whole(low + i128::from(part) % (high - low + 1));
             let words = encode(point(kind, order), value).expect("it fits");
-            prop_assert_eq!(words.len(), usize::from(kind.registers()));
+            prop_assert_eq!(words.len(), usize::from(kind.words()));
             prop_assert_eq!(decode(point(kind, order), &words), Some(value));
             for beyond in [low - 1, high + 1] {
                 prop_assert_eq!(encode(point(kind, order), Exact::whole(beyond)), None);
@@ -208,9 +208,9 @@ proptest! {
     #[test]
     fn a_pattern_of_bits_is_what_is_read(kind in prop::sample::select(numbers()), words in prop::array::uniform4(any::<u16>())) {
         let point = point(kind, ByteOrder::Abcd);
-        let words = &words[..usize::from(kind.registers())];
+        let words = &words[..usize::from(kind.words())];
         let pattern = words.iter().fold(0, |bits: u64, word| bits << 16 | u64::from(*word));
-        if u32::from(kind.bits()) == 16 * u32::from(kind.registers()) {
+        if u32::from(kind.bits()) == 16 * u32::from(kind.words()) {
             let meant = point.raw_number(pattern.into(), true);
             prop_assert_eq!(meant.number(), decode(point, words), "{:?} of {:X}", kind, pattern);
         }

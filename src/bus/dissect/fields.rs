@@ -23,6 +23,8 @@ pub(super) struct Values {
     /// Every other number, in order.
     pub numbers: Vec<u16>,
     pub registers: Vec<u16>,
+    /// Words of them that each address holds: two where the bytes are twice as many as the standard has.
+    pub address_words: usize,
     pub bits: Vec<bool>,
     /// Data, objects or groups, each as text.
     pub parts: Vec<String>,
@@ -47,7 +49,8 @@ impl<'r, 'a> Fields<'r, 'a> {
     /// `asked` is the request message of a response, if it is known.
     pub fn new(reader: &'r mut Reader<'a>, function: u8, direction: Direction, asked: Option<&[u8]>) -> Fields<'r, 'a> {
         let word = |at: usize| Some(u16::from_be_bytes([*asked?.get(at)?, *asked?.get(at + 1)?]));
-        let (start, count, values) = (word(2), word(4), Values::default());
+        let values = Values { address_words: 1, ..Values::default() };
+        let (start, count) = (word(2), word(4));
         Fields { reader, function, direction, values, start, count, counts: false, bytes: 0 }
     }
 
@@ -85,7 +88,7 @@ impl<'r, 'a> Fields<'r, 'a> {
             }
             Item::CoilState => self.coil_state()?,
             Item::Register => {
-                self.values.registers = self.reader.registers(function, self.start, 1)?;
+                self.values.registers = self.reader.registers(function, self.start, 1, 1)?;
             }
             Item::Byte(name, label) => self.values.numbers.push(self.reader.byte(translate(name), label)?.into()),
             Item::Word(name, label) => self.number(translate(name), label)?,
@@ -101,8 +104,10 @@ impl<'r, 'a> Fields<'r, 'a> {
                 self.values.bits = self.reader.bits(function, self.start, count)?;
             }
             Item::Registers => {
-                let count = self.count.filter(|_| self.counts).map_or(self.bytes / 2, usize::from);
-                self.values.registers = self.reader.registers(function, self.start, count.min(self.bytes / 2))?;
+                let each = self.values.address_words;
+                let counted = self.count.filter(|_| self.counts).map(|count| usize::from(count) * each);
+                let count = counted.unwrap_or(self.bytes / 2).min(self.bytes / 2);
+                self.values.registers = self.reader.registers(function, self.start, count, each)?;
             }
             Item::WordCount => {
                 self.bytes = self.reader.word(t!("byte count"), |count| t!("{count} bytes follow", count))?.into();
@@ -168,9 +173,13 @@ impl<'r, 'a> Fields<'r, 'a> {
     fn byte_count(&mut self, next: Option<Item>) -> Option<()> {
         self.bytes = usize::from(self.reader.byte(t!("byte count"), follow)?);
         let bytes = self.bytes;
+        let is_wide = |count: u16| count != 0 && bytes == 4 * usize::from(count);
+        let may_be = matches!((next, self.function), (Some(Item::Registers), 0x03 | 0x04 | 0x10));
+        self.values.address_words = if may_be && self.count.is_some_and(is_wide) { 2 } else { 1 };
+        let each = self.values.address_words;
         let expected = match (&next, self.count.map(usize::from)) {
             (Some(Item::Bits), Some(count)) => count.div_ceil(8),
-            (Some(Item::Registers), Some(count)) if self.counts => 2 * count,
+            (Some(Item::Registers), Some(count)) if self.counts => 2 * count * each,
             _ => bytes,
         };
         if bytes != expected {
@@ -219,7 +228,7 @@ impl<'r, 'a> Fields<'r, 'a> {
     fn file_record(&mut self) -> Option<String> {
         let length = usize::from(self.reader.byte(t!("group length"), follow)?);
         self.reference()?;
-        Some(hex_words(&self.reader.registers(0x03, None, length.saturating_sub(1) / 2)?))
+        Some(hex_words(&self.reader.registers(0x03, None, length.saturating_sub(1) / 2, 1)?))
     }
 
     /// Reference type, file, record and length; and the registers to write.
@@ -229,7 +238,7 @@ impl<'r, 'a> Fields<'r, 'a> {
         let record = self.reader.word(t!("record"), |record| t!("from record {record}", record))?;
         let length = self.reader.word(t!("length"), |length| counted(length.into(), Counted::Registers))?;
         let registers = if with_data { usize::from(length) } else { 0 };
-        let data = hex_words(&self.reader.registers(0x03, None, registers)?);
+        let data = hex_words(&self.reader.registers(0x03, None, registers, 1)?);
         let data = if data.is_empty() { String::new() } else { format!(": {data}") };
         let count = counted(length.into(), Counted::Registers);
         Some(t!("file {file} record {record}, {count}{data}", file, record, count, data))

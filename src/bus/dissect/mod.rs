@@ -18,7 +18,10 @@ use crate::{t, text::translate};
 use std::ops::Range;
 
 use self::{envelope::Envelope, reader::Reader};
-use super::{frame, names, pdu, request_lint};
+use super::{
+    frame::{self, Request},
+    names, pdu, request_lint,
+};
 use crate::plant::{event::Fault, line::Framing, traffic::Frame};
 
 pub use envelope::{message_of, recognise};
@@ -86,6 +89,7 @@ pub fn dissect(
     // Bytes without unit and function have no direction.
     let direction = direction.filter(|_| 2 <= envelope.message.len());
     let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
+        let asked = Request::as_answered(asked, &envelope.message);
         let fault = frame::check_answer(envelope.framing.unwrap_or(Framing::Rtu), asked, &envelope.message).err()?;
         (!matches!(fault, Fault::Exception(_))).then(|| fault.to_string())
     });
@@ -155,7 +159,7 @@ pub fn request_of<'a>(answer: &Frame, before: impl Iterator<Item = &'a Frame>) -
         if !same || !frame::begins_answer(&request, &message) {
             continue;
         }
-        if frame::answers(answer.framing, &request, &message) {
+        if frame::answers(answer.framing, Request::as_answered(&request, &message), &message) {
             return Some(request);
         }
         nearest.get_or_insert(request);

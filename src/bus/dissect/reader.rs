@@ -66,13 +66,23 @@ impl<'a> Reader<'a> {
     }
 
     /// `count` registers; `start` is the wire address of the first, if it is known.
-    pub fn registers(&mut self, function: u8, start: Option<u16>, count: usize) -> Option<Vec<u16>> {
+    pub fn registers(
+        &mut self,
+        function: u8,
+        start: Option<u16>,
+        count: usize,
+        address_words: usize,
+    ) -> Option<Vec<u16>> {
         let mut values = Vec::new();
         for index in 0..count {
             let name = match start {
                 Some(start) => {
-                    let address = start.saturating_add(to_u16(index));
-                    format!("{} / 0x{address:04X}", names::modicon(function, address))
+                    let address = start.saturating_add(to_u16(index / address_words));
+                    let place = format!("{} / 0x{address:04X}", names::modicon(function, address));
+                    match address_words {
+                        1 => place,
+                        _ => t!("{place} word {number}", place, number = index % address_words + 1),
+                    }
                 }
                 None => t!("register {number}", number = index + 1),
             };

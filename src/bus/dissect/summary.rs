@@ -107,6 +107,10 @@ fn of_response(row: &pdu::Function, values: &Values) -> String {
     let (code, registers) = (row.code, hex_words(&values.registers));
     match (code, &values.numbers[..]) {
         (0x01 | 0x02, _) => format!("{}: {}", counted(values.bits.len(), Counted::Bits), bit_words(&values.bits)),
+        (0x03 | 0x04, _) if values.address_words == 2 => {
+            let count = counted(values.registers.len() / 2, Counted::Registers);
+            t!("{count} of 32 bits: {registers}", count, registers)
+        }
         (0x03 | 0x04 | 0x17, _) => format!("{}: {registers}", counted(values.registers.len(), Counted::Registers)),
         (0x05, _) => t!("written: coil {place}", place = written(values, code)),
         (0x06, _) => t!("written: {place}", place = written(values, code)),

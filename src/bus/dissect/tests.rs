@@ -93,6 +93,23 @@ fn answers_are_reported_with_the_addresses_of_their_request() {
     assert_eq!((dissection.direction, dissection.fields[3].name.as_str()), (Some(Direction::Answer), "register 1"));
 }
 
+/// Enron and Daniel: four bytes for each address that is counted.
+#[test]
+fn addresses_of_32_bits_are_named_by_their_own_count() {
+    let answer = "01 03 08 00 00 00 07 43 66 33 33";
+    let read = check(answer, "01 03 1B 59 00 02", "2 registers of 32 bits: 0000 0007 4366 3333");
+    let names: Vec<&str> = read.fields[3..7].iter().map(|field| &*field.name).collect();
+    let [first, second] = ["47002 / 0x1B59", "47003 / 0x1B5A"];
+    let expect = [(first, 1), (first, 2), (second, 1), (second, 2)];
+    assert_eq!(names, expect.map(|(place, word)| format!("{place} word {word}")));
+    let write = "01 10 1B 59 00 01 04 43 66 33 33";
+    check(write, "", "unit 1 write registers 47002 (0x1B59, 1): 4366 3333");
+    // Neither two bytes for each nor four.
+    let bytes = [1, 3, 6, 0, 0, 0, 7, 0x43, 0x66];
+    let odd = dissect(&bytes, None, Some(Direction::Answer), Some(&[1, 3, 0x1B, 0x59, 0, 2]));
+    assert_eq!(odd.wrong.as_deref(), Some("response with 6 data bytes, expected 4"));
+}
+
 #[test]
 fn an_answer_without_any_object_is_named_all_the_same() {
     let answer = dissect(&with_crc(&[1, 0x2B, 0x0E, 1, 1, 0, 0, 0]), None, Some(Direction::Answer), None);

@@ -12,6 +12,36 @@ use crate::{
 /// Fewest bytes behind the byte count of an event log: status, event count and message count.
 const LOG_MIN: u8 = 6;
 
+/// A request message with what its bytes do not say.
+#[derive(Debug, Clone, Copy)]
+pub struct Request<'a> {
+    /// Unit and PDU.
+    pub message: &'a [u8],
+    /// Words that each register address holds in the device: one, or two where it counts as Enron does.
+    pub address_words: u16,
+}
+
+/// To a device that counts as the standard does.
+impl<'a, M: AsRef<[u8]> + ?Sized> From<&'a M> for Request<'a> {
+    fn from(message: &'a M) -> Request<'a> {
+        Request { message: message.as_ref(), address_words: 1 }
+    }
+}
+
+impl<'a> Request<'a> {
+    /// A read as its answer shows it, where nothing else tells: four bytes for each address are 32 bits in one.
+    pub fn as_answered(message: &'a [u8], answer: &[u8]) -> Request<'a> {
+        let is_wide = match (message, answer) {
+            ([_, 3 | 4, _, _, high, low], [_, 3 | 4, bytes, ..]) => {
+                let count = usize::from(u16::from_be_bytes([*high, *low]));
+                count != 0 && usize::from(*bytes) == 4 * count
+            }
+            _ => false,
+        };
+        Request { message, address_words: if is_wide { 2 } else { 1 } }
+    }
+}
+
 /// The normal answer to a request, as far as the request itself tells.
 struct Expected {
     /// Length of the message.
@@ -21,13 +51,13 @@ struct Expected {
 }
 
 /// `None` where only the answer tells how long it is, and for a request that is cut short.
-fn expected(request: &[u8]) -> Option<Expected> {
+fn expected(Request { message: request, address_words }: Request) -> Option<Expected> {
     let function = pdu::function(*request.get(1)?)?;
     let word = |at: usize| Some(u16::from_be_bytes([*request.get(at)?, *request.get(at + 1)?]));
     let count = || word(4).map(usize::from);
     let (length, repeated) = match function.response {
         [Item::ByteCount, Item::Bits] => (3 + count()?.div_ceil(8), 2),
-        [Item::ByteCount, Item::Registers] => (3 + 2 * count()?, 2),
+        [Item::ByteCount, Item::Registers] => (3 + 2 * usize::from(address_words) * count()?, 2),
         [Item::ByteCount, Item::FileRecords] => (3 + records(request).map(|length| 2 + length).sum::<usize>(), 2),
         [.., Item::Data] => match word(2)? {
             // These come back as they were sent (V1.1b3, 6.8.1), the others with what they ask for.
@@ -45,8 +75,8 @@ fn expected(request: &[u8]) -> Option<Expected> {
 }
 
 /// Length of the normal answer to a request message, where the request tells.
-pub fn expected_length(request: &[u8]) -> Option<usize> {
-    expected(request).map(|expected| expected.length)
+pub fn expected_length<'a>(request: impl Into<Request<'a>>) -> Option<usize> {
+    expected(request.into()).map(|expected| expected.length)
 }
 
 /// Bytes of registers in each record that a request of function 14 asks for.
@@ -67,12 +97,13 @@ pub struct ResponseSignature {
 }
 
 /// The signature of the normal answer to a request message; `None` for functions whose answers have none.
-pub fn response_signature(request: &[u8]) -> Option<ResponseSignature> {
+pub fn response_signature<'a>(request: impl Into<Request<'a>>) -> Option<ResponseSignature> {
+    let request = request.into();
     let Expected { length, repeated } = expected(request)?;
-    let function = pdu::function(*request.get(1)?)?;
+    let function = pdu::function(*request.message.get(1)?)?;
     let echo = match function.response {
         [Item::ByteCount, Item::Bits | Item::Registers] => None,
-        _ if repeated == length && length <= 10 => Some(number(&request[2..repeated])),
+        _ if repeated == length && length <= 10 => Some(number(&request.message[2..repeated])),
         _ => return None,
     };
     Some(ResponseSignature { function: function.code, length, echo })
@@ -106,15 +137,16 @@ pub fn begins_answer(request: &[u8], bytes: &[u8]) -> bool {
 }
 
 /// Is this whole message the answer to a request message, or a refusal of it?
-pub fn answers(framing: Framing, request: &[u8], answer: &[u8]) -> bool {
+pub fn answers<'a>(framing: Framing, request: impl Into<Request<'a>>, answer: &[u8]) -> bool {
     matches!(check_answer(framing, request, answer), Ok(()) | Err(Fault::Exception(_)))
 }
 
 /// Checks a whole answer message, free of line errors, against its request: unit, function, and every field that the request
 /// or the answer itself determines. An exception answer is [`Fault::Exception`]; over Modbus TCP, where the header says where
 /// it ends, some devices send more bytes behind its code, and some none at all.
-pub fn check_answer(framing: Framing, request: &[u8], answer: &[u8]) -> Result<(), Fault> {
-    let (&[asked_unit, asked, ..], &[unit, function, ..]) = (request, answer) else {
+pub fn check_answer<'a>(framing: Framing, request: impl Into<Request<'a>>, answer: &[u8]) -> Result<(), Fault> {
+    let request = request.into();
+    let (&[asked_unit, asked, ..], &[unit, function, ..]) = (request.message, answer) else {
         return Err(Fault::Truncated { got: to_u16(answer.len()), expected: 3 });
     };
     if unit != asked_unit {
@@ -136,10 +168,11 @@ pub fn check_answer(framing: Framing, request: &[u8], answer: &[u8]) -> Result<(
 }
 
 /// Checks a normal answer of a function: what it repeats, its length, and whether its counts agree.
-fn check_fields(row: &Function, request: &[u8], answer: &[u8]) -> Result<(), Fault> {
+fn check_fields(row: &Function, asked: Request, answer: &[u8]) -> Result<(), Fault> {
+    let request = asked.message;
     let head = if matches!(row.response, [Item::ByteCount, ..]) && !row.echoes { 3 } else { 2 };
     let behind = |length: usize| length.saturating_sub(head);
-    let expected = expected(request);
+    let expected = expected(asked);
     if let Some(Expected { length, repeated }) = expected {
         if answer.len() != length {
             return Err(wrong_length(behind(answer.len()), behind(length)));

@@ -317,7 +317,7 @@ impl Link {
     /// The answer to this message may still come: it is remembered, and the line stays silent until it would have passed.
     fn expect_late(&mut self, message: &[u8]) {
         self.wire.replies.failed(message, self.wire.uptime());
-        let longest = frame::expected_length(message).unwrap_or(frame::MESSAGE_MAX);
+        let longest = frame::expected_length(self.wire.replies.request(message)).unwrap_or(frame::MESSAGE_MAX);
         let chars = to_u32(frame::wrapped_length(self.framing(), longest));
         self.wire.hold_off(self.wire.char_time * chars + self.wire.silent_interval);
     }

@@ -4,7 +4,10 @@ use tokio::time::Instant;
 
 use super::clock::Clock;
 use crate::{
-    bus::{late_reply::LineReplies, other_master::OtherMaster, plan::Block, request_gap::RequestGaps},
+    bus::{
+        late_reply::LineReplies, other_master::OtherMaster, plan::Block, request_gap::RequestGaps,
+        wide_addresses::WideAddresses,
+    },
     plant::{def::LineDef, event::LineCounters, line_finding::OtherMasterHeard, number::to_u16},
 };
 
@@ -42,8 +45,9 @@ impl LineMemory {
         self.other_master.heard(self.created_at.elapsed())
     }
 
-    /// These blocks will be asked for.
-    pub fn expect(mut self, blocks: &[Block]) -> LineMemory {
+    /// These blocks will be asked for, and these addresses hold 32 bits each.
+    pub fn expect(mut self, blocks: &[Block], wide: WideAddresses) -> LineMemory {
+        self.replies.set_wide(wide);
         self.replies.expect(blocks);
         self
     }

@@ -40,6 +40,7 @@ use crate::{
         line_stats::{LineStats, Plan},
         plan::{self, Block, RangeBisection, UnreadableRanges},
         schedule::{Budget, LIVE_SHARE, Load, Next, Schedule, WRITE_SHARE},
+        wide_addresses::WideAddresses,
     },
     plant::{
         PlantDef,
@@ -99,7 +100,7 @@ pub async fn run(
         deaf: None,
         refused_all: BTreeMap::new(),
         schedule: Schedule::new(&blocks, clock.now()),
-        memory: memory.expect(&blocks),
+        memory: memory.expect(&blocks, WideAddresses::of(&def, line)),
         settings: def.line(line).clone(),
         clock,
         connector,

@@ -50,6 +50,11 @@ impl Pdu {
         Pdu::new(0x10, &[address, to_u16(words.len())], &bytes_of(words))
     }
 
+    /// Writes addresses that hold so many words each: the count is that of the addresses.
+    pub fn write_addresses(address: u16, address_words: u16, words: &[u16]) -> Pdu {
+        Pdu::new(0x10, &[address, to_u16(words.len()) / address_words], &bytes_of(words))
+    }
+
     /// Sets the bits of a register that are not in `and` to those of `or`.
     pub fn mask_write(address: u16, and: u16, or: u16) -> Pdu {
         Pdu::new(0x16, &[address, and, or], &[])

@@ -2,7 +2,7 @@
 
 use std::{ops::Range, time::Duration};
 
-use super::{Extent, UnreadableRanges, cost::Wire, most};
+use super::{Extent, UnreadableRanges, cost::Wire};
 use crate::plant::{def::DeviceDef, tag::TagDef};
 
 /// Cuts tags of one device, table and period, sorted by address and length, into runs that are one request each, so that
@@ -20,7 +20,7 @@ pub(super) fn cut<'a>(
 ) -> Vec<Vec<&'a TagDef>> {
     let too_long = |value: &Value| {
         let alone = Extent::new(tags[value.tags.start].point, value.end, device);
-        most(device, alone.table, unreadable) < alone.count()
+        !alone.fits(device, unreadable)
     };
     let (mut runs, mut values): (Vec<Vec<&TagDef>>, Vec<Value>) = (Vec::new(), Vec::new());
     // The registers of a value that was set aside are no gap, but one before it still lies between its neighbours.
@@ -49,7 +49,7 @@ pub(super) fn cut<'a>(
                 break;
             }
             let (spent, requests) = best[start];
-            let total = (spent + wire.read(extent.table, extent.count()), requests + 1);
+            let total = (spent + wire.read(extent.table, extent.words()), requests + 1);
             if found.is_none_or(|(least, _)| total < least) {
                 found = Some((total, start));
             }

@@ -71,7 +71,7 @@ impl Wire {
         self.request + self.answer + self.byte * data_bytes(table, count)
     }
 
-    /// A good read of a number of registers or bits.
+    /// A good read of a number of words of registers, or bits.
     pub fn read(self, table: Table, count: u32) -> Duration {
         self.frames(table, count) + self.turnaround + self.silent_interval
     }
@@ -89,5 +89,5 @@ pub fn data_bytes(table: Table, count: u32) -> u32 {
 
 /// Worst time that a good read takes on its line, the device's own time, its gap and the silences included.
 pub fn cost(block: &Block, line: &LineDef, device: &DeviceDef, time: DeviceTime) -> Duration {
-    Wire::new(line, device).with_device(time).read(block.table, u32::from(block.count))
+    Wire::new(line, device).with_device(time).read(block.table, block.words())
 }

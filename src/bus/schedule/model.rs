@@ -44,6 +44,7 @@ impl Model {
             poll: Poll::Every(Duration::from_millis(unit.period as u64)),
             class: unit.class,
             alignment: 1,
+            address_words: 1,
         };
         let blocks: Vec<Block> = units.iter().enumerate().map(block).collect();
         let reads = vec![Vec::new(); units.len()];

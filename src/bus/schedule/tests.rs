@@ -23,9 +23,19 @@ fn block(device: u16, poll: Poll) -> Block {
 }
 
 fn classed(device: u16, poll: Poll, class: PollClass) -> Block {
-    let (unit, tags) = (device as u8 + 1, vec![TagId(0)]);
-    let device = DeviceId(device);
-    Block { device, unit, table: Table::Input, address: 0, count: 1, tags: tags.into(), poll, class, alignment: 1 }
+    let (unit, tags, device) = (device as u8 + 1, vec![TagId(0)], DeviceId(device));
+    Block {
+        device,
+        unit,
+        table: Table::Input,
+        address: 0,
+        count: 1,
+        tags: tags.into(),
+        poll,
+        class,
+        alignment: 1,
+        address_words: 1,
+    }
 }
 
 fn every(ms: u64) -> Poll {

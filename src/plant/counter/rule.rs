@@ -49,7 +49,7 @@ impl CounterRule {
             }
             (None, None, None) => [None; 2],
         };
-        let single = whole.is_none() && kind == DataType::F32 && tag.calculation.is_none();
+        let single = whole.is_none() && matches!(kind, DataType::F32 | DataType::EnronF32) && tag.calculation.is_none();
         CounterRule { digit, single, moduli, max_rate: tag.max_rate }
     }
 

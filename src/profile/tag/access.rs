@@ -42,6 +42,7 @@ pub(super) fn access(row: &TagTable, point: Option<Point>, problems: &mut Proble
         let is_part = point.part().is_some() && row.write.is_none();
         let allowed: &[u8] = match (point.table.is_bits(), is_part, point.len()) {
             (true, ..) => &[5, 15],
+            _ if point.kind.address_words() != 1 => &[16],
             (false, true, _) => &[22],
             (false, false, 1) if row.write.is_some() => &[6, 16],
             (false, false, _) if row.write.is_some() => &[16],

@@ -297,3 +297,23 @@ fn numbers_of_64_bits_have_names_and_so_have_their_bits() {
     let beyond = map.replace("bits = { 15", "bits = { 16");
     assert!(errors(&beyond).contains("there is no bit 16"), "{}", errors(&beyond));
 }
+
+#[test]
+fn a_value_of_32_bits_may_have_one_address() {
+    let row = |keys: &str| format!("[[tag]]\nname = \"X\"\naddress = 7001\ntype = \"enron_float32\"\n{keys}\n");
+    let map = meter(&row("table = \"holding\"\naccess = \"rw\""));
+    let x = tag(&map, "D1.X");
+    assert_eq!((x.point.len(), x.point.words(), x.write_function()), (1, 2, Some(16)));
+    let next = format!("{}{}", row("table = \"holding\""), row("table = \"holding\"").replace("7001", "7002"));
+    let next = meter(&next.replacen("\"X\"", "\"W\"", 1));
+    assert_eq!(tag(&next, "D1.W").point.address, 7_001, "the next one begins at the next address");
+    for (keys, why) in [
+        ("table = \"coil\"", "a coil is one bit"),
+        ("table = \"holding\"\naccess = \"rw\"\nwrite_fc = 6", "function 6 cannot write this tag"),
+        ("table = \"holding\"\naccess = \"rw\"\nwrite_fc = 23", "expected [16]"),
+        ("table = \"holding\"\n[[signature.probe]]\ntag = \"X\"\nis = [1]", "X is no register of 16 bits"),
+    ] {
+        let map = meter(&row(keys));
+        assert!(errors(&map).contains(why), "{keys}: {}", errors(&map));
+    }
+}

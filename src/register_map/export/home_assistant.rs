@@ -94,7 +94,10 @@ fn register(tag: &TagDef, keys: &mut Vec<String>) -> Result<(), &'static str> {
         | DataType::Chars(_)
         | DataType::Clock(_)
         | DataType::Version(_)
-        | DataType::NetworkAddress(_) => return Err("its type"),
+        | DataType::NetworkAddress(_)
+        | DataType::EnronI32
+        | DataType::EnronU32
+        | DataType::EnronF32 => return Err("its type"),
     };
     keys.push(format!("data_type: {kind}"));
     let swap = match point.order {

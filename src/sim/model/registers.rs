@@ -24,23 +24,30 @@ pub struct Chart {
     functions: Vec<u8>,
     tags: Vec<TagDef>,
     cells: [BTreeSet<u16>; 4],
+    /// Addresses that hold two words each.
+    wide: [BTreeSet<u16>; 4],
 }
 
 /// A device with what is in its registers now.
 #[derive(Debug, Clone)]
 pub struct Model {
     chart: Arc<Chart>,
-    /// Words, and bits as 0 or 1, by table and address.
-    cells: [BTreeMap<u16, u16>; 4],
+    /// Words, and bits as 0 or 1, by table and [`spot`].
+    cells: [BTreeMap<u32, u16>; 4],
 }
 
 impl Chart {
     pub fn new<'a>(device: &DeviceDef, tags: impl Iterator<Item = &'a TagDef>) -> Chart {
         let tags: Vec<TagDef> = tags.cloned().collect();
-        let cells = [Table::Coil, Table::Discrete, Table::Input, Table::Holding]
-            .map(|table| cells(tags.iter().filter(|tag| tag.point.table == table), device.limits));
+        let of_tables = |is_meant: fn(&&TagDef) -> bool| {
+            let tables = [Table::Coil, Table::Discrete, Table::Input, Table::Holding];
+            let meant = |table| tags.iter().filter(is_meant).filter(move |tag| tag.point.table == table);
+            tables.map(|table| cells(meant(table), device.limits))
+        };
+        let cells = of_tables(|_| true);
+        let wide = of_tables(|tag| tag.point.kind.address_words() != 1);
         let functions = if device.functions.is_empty() { functions(&tags) } else { device.functions.clone() };
-        Chart { limits: device.limits, functions, tags, cells }
+        Chart { limits: device.limits, functions, tags, cells, wide }
     }
 
     fn tag(&self, id: TagId) -> Option<&TagDef> {
@@ -87,7 +94,11 @@ fn functions(tags: &[TagDef]) -> Vec<u8> {
 impl Model {
     /// As it is switched on: each tag at 0, or at the bound or state nearest to it.
     pub fn new(chart: Arc<Chart>) -> Model {
-        let cells = chart.cells.each_ref().map(|cells| cells.iter().map(|address| (*address, 0)).collect());
+        let mut cells: [BTreeMap<u32, u16>; 4] =
+            chart.cells.each_ref().map(|cells| cells.iter().map(|address| (spot(*address, 0), 0)).collect());
+        for (cells, wide) in cells.iter_mut().zip(&chart.wide) {
+            cells.extend(wide.iter().map(|address| (spot(*address, 1), 0)));
+        }
         let mut model = Model { chart: chart.clone(), cells };
         // Twice: a later tag may hold the place of a decimal point.
         for tag in chart.tags.iter().chain(&chart.tags) {
@@ -122,13 +133,15 @@ impl Model {
             None => codec::encode(tag.point, raw),
         };
         let Some(words) = words else { return false };
-        self.cells[place(tag.point.table)].extend((tag.point.address..).zip(words));
+        let spots = spots(tag.point.address, tag.point.kind.address_words());
+        self.cells[place(tag.point.table)].extend(spots.zip(words));
         true
     }
 
     fn words(&self, tag: &TagDef) -> Option<Vec<u16>> {
         let cells = &self.cells[place(tag.point.table)];
-        (tag.point.address..).take(usize::from(tag.point.len())).map(|address| cells.get(&address).copied()).collect()
+        let spots = spots(tag.point.address, tag.point.kind.address_words());
+        spots.take(usize::from(tag.point.words())).map(|spot| cells.get(&spot).copied()).collect()
     }
 
     fn decimals(&self, tag: &TagDef) -> i8 {
@@ -147,13 +160,19 @@ impl Model {
     fn write_cells(&mut self, table: Table, address: u16, values: &[u16]) -> Result<(), ExceptionCode> {
         let chart = self.chart.clone();
         let is_for = |tag: &&TagDef| {
-            tag.writable() && tag.write_at == Some((table, address)) && usize::from(tag.point.len()) == values.len()
+            tag.writable() && tag.write_at == Some((table, address)) && usize::from(tag.point.words()) == values.len()
         };
         if let Some(tag) = chart.tags.iter().find(is_for) {
-            self.cells[place(tag.point.table)].extend((tag.point.address..=u16::MAX).zip(values.iter().copied()));
+            let spots = spots(tag.point.address, tag.point.kind.address_words());
+            self.cells[place(tag.point.table)].extend(spots.zip(values.iter().copied()));
             return if self.admits(tag) { Ok(()) } else { Err(ExceptionCode::ILLEGAL_VALUE) };
         }
-        let span = u32::from(address)..u32::from(address) + to_u32(values.len());
+        let each = self.address_words(table, address);
+        // One word does not make a value here.
+        if !values.len().is_multiple_of(each.into()) {
+            return Err(ExceptionCode::ILLEGAL_ADDRESS);
+        }
+        let span = u32::from(address)..u32::from(address) + to_u32(values.len()) / u32::from(each);
         let extent =
             |tag: &TagDef| u32::from(tag.point.address)..u32::from(tag.point.address) + u32::from(tag.point.len());
         let touched: Vec<&TagDef> = chart
@@ -171,7 +190,7 @@ impl Model {
         if touched.iter().any(locked) {
             return Err(ExceptionCode::ILLEGAL_ADDRESS);
         }
-        self.cells[place(table)].extend((address..=u16::MAX).zip(values.iter().copied()));
+        self.cells[place(table)].extend(spots(address, each).zip(values.iter().copied()));
         if touched.iter().all(|tag| self.admits(tag)) { Ok(()) } else { Err(ExceptionCode::ILLEGAL_VALUE) }
     }
 
@@ -196,6 +215,16 @@ fn at_rest(tag: &TagDef) -> f64 {
     }
 }
 
+/// Where a word stands among the cells of its table: the second one of an address behind all the first ones.
+fn spot(address: u16, word: u16) -> u32 {
+    u32::from(word) << 16 | u32::from(address)
+}
+
+/// Those from an address on, where each holds so many words.
+fn spots(address: u16, each: u16) -> impl Iterator<Item = u32> {
+    (address..=u16::MAX).flat_map(move |address| (0..each).map(move |word| spot(address, word)))
+}
+
 fn place(table: Table) -> usize {
     match table {
         Table::Coil => 0,
@@ -215,7 +244,7 @@ impl Registers for Model {
     }
 
     fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode> {
-        self.cells[place(table)].get(&address).map(|bit| *bit != 0).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
+        self.cells[place(table)].get(&spot(address, 0)).map(|bit| *bit != 0).ok_or(ExceptionCode::ILLEGAL_ADDRESS)
     }
 
     fn write_bit(&mut self, address: u16, on: bool) -> Result<(), ExceptionCode> {
@@ -227,7 +256,15 @@ impl Registers for Model {
     }
 
     fn word(&self, table: Table, address: u16) -> Result<u16, ExceptionCode> {
-        self.cells[place(table)].get(&address).copied().ok_or(ExceptionCode::ILLEGAL_ADDRESS)
+        self.word_at(table, address, 0)
+    }
+
+    fn address_words(&self, table: Table, address: u16) -> u16 {
+        if self.chart.wide[place(table)].contains(&address) { 2 } else { 1 }
+    }
+
+    fn word_at(&self, table: Table, address: u16, word: u16) -> Result<u16, ExceptionCode> {
+        self.cells[place(table)].get(&spot(address, word)).copied().ok_or(ExceptionCode::ILLEGAL_ADDRESS)
     }
 
     fn write_word(&mut self, address: u16, value: u16) -> Result<(), ExceptionCode> {

@@ -173,3 +173,39 @@ tag = [
     assert_eq!(simulator.respond(L1, 1, &[6, 0, 0, 0xC8, 0x05]), Some(vec![6, 0, 0, 0xC8, 0x05]));
     assert_eq!((simulator.value(id("D-1.LOW")), simulator.value(id("D-1.HIGH"))), (Some(5.0), Some(200.0)));
 }
+
+/// As Enron and Daniel count: a flow computer.
+#[test]
+fn addresses_of_32_bits_are_simulated_as_they_are_read() {
+    let device = plant(
+        r#"
+tag = [
+    { name = "STATE", table = "holding", address = 3001, type = "uint16", simulate = { start = 7 } },
+    { name = "N", table = "holding", address = 5001, type = "enron_uint32", access = "rw", max = 4000000000 },
+    { name = "FLOW", table = "holding", address = 5003, type = "enron_float32", order = "CDAB" },
+]
+"#,
+    );
+    let mut simulator = Simulator::new(&device).expect("no rig is named");
+    let id = |name: &str| device.tag_named(name).expect("it is in the profile");
+    assert!(simulator.set_value(id("D-1.FLOW"), 1.5) && simulator.set_value(id("D-1.N"), 305_419_896.0));
+    let read: &[u8] = &[3, 12, 0x12, 0x34, 0x56, 0x78, 0, 0, 0, 0, 0, 0, 0x3F, 0xC0];
+    let write: &[u8] = &[16, 0x13, 0x89, 0, 1, 4, 0, 1, 0, 2];
+    for (request, expect) in [
+        (&[3, 0x13, 0x89, 0, 3][..], read),
+        (&[3, 0x0B, 0xB9, 0, 1], &[3, 2, 0, 7]),
+        (write, &write[..5]),
+        (&[3, 0x13, 0x89, 0, 1], &[3, 4, 0, 1, 0, 2]),
+        // Two bytes are no number of this device, and neither is one beyond its greatest.
+        (&[16, 0x13, 0x89, 0, 1, 2, 0, 1], &[0x90, 3]),
+        (&[16, 0x13, 0x89, 0, 1, 4, 0xFF, 0, 0, 0], &[0x90, 3]),
+        (&[3, 0x13, 0x89, 0, 63], &[0x83, 3]),
+        (&[6, 0x13, 0x89, 0, 1], &[0x86, 2]),
+    ] {
+        assert_eq!(simulator.respond(L1, 1, request).as_deref(), Some(expect), "request {request:02X?}");
+    }
+    assert_eq!(simulator.value(id("D-1.N")), Some(65_538.0));
+    let words = blocks(&device, L1, &UnreadableRanges::default());
+    let words: Vec<_> = words.iter().map(|block| (block.address, block.count, block.address_words)).collect();
+    assert_eq!(words, [(3_001, 1, 1), (5_001, 3, 2)]);
+}

@@ -6,6 +6,7 @@ use super::Link;
 use crate::bus::{
     late_reply::{OutstandingReplies, Proof},
     plan::Block,
+    wide_addresses::WideAddresses,
 };
 
 impl Link {
@@ -59,8 +60,9 @@ impl Link {
         self.wire.replies.is_unsettled(unit, self.wire.uptime())
     }
 
-    /// Other blocks are asked for from now on.
-    pub fn expect(&mut self, blocks: &[Block]) {
+    /// Other blocks are asked for from now on, and these addresses hold 32 bits each.
+    pub fn expect(&mut self, blocks: &[Block], wide: WideAddresses) {
+        self.wire.replies.set_wide(wide);
         self.wire.replies.expect(blocks);
     }
 }

@@ -49,7 +49,8 @@ impl Link {
     ) -> Result<Received, LinkError> {
         let framing = self.framing();
         let mut echo = self.expects_echo(message).then_some(sent);
-        let longest = frame::expected_length(message).unwrap_or(frame::MESSAGE_MAX);
+        let request = self.wire.replies.request(message);
+        let longest = frame::expected_length(request).unwrap_or(frame::MESSAGE_MAX);
         let deadline = sent_at + self.timeout + self.wire.char_time * to_u32(frame::wrapped_length(framing, longest));
         let mut buffer: Vec<u8> = Vec::new();
         // What came and did not fit: it names the fault if nothing better comes.
@@ -63,14 +64,14 @@ impl Link {
             }
             let echo_begun = self.echoes && echo.is_some_and(|sent| sent.starts_with(&buffer));
             let verdict =
-                if echo_begun { FrameMatch::Nothing } else { framing::find_answer(framing, message, &buffer) };
+                if echo_begun { FrameMatch::Nothing } else { framing::find_answer(framing, request, &buffer) };
             let wait_until = match verdict {
                 FrameMatch::Answer(range) => {
                     self.wire.drop_unexpected(&buffer[..range.start]);
                     let frame: Arc<[u8]> = buffer[range].into();
                     self.wire.record(false, frame.clone(), FrameResult::Good);
                     let answer = frame::unwrap(framing, &frame)
-                        .and_then(|answer| frame::check_answer(framing, message, &answer).map(|()| answer));
+                        .and_then(|answer| frame::check_answer(framing, request, &answer).map(|()| answer));
                     return Ok(Received { answer, frame, response_time });
                 }
                 FrameMatch::Foreign(end, fault) => {
@@ -83,7 +84,7 @@ impl Link {
                 FrameMatch::Nothing => deadline,
                 // Its rest would have come with it; the answer may come in another.
                 FrameMatch::Begun if self.in_datagrams => {
-                    misfit = Some(framing::left_over(framing, message, &buffer));
+                    misfit = Some(framing::left_over(framing, request, &buffer));
                     let cut = FrameResult::Wrong(FrameFault::CutShort);
                     self.wire.record(false, std::mem::take(&mut buffer).into(), cut);
                     continue;
@@ -100,7 +101,7 @@ impl Link {
             }
             let fault = match verdict {
                 FrameMatch::Corrupt(fault) => fault,
-                _ => misfit.unwrap_or_else(|| framing::left_over(framing, message, &buffer)),
+                _ => misfit.unwrap_or_else(|| framing::left_over(framing, request, &buffer)),
             };
             let frame: Arc<[u8]> = buffer.into();
             if !frame.is_empty() {

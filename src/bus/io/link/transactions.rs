@@ -231,7 +231,8 @@ impl Link {
                 }
                 Owner::UnderWay(request) => {
                     let answer = frame[6..].to_vec();
-                    let answer = frame::check_answer(Framing::Mbap, &request.message, &answer).map(|()| answer);
+                    let asked = self.wire.replies.request(&request.message);
+                    let answer = frame::check_answer(Framing::Mbap, asked, &answer).map(|()| answer);
                     self.unanswered = 0;
                     let behind = self.transactions.under_way.iter_mut();
                     behind.filter(|other| request.sent_at <= other.sent_at).for_each(|other| other.begun_at = now);

@@ -74,5 +74,5 @@ impl Task<'_> {
 /// A span as a block without tags.
 fn block_of(device: DeviceId, unit: u8, AddressSpan { table, address, count }: AddressSpan) -> Block {
     let (tags, poll, class) = ([].into(), Poll::Once, PollClass::Background);
-    Block { device, unit, table, address, count, tags, poll, class, alignment: 1 }
+    Block { device, unit, table, address, count, tags, poll, class, alignment: 1, address_words: 1 }
 }

@@ -12,6 +12,7 @@ use crate::{
         io::link::{Link, LinkError},
         plan::{self, Block, Wire, may_be_cut},
         schedule::{Failure, Schedule},
+        wide_addresses::WideAddresses,
     },
     plant::{
         def::Framing,
@@ -311,9 +312,13 @@ impl Task<'_> {
         self.stats.replan(&self.blocks, &blocks);
         self.stats.admit(&self.def, &self.settings, &blocks);
         schedule.replan(&blocks, at);
+        let wide = WideAddresses::of(&self.def, self.line);
         match link {
-            Some(link) => link.expect(&blocks),
-            None => self.memory.replies.expect(&blocks),
+            Some(link) => link.expect(&blocks, wide),
+            None => {
+                self.memory.replies.set_wide(wide);
+                self.memory.replies.expect(&blocks);
+            }
         }
         self.hangups.keep(&blocks);
         self.blocks = blocks;

@@ -99,7 +99,8 @@ async fn read(link: &mut Link, block: &Block) -> Result<Vec<u16>, LinkError> {
 
 /// The values in a checked answer message.
 pub(super) fn parse(block: &Block, answer: &[u8]) -> Result<Vec<u16>, Fault> {
-    let values = answer.get(1..).and_then(|pdu| pdu::values_read(&block.request()[1..], pdu));
+    let words_read = |pdu| pdu::words_read(&block.request()[1..], pdu, block.address_words);
+    let values = answer.get(1..).and_then(words_read);
     // The length was checked byte for byte before; kept so that no later change can turn a shift into a value.
     let wrong = Fault::WrongLength { got: to_u16(answer.len()), asked: block.count };
     values.map(|(.., words)| words).ok_or(wrong)
@@ -107,8 +108,9 @@ pub(super) fn parse(block: &Block, answer: &[u8]) -> Result<Vec<u16>, Fault> {
 
 /// The words of a tag in those of a block.
 fn own<'a>(tag: &TagDef, block: &Block, words: &'a [u16]) -> Option<&'a [u16]> {
-    let start = usize::from(tag.point.address.checked_sub(block.address)?);
-    words.get(start..start + usize::from(tag.point.len()))
+    let offset = tag.point.address.checked_sub(block.address)?;
+    let start = usize::from(offset) * usize::from(tag.point.kind.address_words());
+    words.get(start..start + usize::from(tag.point.words()))
 }
 
 /// The text of a tag that holds text.

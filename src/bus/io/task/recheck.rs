@@ -10,6 +10,7 @@ use crate::{
         io::link::{Link, LinkError},
         plan::Block,
         schedule::Schedule,
+        wide_addresses::WideAddresses,
     },
     plant::{def::DeviceId, live::AddressSpan, poll_class::PollClass, tag::Poll},
 };
@@ -69,6 +70,7 @@ impl Task<'_> {
         }
         let on_line = self.def.devices.iter().filter(|device| device.line == self.line);
         let wanted = on_line.filter(|device| first.is_none_or(|first| first == device.id));
+        let wide = WideAddresses::of(&self.def, self.line);
         let requests: Vec<Block> = wanted
             .flat_map(|device| {
                 let lives = |(index, block): &(usize, &Block)| block.device == device.id && schedule.lives(*index);
@@ -77,7 +79,8 @@ impl Task<'_> {
                 let start = |table| living.iter().find(|block| block.table == table).map(|block| block.address);
                 let spans =
                     if living.is_empty() { vec![] } else { self.unreadable.refused_requests(device.unit, start) };
-                spans.into_iter().map(|span| request(device.id, device.unit, span))
+                let wide = &wide;
+                spans.into_iter().map(move |span| request(device.id, device.unit, span, wide))
             })
             .collect();
         let Some(block) = requests.get(self.recheck.tried % requests.len().max(1)) else { return Ok(()) };
@@ -101,7 +104,9 @@ impl Task<'_> {
 }
 
 /// A read of which nothing is shown.
-fn request(device: DeviceId, unit: u8, AddressSpan { table, address, count }: AddressSpan) -> Block {
+fn request(device: DeviceId, unit: u8, span: AddressSpan, wide: &WideAddresses) -> Block {
+    let AddressSpan { table, address, count } = span;
+    let address_words = wide.address_words(unit, table, address, count);
     let (poll, class) = (Poll::Never, PollClass::Background);
-    Block { device, unit, table, address, count, tags: [].into(), poll, class, alignment: 1 }
+    Block { device, unit, table, address, count, tags: [].into(), poll, class, alignment: 1, address_words }
 }

@@ -337,7 +337,7 @@ fn write_request(tag: &TagDef, raw: Exact) -> Option<Pdu> {
             Some(match (words.as_slice(), tag.write_fc) {
                 ([word], None | Some(6)) => Pdu::write_register(address, *word),
                 (words, Some(23)) => Pdu::write_and_read(address, words),
-                (words, _) => Pdu::write_registers(address, words),
+                (words, _) => Pdu::write_addresses(address, point.kind.address_words(), words),
             })
         }
         Table::Input => None,

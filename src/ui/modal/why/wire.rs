@@ -147,7 +147,7 @@ pub(super) fn point(def: &TagDef) -> String {
     };
     let order = match (point.table.is_bits(), point.order) {
         (true, _) => "",
-        (false, ByteOrder::Abcd | ByteOrder::Cdab) if point.kind.registers() == 1 => "",
+        (false, ByteOrder::Abcd | ByteOrder::Cdab) if point.kind.words() == 1 => "",
         (false, ByteOrder::Abcd) if def.is_text() => t!(" ABCD (high byte first)"),
         (false, ByteOrder::Abcd) => t!(" ABCD (high word first)"),
         (false, ByteOrder::Cdab) => t!(" CDAB (low word first)"),
