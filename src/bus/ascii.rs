@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::{frame, framing::FrameMatch};
 use crate::plant::{
     def::Framing,
-    event::Fault,
+    fault::Fault,
     number::{to_u8, to_u16},
 };
 

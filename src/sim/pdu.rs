@@ -9,7 +9,7 @@ use crate::{
         names,
         pdu::{self, Item, MEI_IDENTIFICATION},
     },
-    plant::{def::Limits, event::ExceptionCode, number::to_u8, tag::Table},
+    plant::{def::Limits, fault::ExceptionCode, number::to_u8, tag::Table},
 };
 
 /// What a device has behind its addresses. A write of several is tried on a copy, so one bad value refuses the whole block.

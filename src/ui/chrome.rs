@@ -26,8 +26,8 @@ use crate::plant::{
     command::{CommandKind, NotConfirmed, Outcome},
     commands::alarm_action,
     def::LineDef,
-    event::LineState,
     exact::Exact,
+    line_state::LineState,
     number::to_u16,
 };
 

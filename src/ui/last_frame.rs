@@ -13,7 +13,7 @@ use super::{
     tabs::{Tab, alarms::actions},
 };
 use crate::{
-    plant::{def::AlarmId, snapshot::ActiveAlarm},
+    plant::{alarm::ActiveAlarm, def::AlarmId},
     t,
 };
 

@@ -27,7 +27,7 @@ use sightglass::{
         def::{AlarmId, ProcedureId, TagId},
         procedure::{ProcedureRun, ProcedureState},
         sample::{Quality, Sample},
-        station::StationFault,
+        station_fault::StationFault,
         tag::Poll,
     },
     profile::{self, Search},

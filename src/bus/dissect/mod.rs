@@ -19,7 +19,7 @@ use std::ops::Range;
 
 use self::{envelope::Envelope, reader::Reader};
 use super::{frame, names, pdu, request_lint};
-use crate::plant::{event::Fault, line::Framing, traffic::Frame};
+use crate::plant::{fault::Fault, line::Framing, traffic::Frame};
 
 pub use envelope::{message_of, recognise};
 

@@ -5,7 +5,7 @@ use tokio::time::Instant;
 use super::clock::Clock;
 use crate::{
     bus::{late_reply::LineReplies, other_master::OtherMaster, plan::Block, request_gap::RequestGaps},
-    plant::{def::LineDef, event::LineCounters, line_finding::OtherMasterHeard, number::to_u16},
+    plant::{def::LineDef, line_finding::OtherMasterHeard, line_state::LineCounters, number::to_u16},
 };
 
 /// What a line remembers from one opening of its port to the next.

@@ -5,12 +5,8 @@ use crate::t;
 use crate::text::translate;
 use crate::{
     plant::{
-        alarm::AlarmState,
-        def::Priority,
-        event::LineState,
-        ne107::Reason,
-        snapshot::{ActiveAlarm, DeviceState},
-        time::elapsed,
+        alarm::ActiveAlarm, alarm::AlarmState, def::Priority, line_state::DeviceState, line_state::LineState,
+        ne107::Reason, time::elapsed,
     },
     ui::{
         modal::{

@@ -6,7 +6,7 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
 use crate::{
-    plant::{command::CommandKind, def::DeviceId, event::LineState, snapshot::DeviceState},
+    plant::{command::CommandKind, def::DeviceId, line_state::DeviceState, line_state::LineState},
     ui::{
         UiAction, ViewContext, rights,
         widgets::{

@@ -24,8 +24,8 @@ mod tests;
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        alarm::{ActiveAlarm, SuppressedAlarm},
         def::{AlarmClass, AlarmId, Priority, Subject},
-        snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
         layout::Size,

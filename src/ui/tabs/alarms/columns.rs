@@ -3,7 +3,7 @@
 use super::{Alarms, guidance, list::AlarmRow};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{def::Subject, snapshot::ActiveAlarm},
+    plant::{alarm::ActiveAlarm, def::Subject},
     ui::{chrome, layout::Size, modal::reason::subject},
 };
 

@@ -5,7 +5,7 @@ use ratatui::style::Modifier;
 use super::{Alarms, Page, columns::AlarmColumns, guidance, handover::suppressed_words, list::AlarmRow, on_page, side};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{def::AlarmId, snapshot::ActiveAlarm},
+    plant::{alarm::ActiveAlarm, def::AlarmId},
     ui::{chrome::history_text, layout::Size, preferences::Bell},
 };
 

@@ -17,7 +17,7 @@ use crate::{
     },
     plant::{
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, PatternTally},
-        event::Fault,
+        fault::Fault,
         number::to_u32,
         port_signals::PortSignals,
         sweep::{SweptOutcome, SweptRange},

@@ -10,7 +10,7 @@ use crate::{
     plant::{
         command::{CommandId, Outcome, Refusal},
         diagnostics::{Diagnostic, DiagnosticState, Finding, RegisterWrite},
-        event::ExceptionCode,
+        fault::ExceptionCode,
         live::number,
         scale,
         tag::{ByteOrder, DataType, Encoding, Point, Table},
