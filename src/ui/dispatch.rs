@@ -62,7 +62,7 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return session_lock::on_typed(model, event);
     }
     let hears = |key: &GlobalKey| key.reaches(Reach::Small) || !model.small();
-    if let Some(key) = global::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some()).filter(hears) {
+    if let Some(key) = global::find(replay_keys::KEYS, event).filter(|_| model.replay.shown().is_some()).filter(hears) {
         let actions = key.press(model);
         return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
     }
@@ -137,16 +137,6 @@ fn go(model: &mut Model, target: Target) -> Vec<UiAction> {
     palette::actions(&model.cx(), target)
 }
 
-/// Closes what lies on top of the first page of the tab; `false` if nothing does.
-pub(super) fn step_back(model: &mut Model) -> bool {
-    let mut closed = false;
-    with_tabs(model, |tabs, cx| {
-        closed = tabs.shown_mut().back(cx);
-        Vec::new()
-    });
-    closed
-}
-
 /// The screen has another size: a tab that it has no room for gives way to the values, as long as these are offered.
 pub(super) fn fit_screen(model: &mut Model) {
     if Size::of(model.screen) == Size::Compact && !model.tabs.shown.is_compact() {
@@ -183,7 +173,7 @@ fn close_covered_picture(model: &mut Model) {
         || model.tabs.shown != Tab::Trends
         || model.small()
         || model.replay.page().is_some()
-        || session_lock::is_closed(&model.session)
+        || rights::is_closed(&model.session)
         || model.tabs.trends.pictured && model.tabs.trends.picture(&model.cx()).is_none();
     if covers {
         close_picture(model);

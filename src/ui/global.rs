@@ -4,16 +4,16 @@ use crossterm::event::{KeyCode, KeyEvent};
 
 use super::{
     Effect, Model, UiAction,
-    context::with_replay,
-    dispatch::step_back,
     keys::{Chord, Hint, char, code, ctrl},
     last_frame,
-    modal::{Modal, Palette, TerminalSettings},
+    modal::{Modal, Palette, TerminalSettings, instant},
+    model_context::{with_replay, with_tabs},
     replay::{self, Replay},
-    screen_dump, session_lock,
+    rights, screen_dump,
     tabs::{Tab, alarms::actions},
 };
 use crate::{
+    access::SessionRequest,
     plant::{alarm::AlarmCommand, command::CommandKind},
     t,
 };
@@ -103,7 +103,7 @@ impl GlobalKey {
                 model.note = Some(replay::refused().into());
                 Vec::new()
             }
-            (Rule::Unlocked, _) if session_lock::is_closed(&model.session) => Vec::new(),
+            (Rule::Unlocked, _) if rights::is_closed(&model.session) => Vec::new(),
             (_, Does::Show(tab)) => show(model, tab),
             (_, Does::Run(run)) => run(model),
         }
@@ -148,8 +148,7 @@ const KEYS: &[GlobalKey] = &[
     })
     .unlocked(),
     GlobalKey::new(char('\''), "", "bookmarks: past times that were kept under a name", list_bookmarks).unlocked(),
-    GlobalKey::new(ctrl('k'), "", "lock this terminal; works in every window", |model| session_lock::lock(model))
-        .reach(Reach::Windows),
+    GlobalKey::new(ctrl('k'), "", "lock this terminal; works in every window", lock).reach(Reach::Windows),
     GlobalKey::new(char('L'), "", "change the language of the screens", next_language).reach(Reach::Small),
     GlobalKey::new(ctrl('t'), "", "change the language, in every window too", next_language).reach(Reach::Windows),
     GlobalKey::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", silence).of_present(),
@@ -224,6 +223,16 @@ fn dismiss(model: &mut Model) -> Vec<UiAction> {
     Vec::new()
 }
 
+/// Closes what lies on top of the first page of the tab; `false` if nothing does.
+pub(super) fn step_back(model: &mut Model) -> bool {
+    let mut closed = false;
+    with_tabs(model, |tabs, cx| {
+        closed = tabs.shown_mut().back(cx);
+        Vec::new()
+    });
+    closed
+}
+
 fn open_palette(model: &mut Model) -> Vec<UiAction> {
     let palette = Palette::new(&model.cx(), model.tabs.shown(), model.bookmarks(), &model.recent);
     vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
@@ -240,6 +249,12 @@ fn list_bookmarks(model: &mut Model) -> Vec<UiAction> {
 
 fn next_language(model: &mut Model) -> Vec<UiAction> {
     vec![UiAction::SetLocale(model.locale().language.next().locale())]
+}
+
+/// Locks at once if a user is logged in.
+fn lock(model: &mut Model) -> Vec<UiAction> {
+    let may = model.session.who.is_some() && !model.session.locked;
+    if may { vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)] } else { Vec::new() }
 }
 
 /// Asks for a past instant, to show it on the tab.
@@ -262,13 +277,13 @@ fn on_past(model: &mut Model, page: bool) -> Vec<UiAction> {
         None => {
             let of_alarms = model.tabs.shown == Tab::Alarms;
             let place = if page {
-                replay::Place::Page
+                instant::Place::Page
             } else if of_alarms {
-                replay::Place::TabOrPage
+                instant::Place::TabOrPage
             } else {
-                replay::Place::Tab
+                instant::Place::Tab
             };
-            vec![UiAction::Open(replay::ask_instant(&cx, tab, place))]
+            vec![UiAction::Open(instant::ask_instant(&cx, tab.moment(&cx), place))]
         }
     }
 }

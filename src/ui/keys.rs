@@ -291,7 +291,7 @@ mod tests {
     use crate::ui::{
         fixture::{Fixture, with_cx},
         global::{self, GlobalKey},
-        replay,
+        replay_keys,
         tabs::Tab,
     };
 
@@ -299,7 +299,7 @@ mod tests {
         let chords_of = |table: &[GlobalKey]| table.iter().map(|key| key.chord()).collect::<Vec<_>>();
         // These mean the same in the past: a time is asked for, a step is made, and Esc leads back.
         let same = [char('@'), char('['), char(']'), code(KeyCode::Esc)];
-        let replayed = chords_of(replay::KEYS).into_iter().filter(|chord| !same.contains(chord));
+        let replayed = chords_of(replay_keys::KEYS).into_iter().filter(|chord| !same.contains(chord));
         let all: Vec<Chord> = chords.into_iter().chain(chords_of(&global::keys())).chain(replayed).collect();
         for (n, chord) in all.iter().enumerate() {
             assert!(!all[..n].contains(chord), "{name}: {} means two things", chord.name());

@@ -6,20 +6,9 @@ mod tests;
 use crossterm::event::KeyCode;
 use ratatui::{Terminal, backend::TestBackend, layout::Position, style::Modifier};
 
-use super::{Model, UiAction, chrome, context::with_tabs, dispatch::on_key, keys, last_frame, layout};
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pointer {
-    /// Its left button went down.
-    Press(Position),
-    /// It moved with the left button down.
-    Drag(Position),
-    /// The wheel turned towards the user, or away.
-    Wheel {
-        /// Towards.
-        down: bool,
-    },
-}
+use super::{
+    Model, UiAction, chrome, dispatch::on_key, keys, last_frame, layout, model_context::with_tabs, msg::Pointer,
+};
 
 pub(super) fn on_pointer(model: &mut Model, pointer: Pointer) -> Vec<UiAction> {
     if !model.preferences.mouse || model.small() {

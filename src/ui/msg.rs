@@ -4,13 +4,13 @@ use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use crossterm::event::KeyEvent;
 use jiff::{SignedDuration, Timestamp};
+use ratatui::layout::Position;
 
 use super::{
     extension::{Extension, ExtensionMessage},
     modal::Modal,
-    mouse::Pointer,
     preferences::{Kept, Preferences, PreferencesFile},
-    tabs::{Tab, registers::Start},
+    tabs::Tab,
 };
 use crate::{
     access::{Credentials, Durability, SessionRequest, SessionStatus},
@@ -21,6 +21,8 @@ use crate::{
         request_refusal::RequestRefusal,
         snapshot::Snapshot,
     },
+    register_map::named::Named,
+    report::value_log::reader::ValueLog,
     text::Locale,
 };
 
@@ -63,6 +65,32 @@ pub enum Msg {
     Tick {
         /// Real time since the last snapshot.
         silent: Duration,
+    },
+}
+
+/// What the tab of the registers begins with.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Start {
+    pub watch: Vec<Named>,
+    /// Where it is logged.
+    pub log: Option<PathBuf>,
+    /// Time between two reads.
+    pub every: Option<SignedDuration>,
+    /// A log to look at instead of a device, and what it is called.
+    pub shown: Option<(String, ValueLog)>,
+}
+
+/// What the mouse does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pointer {
+    /// Its left button went down.
+    Press(Position),
+    /// It moved with the left button down.
+    Drag(Position),
+    /// The wheel turned towards the user, or away.
+    Wheel {
+        /// Towards.
+        down: bool,
     },
 }
 

@@ -29,6 +29,7 @@ use crate::{
         rights,
         tabs::mimic,
         widgets::{
+            actuator_mark,
             text::{age, clock, fit, pad, width},
             value,
         },
@@ -142,7 +143,7 @@ impl Faceplate {
             let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
             let left = canvas.width().saturating_sub(x + 2);
             let x = canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
-            if let Some((words, style)) = interlock::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
+            if let Some((words, style)) = actuator_mark::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
                 let left = canvas.width().saturating_sub(x + 2);
                 canvas.text(x + 2, y, &fit(&words, left), style);
             }

@@ -10,7 +10,7 @@ use crate::ui::{
     ViewContext,
     global::{self, GlobalKey},
     keys::Hint,
-    replay,
+    replay_keys,
     tabs::{Tab, Tabs},
     widgets::{
         list::{Motion, first, on_screen},
@@ -40,7 +40,7 @@ fn rows(cx: &ViewContext, tabs: &Tabs) -> Vec<Hint> {
     let offered = Tab::offered(cx);
     let there = global::keys().into_iter().filter(|key| key.tab().is_none_or(|tab| offered.contains(&tab)));
     let heading = |text: &str| Hint::new("", text, "");
-    let replayed = replay::KEYS.iter().copied().map(GlobalKey::hint);
+    let replayed = replay_keys::KEYS.iter().copied().map(GlobalKey::hint);
     let past = [heading(""), heading(t!("past"))].into_iter().chain(replayed).filter(|_| cx.is_past());
     let own = own.into_iter().filter(|hint| !hint.help.is_empty());
     [heading(translate(tabs.shown.title()))]

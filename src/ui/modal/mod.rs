@@ -9,6 +9,7 @@ pub(crate) mod faceplate;
 pub(crate) mod form;
 pub(crate) mod guidance;
 pub(crate) mod help;
+pub(crate) mod instant;
 pub(crate) mod line;
 pub(crate) mod notice;
 pub(crate) mod palette;

@@ -10,7 +10,7 @@ use nucleo_matcher::{
 };
 use ratatui::{Frame, layout::Rect};
 
-use super::{Faceplate, Guidance, Modal, Next, line::Line, window};
+use super::{Faceplate, Guidance, Modal, Next, instant, line::Line, window};
 use crate::{
     plant::{
         def::{AlarmId, DeviceId, ProcedureId, TagId},
@@ -25,7 +25,6 @@ use crate::{
         layout::Size,
         modal::reason::subject,
         preferences::Bookmark,
-        replay,
         tabs::{Tab, TabView, alarms},
         widgets::{
             list::{Motion, first, on_screen},
@@ -254,13 +253,13 @@ fn instant(cx: &ViewContext, text: &str) -> Option<Found> {
     // A bench has no history, the smallest screen no row that says that a past is shown.
     let has_past = !cx.def().is_bench() && Size::Compact < cx.size;
     let at = (has_past && text.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
-        .then(|| replay::instant(cx, text).ok())??;
-    Some(Found::new(Target::Instant(at), t!("time"), &replay::stamp(cx, at), t!("replay")))
+        .then(|| instant::instant(cx, text).ok())??;
+    Some(Found::new(Target::Instant(at), t!("time"), &instant::stamp(cx, at), t!("replay")))
 }
 
 fn bookmark_rows<'a>(cx: &'a ViewContext, bookmarks: &'a [Bookmark]) -> impl DoubleEndedIterator<Item = Found> + 'a {
     let row = |mark: &Bookmark| {
-        Found::new(Target::Bookmark(mark.at), t!("bookmark"), &mark.name, &replay::stamp(cx, mark.at))
+        Found::new(Target::Bookmark(mark.at), t!("bookmark"), &mark.name, &instant::stamp(cx, mark.at))
     };
     bookmarks.iter().map(row)
 }

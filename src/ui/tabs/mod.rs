@@ -9,6 +9,7 @@ mod listing;
 mod overlay;
 mod periodic_query;
 mod prelude;
+mod rows;
 pub(crate) mod registers;
 pub(crate) mod faults;
 pub(crate) mod login;
@@ -28,13 +29,13 @@ use ratatui::{
 
 pub use listing::ListPage;
 pub use periodic_query::{Answered, Queries};
+pub use rows::Rows;
 
 use super::{
     Effect, UiAction, ViewContext,
     keys::{self, Hint, Keys},
-    last_frame::Rows,
     layout::Size,
-    session_lock,
+    rights,
 };
 use crate::{
     access::{SessionRequest, audit_log::sha256},
@@ -74,7 +75,7 @@ pub trait TabView: Keyed {
     where
         Self: Sized,
     {
-        !session_lock::is_closed(cx.session)
+        !rights::is_closed(cx.session)
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect);

@@ -11,7 +11,7 @@ pub(super) use ratatui::{
 };
 
 pub(super) use super::{
-    KeyTable, Keyed, Tab, TabView,
+    KeyTable, Keyed, Rows, Tab, TabView,
     draw::{self, around, open, row_style},
     listing::{self, Column, Heading, List, ListPage, Listing, left, rest, right},
     periodic_query::{Answered, Asked, FromAnswer, PeriodicQuery, Queries, real},
@@ -33,7 +33,6 @@ pub(super) use crate::{
     ui::{
         UiAction, ViewContext,
         keys::{self, Below, Hint, Keys, Offer, char, code},
-        last_frame::Rows,
         modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why},
         widgets::{
             list::{self, Motion, Scroll, Selected, Words, first, motions, on_screen},

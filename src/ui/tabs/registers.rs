@@ -29,7 +29,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 #[cfg(test)]
 pub use self::keys::chords_of_page;
-pub use self::watch::start::{Start, parse_all as parse_watched};
+pub use self::watch::start::parse_all as parse_watched;
 use self::{cells::Cells, recognise::Recognition};
 use crate::ui::tabs::prelude::*;
 use crate::{

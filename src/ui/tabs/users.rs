@@ -11,7 +11,7 @@ use crate::{
     access::UserRow,
     ui::{
         modal::{UserForm, user_form::Purpose},
-        rights, session_lock,
+        rights,
     },
 };
 
@@ -94,7 +94,7 @@ impl TabView for Users {
 
     fn is_offered(cx: &ViewContext) -> bool {
         let supervisor = cx.session.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
-        !session_lock::is_closed(cx.session) && supervisor
+        !rights::is_closed(cx.session) && supervisor
     }
 }
 
