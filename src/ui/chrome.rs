@@ -50,7 +50,7 @@ pub fn view(model: &Model, frame: &mut Frame) {
     if let Some(modal) = &model.modal {
         // On the smallest screen a window has all rows below the banner but that of the keys.
         let room = if cx.size <= Size::Compact { parts.body.union(parts.status) } else { parts.body };
-        modal.view(cx, &model.tabs, frame, room);
+        modal.view(cx, frame, room);
     }
 }
 

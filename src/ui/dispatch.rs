@@ -1,7 +1,9 @@
 //! What a key does: of a window, of the replay, of every tab, or of the shown tab.
 
 use super::*;
+use crate::text::translate;
 use global::{GlobalKey, Reach};
+use keys::Hint;
 use modal::{Next, Notice};
 use widgets::list::Motion;
 
@@ -114,6 +116,30 @@ fn on_tab_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         model.note = Some(t!("This key does nothing here. ? lists the keys, : goes to anything by its name").into());
     }
     actions
+}
+
+/// Fills in the list of all keys while it is shown.
+pub(super) fn list_keys(model: &mut Model) {
+    if !matches!(model.modal, Some(Modal::Help(_))) {
+        return;
+    }
+    let (cx, tab) = (model.cx(), model.tabs.shown);
+    let heading = |text: &str| Hint::new("", text, "");
+    let own = model.tabs.shown().hints(&cx).into_iter().filter(|hint| !hint.help.is_empty());
+    let replayed = replay_keys::KEYS.iter().copied().map(GlobalKey::hint);
+    let past = [heading(""), heading(t!("past"))].into_iter().chain(replayed).filter(|_| cx.is_past());
+    let offered = Tab::offered(&cx);
+    let there = global::keys().into_iter().filter(|key| key.tab().is_none_or(|tab| offered.contains(&tab)));
+    let rows = [heading(translate(tab.title()))]
+        .into_iter()
+        .chain(own)
+        .chain(past)
+        .chain([heading(""), heading(t!("every tab"))])
+        .chain(there.map(GlobalKey::hint))
+        .collect();
+    if let Some(Modal::Help(help)) = &mut model.modal {
+        help.rows = rows;
+    }
 }
 
 /// What was chosen in the palette or in the help.

@@ -11,6 +11,9 @@ use super::theme::Theme;
 pub trait Extension: Any + Debug + Send + Sync {
     /// Parts of the header, each with its rank: the greatest is left out first.
     fn header(&self, theme: &Theme) -> Vec<(usize, String, Style)>;
+
+    /// Is its tab offered?
+    fn has_tab(&self) -> bool;
 }
 
 /// The state of the extension, if it is of this type.

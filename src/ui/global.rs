@@ -6,11 +6,11 @@ use super::{
     Effect, Model, UiAction,
     keys::{Chord, Hint, char, code, ctrl},
     last_frame,
-    modal::{Modal, Palette, TerminalSettings, instant},
+    modal::{Help, Modal, Palette, TerminalSettings, instant},
     model_context::{with_replay, with_tabs},
     replay::{self, Replay},
     rights, screen_dump,
-    tabs::{Tab, alarms::actions},
+    tabs::{Tab, alarms::actions, draw::around},
 };
 use crate::{
     access::SessionRequest,
@@ -77,6 +77,7 @@ impl GlobalKey {
         GlobalKey { rule: Rule::Unlocked, ..self }
     }
 
+    #[cfg(test)]
     pub fn chord(self) -> Chord {
         self.chord
     }
@@ -171,7 +172,7 @@ const KEYS: &[GlobalKey] = &[
     GlobalKey::new(ctrl('c'), "", "quit (asks first)", |_| vec![UiAction::Leave]).reach(Reach::Typed),
     GlobalKey::new(char('q'), "quit", "quit (asks first, and lists what stops)", |_| vec![UiAction::Leave])
         .reach(Reach::Small),
-    GlobalKey::new(char('?'), "help", "all keys", |_| vec![UiAction::Open(Modal::Help(0))]),
+    GlobalKey::new(char('?'), "help", "all keys", |_| vec![UiAction::Open(Modal::Help(Help::default()))]),
 ];
 
 fn show(model: &mut Model, tab: Tab) -> Vec<UiAction> {
@@ -189,7 +190,9 @@ fn show(model: &mut Model, tab: Tab) -> Vec<UiAction> {
 
 /// Shows the tab so many further on.
 fn step(model: &mut Model, by: isize) -> Vec<UiAction> {
-    vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), by))]
+    let offered = Tab::offered(&model.cx());
+    let place = offered.iter().position(|tab| *tab == model.tabs.shown).unwrap_or(0);
+    vec![UiAction::Show(offered[around(place, by, offered.len())])]
 }
 
 /// Shows the tab before, or after it again.
@@ -234,7 +237,10 @@ pub(super) fn step_back(model: &mut Model) -> bool {
 }
 
 fn open_palette(model: &mut Model) -> Vec<UiAction> {
-    let palette = Palette::new(&model.cx(), model.tabs.shown(), model.bookmarks(), &model.recent);
+    let (cx, here) = (model.cx(), [PALETTE, PALETTE_TOO]);
+    let global = KEYS.iter().filter(|key| !here.contains(&key.chord)).map(|key| key.hint());
+    let keys = model.tabs.shown().hints(&cx).into_iter().chain(global).collect();
+    let palette = Palette::new(&cx, keys, model.bookmarks(), &model.recent);
     vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
 }
 

@@ -6,15 +6,17 @@ pub mod theme;
 pub(crate) mod preferences;
 pub(crate) mod extension;
 mod context;
+pub(crate) mod keys;
+pub(crate) mod rights;
+pub(crate) mod tab;
 pub(crate) mod msg;
 pub(crate) mod bell;
-pub(crate) mod keys;
 pub(crate) mod line_state;
-pub(crate) mod rights;
 pub(crate) mod glyph_filter;
 pub(crate) mod widgets;
 pub(crate) mod interlock;
 pub(crate) mod modal;
+pub(crate) mod key_table;
 pub(crate) mod screen_dump;
 mod alarm_text;
 mod command_text;
@@ -62,8 +64,9 @@ use graphics::Picture;
 pub use last_command::LastCommand;
 use last_frame::LastFrame;
 use layout::Size;
+pub use modal::UiAction;
 use modal::{Confirm, Modal, Target, palette};
-pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
+pub use msg::{Effect, Leaving, Msg, QueryId};
 use preferences::{Bell, Preferences, PreferencesFile};
 use replay::Replay;
 use screen_dump::ScreenDump;
@@ -233,7 +236,10 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
-    model.locale().within(|| on_msg(model, msg))
+    let effects = model.locale().within(|| on_msg(model, msg));
+    // In the language that the message may have chosen.
+    model.locale().within(|| dispatch::list_keys(model));
+    effects
 }
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {

@@ -92,7 +92,7 @@ fn rows(model: &Model) -> Vec<Row> {
     let cx = super::ViewContext { phase: 2, ..model.cx() };
     let body = layout::layout(model.screen).body;
     let Ok(_) = terminal.draw(|frame| match &model.modal {
-        Some(modal) => modal.view(&cx, &model.tabs, frame, body),
+        Some(modal) => modal.view(&cx, frame, body),
         None => model.tabs.shown().view(&cx, frame, body),
     });
     let cells = terminal.backend().buffer().content.chunks(usize::from(width.max(1)));

@@ -20,12 +20,12 @@ use crate::{
     text::{searchable, translate},
     ui::{
         UiAction, ViewContext,
-        global::{self, GlobalKey},
-        keys::{self, Chord},
+        keys::{self, Chord, Hint},
         layout::Size,
         modal::reason::subject,
         preferences::Bookmark,
-        tabs::{Tab, TabView, alarms},
+        tab::Tab,
+        tabs::alarms,
         widgets::{
             list::{Motion, first, on_screen},
             text::{fit, pad, width},
@@ -121,9 +121,9 @@ pub struct Palette {
 }
 
 impl Palette {
-    /// Everything that there is, what was chosen before at first.
-    pub fn new(cx: &ViewContext, tab: &dyn TabView, bookmarks: &[Bookmark], recent: &[Target]) -> Palette {
-        let mut rows = rows(cx, tab);
+    /// Everything that there is, with the keys of the moment; what was chosen before at first.
+    pub fn new(cx: &ViewContext, keys: Vec<Hint>, bookmarks: &[Bookmark], recent: &[Target]) -> Palette {
+        let mut rows = rows(cx, keys);
         rows.extend(bookmark_rows(cx, bookmarks));
         let place = |row: &Found| recent.iter().position(|target| *target == row.target).unwrap_or(recent.len());
         rows.sort_by_key(place);
@@ -264,7 +264,7 @@ fn bookmark_rows<'a>(cx: &'a ViewContext, bookmarks: &'a [Bookmark]) -> impl Dou
     bookmarks.iter().map(row)
 }
 
-fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Found> {
+fn rows(cx: &ViewContext, keys: Vec<Hint>) -> Vec<Found> {
     let def = cx.def();
     let tabs = Tab::offered(cx).into_iter();
     let tabs = tabs.map(|tab| Found::new(Target::Tab(tab), t!("tab"), translate(tab.title()), translate(tab.help())));
@@ -279,10 +279,7 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Found> {
     let active = cx.snapshot.alarms.iter().map(|active| alarm(active.id, translate(active.state.word())));
     let is_active = |id: AlarmId| cx.snapshot.alarms.iter().any(|active| active.id == id);
     let others = def.alarms.iter().filter(|def| !is_active(def.id)).map(|def| alarm(def.id, ""));
-    let here = [global::PALETTE, global::PALETTE_TOO];
-    let global = global::keys().into_iter().filter(|key| key.tab().is_none() && !here.contains(&key.chord()));
-    let global = global.map(GlobalKey::hint);
-    let keys = tab.hints(cx).into_iter().chain(global).filter_map(|hint| {
+    let keys = keys.into_iter().filter_map(|hint| {
         let help = if hint.help.is_empty() { &hint.label } else { &hint.help };
         Some(Found::new(Target::Key(hint.chord?), t!("key"), &hint.key, help))
     });

@@ -163,7 +163,7 @@ impl KeyTable for Alarms {
     }
 
     #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
+    fn chords() -> crate::ui::key_table::PageChords {
         Page::ALL.map(|page| (page.title(), keys::table(page).chords())).to_vec()
     }
 }

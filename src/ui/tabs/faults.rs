@@ -32,7 +32,7 @@ pub struct Faults {
     verdict: bool,
 }
 
-type Key = crate::ui::keys::Key<Faults>;
+type Key = crate::ui::key_table::Key<Faults>;
 
 const KEYS: &[Key] = &[
     Key::change(code(KeyCode::Up), "", "select the fault above", |faults, cx| faults.step(cx, -1)),
@@ -65,10 +65,6 @@ impl TabView for Faults {
     fn new(_snapshot: &Snapshot) -> Faults {
         Faults::default()
     }
-
-    fn is_offered(cx: &ViewContext) -> bool {
-        !rights::is_closed(cx.session) && open(cx).is_some()
-    }
 }
 
 impl KeyTable for Faults {
@@ -77,7 +73,7 @@ impl KeyTable for Faults {
     }
 
     #[cfg(test)]
-    fn chords() -> keys::PageChords {
+    fn chords() -> key_table::PageChords {
         vec![("faults", Keys::of(&[KEYS]).chords())]
     }
 }
@@ -132,6 +128,11 @@ impl Faults {
 impl Extension for Status {
     fn header(&self, theme: &Theme) -> Vec<(usize, String, Style)> {
         [demo_part(theme, self)].into_iter().chain(result_part(theme, self)).collect()
+    }
+
+    /// An exam hides it.
+    fn has_tab(&self) -> bool {
+        self.is_open()
     }
 }
 

@@ -156,7 +156,7 @@ impl KeyTable for Mimic {
     }
 
     #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
+    fn chords() -> crate::ui::key_table::PageChords {
         vec![("mimic", Keys::of(&[keys::KEYS]).chords())]
     }
 }

@@ -32,10 +32,11 @@ pub(super) use crate::{
     text::translate,
     ui::{
         UiAction, ViewContext,
-        keys::{self, Below, Hint, Keys, Offer, char, code},
+        key_table::{self, Below, Keys, Offer, motions},
+        keys::{self, Hint, char, code},
         modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why},
         widgets::{
-            list::{self, Motion, Scroll, Selected, Words, first, motions, on_screen},
+            list::{self, Motion, Scroll, Selected, Words, first, on_screen},
             text::{self, Canvas, clock, fit, fit_words, moment, pad, pad_left, running, width, wrap},
             value,
         },

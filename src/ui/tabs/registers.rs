@@ -174,10 +174,6 @@ impl TabView for Registers {
     }
 
     /// Where a plant file says what the registers mean, the other tabs show them.
-    fn is_offered(cx: &ViewContext) -> bool {
-        cx.def().is_bench()
-    }
-
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
         self.list(cx).map_or_else(|| view::copied(self, cx), |list| list.copied(cx))
     }

@@ -12,7 +12,7 @@ use crate::{
     },
 };
 
-type Key = crate::ui::keys::Key<Mimic>;
+type Key = crate::ui::key_table::Key<Mimic>;
 
 /// Keys of this tab; [`PLANT`] lists the four arrows as one.
 pub(super) const KEYS: &[Key] = &[
