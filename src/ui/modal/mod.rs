@@ -14,6 +14,7 @@ pub(crate) mod instant;
 pub(crate) mod line;
 pub(crate) mod notice;
 pub(crate) mod palette;
+pub(crate) mod plant_command;
 pub(crate) mod prompt;
 pub(crate) mod reason;
 pub(crate) mod confirmed_value;

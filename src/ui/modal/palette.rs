@@ -25,7 +25,6 @@ use crate::{
         modal::reason::subject,
         preferences::Bookmark,
         tab::Tab,
-        tabs::alarms,
         widgets::{
             list::{Motion, first, on_screen},
             text::{fit, pad, width},
@@ -315,7 +314,7 @@ pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
             vec![UiAction::ShowOnTrends(tag, (before, cx.now))]
         }
         Target::Alarm(id) => {
-            let faceplate = alarms::faceplate(cx, cx.def().alarm(id).subject);
+            let faceplate = Faceplate::of(cx, cx.def().alarm(id).subject);
             vec![UiAction::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate))))]
         }
         Target::Key(_) => Vec::new(),

@@ -27,13 +27,9 @@ use crate::{
         def::{AlarmClass, AlarmId, Priority, Subject},
         snapshot::{ActiveAlarm, SuppressedAlarm},
     },
-    ui::{
-        layout::Size,
-        modal::{Guidance, faceplate::device_text},
-    },
+    ui::{layout::Size, modal::Guidance},
 };
 use filter::{Filter, Sort};
-pub use go::faceplate;
 use handover::Handover;
 pub(in crate::ui) use handover::NO_CHANGE;
 pub use handover::suppressed_words;

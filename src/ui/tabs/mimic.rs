@@ -2,7 +2,6 @@
 
 mod attention;
 mod cards;
-mod command;
 mod companions;
 mod forecast;
 mod keys;
@@ -18,7 +17,6 @@ mod totals;
 #[cfg(test)]
 mod tests;
 
-pub use command::command_of;
 use companions::{Companions, Parts, parts};
 use neighbour::neighbour;
 use overview::Overview;
