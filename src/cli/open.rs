@@ -19,7 +19,7 @@ use crate::{
     },
     profile::{self, OwnProfiles, Search},
     station::io as station,
-    ui::{self, tabs::registers::Start},
+    ui::{self, msg::Start},
 };
 
 /// The usual baud rates and parities, the most frequent first.

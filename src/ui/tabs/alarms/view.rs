@@ -6,7 +6,7 @@ use super::{Alarms, Page, columns::AlarmColumns, guidance, handover::suppressed_
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{alarm::ActiveAlarm, def::AlarmId},
-    ui::{chrome::history_text, layout::Size, preferences::Bell},
+    ui::{alarm_text::history_text, layout::Size, preferences::Bell},
 };
 
 /// Rows above the list: views, filter, headings.

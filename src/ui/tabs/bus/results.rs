@@ -7,7 +7,7 @@ use super::{
     rows::{Spans, plain},
     window::{dissection_rows, exchange_rows},
 };
-use crate::ui::{chrome::outcome_words, tabs::prelude::*};
+use crate::ui::{command_text::outcome_words, tabs::prelude::*};
 use crate::{
     bus::{
         diagnostics::tally,

@@ -11,7 +11,7 @@ use crate::{
         sample::Cause,
     },
     ui::{
-        chrome::since,
+        alarm_text::since,
         modal::{
             faceplate::{device_text, line_state_text},
             reason::subject,

@@ -4,7 +4,7 @@
 mod tests;
 
 use super::{AddressSpan, Registers};
-use crate::ui::{chrome::outcome_words, tabs::prelude::*};
+use crate::ui::{command_text::outcome_words, tabs::prelude::*};
 use crate::{
     bus::codec,
     plant::{
