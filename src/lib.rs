@@ -127,7 +127,7 @@
 //! | a symbol of the mimic | its kind in `profile/picture/symbol.rs`, its item in `plant/mimic_def.rs`, its drawing in `ui/widgets/mimic` |
 //! | a theme | a column of the table in `ui/theme/palette.rs` |
 //! | a report format | its file in `report`, its row in `report/mod.rs`, its name in `plant/report.rs` |
-//! | a tab | its file in `ui/tabs`, its row in `ui/tabs/mod.rs` |
+//! | a tab | its file in `ui/tabs`, its rows in `ui/tab.rs` and `ui/tabs/mod.rs` |
 //! | a page with a list | a `Listing` in its file in `ui/tabs`, its rows in `list` and `list_mut` of the tab: see CONTRIBUTING.md |
 //! | a window with fields | a `Form` of `ui/modal/form.rs` in its window, whose fields say what may be typed or chosen |
 //! | what every list can | `ui/tabs/listing`; its key a row in `ui/tabs/listing/keys.rs` |

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use crate::plant::{
     Snapshot,
+    alarm::ActiveAlarm,
     sample::{Cause, Sample},
-    snapshot::{ActiveAlarm, DeviceStatus, LineStatus},
+    snapshot::{DeviceStatus, LineStatus},
 };
 
 /// Alarms, clock, trouble of the history, and which lines and devices are reached; no value of the process, no text, no

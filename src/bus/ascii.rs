@@ -8,7 +8,7 @@ use super::{
 };
 use crate::plant::{
     def::Framing,
-    event::Fault,
+    fault::Fault,
     number::{to_u8, to_u16},
 };
 

@@ -19,7 +19,7 @@ use crate::plant::{
     diagnostics::{
         Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, DiagnosticStep, FINDINGS_MAX, Finding, RegisterWrite,
     },
-    event::Fault,
+    fault::Fault,
     line_trouble::LineTrouble,
     live::AddressSpan,
     number::{to_u16, to_u32},

@@ -113,7 +113,7 @@ mod tests {
     use crate::{
         bus::ascii,
         plant::{
-            event::Fault,
+            fault::Fault,
             line::Framing,
             traffic::{FrameFault, FrameResult},
         },

@@ -9,7 +9,7 @@ use super::{
     ascii,
     pdu::{self, Length},
 };
-use crate::plant::{def::Framing, event::Fault, number::to_u16};
+use crate::plant::{def::Framing, fault::Fault, number::to_u16};
 
 pub use answer::{
     Request, ResponseSignature, answers, begins_answer, check_answer, expected_length, response_signature,
@@ -141,7 +141,7 @@ pub fn hex(bytes: &[u8]) -> String {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::plant::event::ExceptionCode;
+    use crate::plant::fault::ExceptionCode;
 
     #[test]
     fn the_check_value_of_the_standard() {

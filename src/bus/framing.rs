@@ -9,7 +9,7 @@ use super::{
 };
 use crate::plant::{
     def::Framing,
-    event::{ExceptionCode, Fault},
+    fault::{ExceptionCode, Fault},
     number::to_u16,
 };
 

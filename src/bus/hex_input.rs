@@ -8,7 +8,7 @@ use super::{
     request_lint::check_request,
 };
 use crate::{
-    plant::{event::Fault, line::Framing, number::to_u8},
+    plant::{fault::Fault, line::Framing, number::to_u8},
     t,
 };
 

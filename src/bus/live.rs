@@ -8,7 +8,7 @@ use jiff::Timestamp;
 
 use super::plan::{AddressRange, RangeBisection, UnreadableRanges, may_be_cut};
 use crate::plant::{
-    event::{ExceptionCode, Fault},
+    fault::{ExceptionCode, Fault},
     live::{AddressSpan, LivePart, LiveRead, LiveReading},
     number::to_u16,
     tag::Table,

@@ -35,7 +35,7 @@ use self::{
     queue::{Queue, Spot},
 };
 use super::plan::Block;
-use crate::plant::{def::DeviceId, event::ExceptionCode, tag::PollClass};
+use crate::plant::{def::DeviceId, fault::ExceptionCode, tag::PollClass};
 
 /// On an overloaded line even what is shed or always comes last is read once it has waited so long. Only a line that its
 /// critical polls alone fill to the brim gets that far.

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use super::{codec, dissect::message_of, names};
 use crate::plant::{
-    event::Fault,
     exact::Exact,
+    fault::Fault,
     line::Framing,
     tag::{DataType, Point},
     traffic::Exchange,
@@ -154,7 +154,7 @@ mod tests {
         check(point(Table::Holding, 1_002, DataType::F32), &read);
         check(point(Table::Input, 1_000, DataType::U16), &read);
         let refused = Exchange {
-            outcome: Err(Fault::Exception(crate::plant::event::ExceptionCode(2))),
+            outcome: Err(Fault::Exception(crate::plant::fault::ExceptionCode(2))),
             ..exchange(Framing::Rtu, &ASKED, &[1, 0x83, 2])
         };
         check(point(Table::Holding, 1_000, DataType::U16), &refused);

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use crate::plant::{
     Snapshot,
+    alarm::ActiveAlarm,
     alarm::{AlarmCommand, manager::subject_name},
     command::{CommandKind, Outcome},
     def::TagId,
     entry,
     exact::Exact,
-    snapshot::ActiveAlarm,
 };
 
 use super::{CliError, client, in_runtime, prompt, say};

@@ -19,7 +19,7 @@ use crate::{
     },
     profile::{self, OwnProfiles, Search},
     station::io as station,
-    ui::{self, tabs::registers::Start},
+    ui::{self, msg::Start},
 };
 
 /// The usual baud rates and parities, the most frequent first.
@@ -345,7 +345,7 @@ mod tests {
             let findings = vec![Finding::Unit { unit: 3, serial: None, reply }];
             answer(&DiagnosticRun { findings, ..job.run().clone() }).map(|(unit, ..)| unit)
         };
-        let corrupt = UnitReply::Corrupt(crate::plant::event::Fault::Timeout);
+        let corrupt = UnitReply::Corrupt(crate::plant::fault::Fault::Timeout);
         assert_eq!((found(UnitReply::Register(77)), found(corrupt)), (Some(3), None));
     }
 }

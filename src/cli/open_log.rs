@@ -10,7 +10,7 @@ use jiff::SignedDuration;
 use super::{CliError, say, span};
 use crate::{
     report::value_log::reader,
-    ui::tabs::registers::{Start, parse_watched},
+    ui::{msg::Start, tabs::registers::parse_watched},
 };
 
 /// The largest log that is read: days of values.

@@ -15,7 +15,8 @@ use crate::{
     plant::{
         PlantDef,
         def::{DeviceDef, DeviceId, LineDef, LineId, Transport},
-        event::{Fault, LineState},
+        fault::Fault,
+        line_state::LineState,
         live::{AddressSpan, LiveRead, LiveReading, ReplyTimes},
         tag::Table,
     },

@@ -188,7 +188,7 @@ mod tests {
             read,
             tests::{at, json, message},
         },
-        plant::event::Fault,
+        plant::fault::Fault,
     };
 
     fn request(id: &str, second: i64) -> Request {

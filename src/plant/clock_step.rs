@@ -8,13 +8,15 @@ use std::sync::Arc;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
+    alarm::{ActiveAlarm, SuppressedAlarm},
     alarm::{AlarmCommand, state::OperatorNote},
     command::CommandKind,
     control_run::ControlRun,
-    event::LineState,
+    line_state::DeviceState,
+    line_state::LineState,
     record::{AlarmRecord, FirstOut, Record},
     restore::Restore,
-    snapshot::{ActiveAlarm, DeviceState, DeviceStatus, LineStatus, Snapshot, SuppressedAlarm},
+    snapshot::{DeviceStatus, LineStatus, Snapshot},
     tuning::Tuning,
 };
 
@@ -165,7 +167,8 @@ mod tests {
     use crate::plant::{
         Plant,
         command::{Command, CommandId, CommandStatus, Outcome},
-        event::{Event, Fault},
+        event::Event,
+        fault::Fault,
         fixture::{self, DP, FAULT, PV, SV, TIC},
     };
 

@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 
 pub use super::id::WriteId;
 use super::{
-    alarm::AlarmCommand,
+    alarm::{ActiveAlarm, AlarmCommand},
     def::{DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::Diagnostic,
-    event::{ExceptionCode, Fault},
     exact::Exact,
+    fault::{ExceptionCode, Fault},
     procedure::ProcedureDef,
     restore::RestoreRequest,
     snapshot::Snapshot,
@@ -370,4 +370,16 @@ pub enum BusRequest {
     },
     /// Stop the running diagnostic.
     StopTest,
+}
+
+impl ActiveAlarm {
+    /// The command to acknowledge it, as it is seen here.
+    pub fn acknowledge(&self) -> CommandKind {
+        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: self.id, annunciated_at: self.annunciated_at })
+    }
+
+    /// The command to tick a step of the action, or to take its tick back.
+    pub fn tick(&self, step: u8, done: bool) -> CommandKind {
+        CommandKind::Alarm(AlarmCommand::Tick { alarm: self.id, raised_at: self.raised_at, step, done })
+    }
 }

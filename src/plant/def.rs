@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::tag::{Table, TagDef};
 
 pub use super::{
-    alarm::def::Priority,
+    alarm_def::Priority,
     batch::BatchDef,
     control_run::RunDef,
     history_def::{HistoryDef, ParquetVersion},
@@ -22,7 +22,7 @@ pub use super::{
     role::{Reauthentication, Role},
 };
 pub(crate) use super::{
-    alarm::def::{AlarmClass, AlarmDef, AlarmRules, Condition, Guidance, Level, Subject},
+    alarm_def::{AlarmClass, AlarmDef, AlarmRules, Condition, Guidance, Level, Subject},
     interlock::ControlLogic,
     line::{Parity, Rs485},
     mimic_def::{MimicCommand, MimicItem, MimicRect},

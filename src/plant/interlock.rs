@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    alarm::condition::is_set,
+    condition::is_set,
     def::{ActionDef, PlantDef},
     exact::Exact,
     id::TagId,

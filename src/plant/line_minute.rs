@@ -135,8 +135,9 @@ mod tests {
 
     use super::*;
     use crate::plant::{
-        event::{Fault, LineCounters},
+        fault::Fault,
         fixture::{self, TIC},
+        line_state::LineCounters,
     };
 
     fn at(second: i64) -> Timestamp {

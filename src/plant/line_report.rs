@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use super::{
     admission::Admission,
     device_time::DeviceTime,
-    event::LineCounters,
     id::{DeviceId, LineId, TagId},
     line::LineDef,
     line_finding::{LineFinding, OtherMasterHeard},
+    line_state::LineCounters,
     redefinition::Renamed,
     request_stats::{RequestStats, Spread},
     tag::{Poll, PollClass, Table},

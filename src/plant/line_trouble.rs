@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{plant::event::Fault, t};
+use crate::{plant::fault::Fault, t};
 
 /// English in the log and on record, translated where a terminal shows it. What the operating system says stays in its words.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]

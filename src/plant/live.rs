@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     address::{in_table, of_modicon},
-    event::Fault,
+    fault::Fault,
     id::LineId,
     tag::Table,
 };

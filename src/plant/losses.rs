@@ -2,11 +2,11 @@
 
 use super::{
     PlantDef, Snapshot,
+    alarm::SuppressedAlarm,
     alarm::{manager::name_of, state::OperatorNote, succession::successors},
     def::{AlarmId, ProcedureDef},
     id::ProcedureId,
     number::to_u16,
-    snapshot::SuppressedAlarm,
 };
 
 /// What becomes of something that stands.

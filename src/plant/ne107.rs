@@ -6,11 +6,8 @@ use std::{fmt, time::Duration};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    device_time::DeviceTime,
-    event::{ExceptionCode, LineState},
-    keyword::keyword_enum,
-    request_stats::RequestStats,
-    snapshot::DeviceState,
+    device_time::DeviceTime, fault::ExceptionCode, keyword::keyword_enum, line_state::DeviceState,
+    line_state::LineState, request_stats::RequestStats,
 };
 
 keyword_enum! {
@@ -226,7 +223,7 @@ mod tests {
     use jiff::Timestamp;
 
     use super::*;
-    use crate::plant::{device_time::SeenTime, event::Fault};
+    use crate::plant::{device_time::SeenTime, fault::Fault};
 
     const UP: DeviceState = DeviceState::Responding;
     const DOWN: DeviceState = DeviceState::Down { since: Timestamp::UNIX_EPOCH };

@@ -2,11 +2,9 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{id::TagId, mqtt_request::MqttRequestStatus};
-use crate::t;
+use super::id::TagId;
 
 /// What the table `[north]` of a plant file says.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -76,38 +74,4 @@ pub fn topic_level(name: &str) -> String {
     let level =
         |letter: char| if matches!(letter, '/' | '+' | '#' | '$') || letter.is_control() { '_' } else { letter };
     name.chars().map(level).collect()
-}
-
-/// How far the data out has come.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct NorthStatus {
-    /// The broker has accepted the station.
-    pub connected: bool,
-    /// Samples that the broker has acknowledged since the start.
-    pub sent: u64,
-    /// What the broker refused since the start: it is not sent again.
-    pub refused: u64,
-    /// Everything that was stored before this instant is at the broker.
-    pub sent_until: Timestamp,
-    /// What went wrong last; `None` while all is well.
-    pub error: Option<String>,
-    /// The requests from outside, where the plant file permits them.
-    pub requests: Option<MqttRequestStatus>,
-}
-
-impl NorthStatus {
-    /// `connected, 5192 samples sent, 0 refused, complete until 14:02:30`; `until` is the instant in words.
-    pub fn words(&self, until: &str) -> String {
-        let NorthStatus { connected, sent, refused, sent_until: _, error, requests: _ } = self;
-        let state = if *connected { t!("connected") } else { t!("not connected") };
-        let why = error.as_ref().map(|why| format!(": {why}")).unwrap_or_default();
-        t!(
-            "{state}{why}, {sent} samples sent, {refused} refused, complete until {until}",
-            state,
-            why,
-            sent,
-            refused,
-            until
-        )
-    }
 }

@@ -7,14 +7,15 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     def::{DeviceDef, LineId, PlantDef},
-    event::{LineCounters, LineState},
     interlock::ActuatorTracker,
     line_minute::LineMinute,
+    line_state::DeviceState,
+    line_state::{LineCounters, LineState},
     line_trouble::LineTrouble,
     record::AlarmRecord,
     reducer::Plant,
     sample::{Cause, Quality, Sample},
-    snapshot::{DeviceState, LineStatus, Snapshot},
+    snapshot::{LineStatus, Snapshot},
 };
 
 /// What the history knows of an instant.

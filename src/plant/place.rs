@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::{
-    alarm::def::Subject,
+    alarm_def::Subject,
     def::{DeviceDef, LineDef, PlantDef, Transport},
     tag::{Point, TagDef},
 };
@@ -42,7 +42,7 @@ pub(super) fn of_subject(def: &PlantDef, subject: Subject) -> String {
         Subject::Tag(tag) => of_tag(def, def.tag(tag)),
         Subject::Device(device) => of_device(def, def.device(device)),
         Subject::Line(line) => of_line(def.line(line)),
-        Subject::Station => super::station::STATION.to_owned(),
+        Subject::Station => super::station_fault::STATION.to_owned(),
     }
 }
 

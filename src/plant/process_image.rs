@@ -13,8 +13,8 @@ use self::fault_effect::{FaultEffect, effect_of};
 use super::{
     calculation::Calculator,
     def::{DeviceId, PlantDef, TagId},
-    event::Fault,
     exact::Exact,
+    fault::Fault,
     heard::{Heard, Stated},
     record::Record,
     sample::{Cause, Quality, Sample},

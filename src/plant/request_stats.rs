@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::event::{ExceptionCode, Fault};
+use super::fault::{ExceptionCode, Fault};
 use crate::plant::number::to_usize;
 
 /// How requests ended.

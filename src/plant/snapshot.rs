@@ -9,29 +9,27 @@ use jiff::{SignedDuration, Timestamp};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    alarm::{
-        AlarmCommand, AlarmMetrics,
-        state::{AlarmState, OperatorNote},
-    },
+    alarm::{ActiveAlarm, AlarmCommand, AlarmMetrics, SuppressedAlarm},
     command::{CommandKind, CommandStatus},
     control_run::ControlRun,
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::DiagnosticRun,
-    event::{Fault, LineCounters, LineState},
     exact::Exact,
+    fault::Fault,
     interlock::ActuatorTracker,
     line_report::LineReport,
+    line_state::{DeviceState, LineCounters, LineState},
     ne107,
-    north_def::NorthStatus,
+    north_status::NorthStatus,
     number::{digits, to_i8, to_u32},
     parameter_set::StoredSet,
     procedure::ProcedureRun,
     process_load::ProcessLoad,
-    record::{ChainHash, FirstOut},
+    record::ChainHash,
     restore::Restore,
     sample::{Cause, Sample},
     scale,
-    station::StationFault,
+    station_fault::StationFault,
     tag::Decimals,
     time::elapsed,
     traffic::Exchange,
@@ -275,84 +273,6 @@ pub struct DeviceStatus {
     pub diagnosis: Option<ne107::Reason>,
 }
 
-/// Whether a device answers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum DeviceState {
-    /// Not asked yet.
-    #[default]
-    Unknown,
-    /// Its last request was answered.
-    Responding,
-    /// The last `n` requests failed, not enough to give it up.
-    Failing(u32),
-    /// Given up, probed now and then.
-    Down {
-        /// Since when.
-        since: Timestamp,
-    },
-}
-
-/// An alarm that an operator should see.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ActiveAlarm {
-    /// Which.
-    pub id: AlarmId,
-    /// Unacknowledged, acknowledged, returned, latched; never one of those that are suppressed.
-    pub state: AlarmState,
-    /// When it was raised.
-    pub raised_at: Timestamp,
-    /// When it was last annunciated; identifies what the operator saw, see [`super::alarm::AlarmCommand::Acknowledge`].
-    pub annunciated_at: Timestamp,
-    /// When it returned to normal, if it did.
-    pub returned_at: Option<Timestamp>,
-    /// The value that raised it.
-    pub value: Option<Exact>,
-    /// Who acknowledged it, when, with which note.
-    pub acknowledged: Option<OperatorNote>,
-    /// The steps of its action that were done: who, when, and the step as the reason.
-    pub steps: Vec<OperatorNote>,
-    /// Activations since the station started.
-    pub times: u32,
-    /// Its place among the alarms that were raised together.
-    pub first_out: Option<FirstOut>,
-}
-
-impl ActiveAlarm {
-    /// An alarm without value, actions and first-out group.
-    pub fn new(id: AlarmId, state: AlarmState, raised_at: Timestamp) -> ActiveAlarm {
-        let (returned_at, value, acknowledged, steps, times, first_out) = (None, None, None, Vec::new(), 1, None);
-        let annunciated_at = raised_at;
-        ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, steps, times, first_out }
-    }
-    /// The command to acknowledge it, as it is seen here.
-    pub fn acknowledge(&self) -> CommandKind {
-        CommandKind::Alarm(AlarmCommand::Acknowledge { alarm: self.id, annunciated_at: self.annunciated_at })
-    }
-    /// Who did this step of the action, and when.
-    pub fn step(&self, text: &str) -> Option<&OperatorNote> {
-        self.steps.iter().find(|ticked| ticked.reason.as_deref() == Some(text))
-    }
-    /// The command to tick a step of the action, or to take its tick back.
-    pub fn tick(&self, step: u8, done: bool) -> CommandKind {
-        CommandKind::Alarm(AlarmCommand::Tick { alarm: self.id, raised_at: self.raised_at, step, done })
-    }
-}
-
-/// An alarm that is suppressed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SuppressedAlarm {
-    /// Which.
-    pub id: AlarmId,
-    /// Shelved, suppressed or out of service.
-    pub state: AlarmState,
-    /// Who suppressed it, when and why; no operator if by design.
-    pub note: OperatorNote,
-    /// When it comes back by itself, if it is shelved.
-    pub until: Option<Timestamp>,
-    /// Its condition holds all the same.
-    pub active: bool,
-}
-
 impl HistoryStatus {
     /// What is wrong with it and how many records wait: `not recording: 1234 records waiting (12 %); disk full`.
     pub fn words(&self) -> Option<String> {
@@ -362,6 +282,20 @@ impl HistoryStatus {
         }
         let share = self.waiting * 100 / self.waiting_max.max(1);
         Some(t!("not recording: {count} records waiting ({share} %); {trouble}", count = self.waiting, share, trouble))
+    }
+}
+
+impl Snapshot {
+    /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
+    pub fn acknowledge_all(&self) -> Option<CommandKind> {
+        let waits = self.alarms.iter().any(|alarm| alarm.state.needs_acknowledgement());
+        waits.then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: self.annunciations }))
+    }
+
+    /// The most urgent alarm that waits for an acknowledgement, else the most urgent one: what every page names.
+    pub fn foremost_alarm(&self) -> Option<&ActiveAlarm> {
+        let mut waiting = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
+        waiting.next().or_else(|| self.alarms.first())
     }
 }
 

@@ -4,7 +4,7 @@ use crate::t;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    event::{ExceptionCode, Fault},
+    fault::{ExceptionCode, Fault},
     tag::Table,
 };
 

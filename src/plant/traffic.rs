@@ -5,7 +5,7 @@ use std::{collections::VecDeque, fmt, sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{event::Fault, line::Framing};
+use super::{fault::Fault, line::Framing};
 use crate::t;
 
 /// Frames that a line remembers.

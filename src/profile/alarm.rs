@@ -18,7 +18,7 @@ use crate::plant::{
     },
     expr::Expr,
     number::to_u16,
-    station::StationFault,
+    station_fault::StationFault,
     tag::TagDef,
 };
 

@@ -27,9 +27,9 @@ use super::{
     tag::{self, DeviceContext},
 };
 use crate::plant::{
+    classification,
     def::{DeviceDef, DeviceId, LineDef, LineId, MimicDef, PlantDef, TagId},
     number::to_u16,
-    poll_class,
     record::hex,
     tag::{PollClass, TagDef},
 };
@@ -93,7 +93,7 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, &rules, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
     let north = north::north(name, file.north.as_ref().map(|north| &north.value), &defs, problems);
-    let classes = poll_class::classes(&tags, &alarms, &classes);
+    let classes = classification::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
     Some(PlantDef {
         name: name.to_owned(),

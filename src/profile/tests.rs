@@ -24,7 +24,7 @@ use super::{
 use crate::plant::{
     def::{Condition, DeviceId, HistoryDef, LineId, ParquetVersion, PlantDef, Priority, Role, Subject},
     interlock::InterlockCondition,
-    station::StationFault,
+    station_fault::StationFault,
     tag::{Bound, DataType, PollClass},
 };
 

@@ -11,7 +11,7 @@ use crate::{
     },
     plant::{
         def::{Limits, READ_REGISTERS_MAX},
-        event::ExceptionCode,
+        fault::ExceptionCode,
         number::to_u8,
         tag::Table,
     },

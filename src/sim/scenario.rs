@@ -14,11 +14,11 @@ use std::time::Duration;
 use super::faults::{FaultTarget, InjectedFault};
 use crate::plant::{
     Snapshot,
+    alarm::ActiveAlarm,
     command::CommandKind,
     def::{AlarmId, TagId},
     keyword::keyword_enum,
     record::AlarmEvent,
-    snapshot::ActiveAlarm,
 };
 
 /// A drill. Times count from its start, in plant time.

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::pdu::{self, Registers};
-use crate::plant::event::ExceptionCode;
+use crate::plant::fault::ExceptionCode;
 use crate::{bus, plant::number::to_u8};
 
 /// Events in the log (V1.1b3, 6.10); the oldest makes room.

@@ -6,8 +6,9 @@ use crate::plant::{
     Snapshot,
     alarm::{AlarmState, manager::subject_name},
     def::AlarmId,
-    event::LineState,
-    snapshot::{DeviceState, HistoryStatus},
+    line_state::DeviceState,
+    line_state::LineState,
+    snapshot::HistoryStatus,
 };
 
 /// One line a change: lines, devices, alarms, commands, troubles of the store. Without time stamps.
@@ -154,7 +155,8 @@ mod tests {
     use crate::plant::{
         Plant,
         def::LineId,
-        event::{Event, Fault},
+        event::Event,
+        fault::Fault,
         fixture::{self, PV, TIC},
     };
 

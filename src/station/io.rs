@@ -31,7 +31,7 @@ use crate::{
         event::Event,
         record::ChainHash,
         snapshot::HistoryStatus,
-        station::STATION,
+        station_fault::STATION,
     },
     profile::PlantFile,
 };

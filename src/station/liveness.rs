@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Duration};
 
 use crate::plant::{
-    Snapshot, diagnostics::DiagnosticState, event::LineState, line_check::WAIT_MAX, line_report::LineReport,
+    Snapshot, diagnostics::DiagnosticState, line_check::WAIT_MAX, line_report::LineReport, line_state::LineState,
     snapshot::LineStatus,
 };
 

@@ -11,7 +11,7 @@
 //! # When a resource fails
 //!
 //! Polling and alarms go on in every row, at the start as in the middle. Faults of history, disk, audit log, alarm-state
-//! file, users file, clock and line tasks are alarms of the station: [`StationFault`](crate::plant::station::StationFault).
+//! file, users file, clock and line tasks are alarms of the station: [`StationFault`](crate::plant::station_fault::StationFault).
 //!
 //! | resource | what happens | how it ends |
 //! |---|---|---|

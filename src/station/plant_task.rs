@@ -37,7 +37,7 @@ use crate::{
         event::Event,
         record::{ActionRecord, AlarmRecord, Record},
         snapshot::HistoryStatus,
-        station::{FaultState, StationFault},
+        station_fault::{FaultState, StationFault},
     },
     profile::PlantFile,
 };

@@ -23,10 +23,12 @@ use crate::{
     plant::{
         PlantDef,
         def::{DeviceId, LineId},
-        event::{Event, Fault, LineState, WriteResult},
+        event::{Event, WriteResult},
+        fault::Fault,
         line_finding::DeviceFinding,
+        line_state::LineState,
         line_trouble::LineTrouble,
-        station::{FaultState, StationFault},
+        station_fault::{FaultState, StationFault},
     },
 };
 

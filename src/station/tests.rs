@@ -15,7 +15,7 @@ use crate::{
     history::{Answer, Query, io::QueryRequest},
     plant::{
         command::CommandKind, def::AlarmId, fixture, record::ActionRecord, request_refusal::RequestRefusal,
-        station::StationFault,
+        station_fault::StationFault,
     },
 };
 

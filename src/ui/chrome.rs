@@ -11,36 +11,29 @@ use header::header;
 use ratatui::{Frame, layout::Position, style::Style};
 
 use banner::banner;
-pub use banner::{alarm_words, counts, history_text, since};
 use footer::Footer;
 
 use super::{
     LastCommand, Model, SILENCE, ViewContext,
+    command_text::{command_label, outcome_words},
     keys::{Chord, Hint},
     layout::{Size, layout},
     modal::Modal,
     tabs::Tab,
     widgets::text::{Canvas, clock, fit, fit_words, running, width},
 };
-use crate::plant::{
-    command::{CommandKind, NotConfirmed, Outcome},
-    commands::alarm_action,
-    def::LineDef,
-    event::LineState,
-    exact::Exact,
-    number::to_u16,
-};
+use crate::plant::{command::Outcome, def::LineDef, line_state::LineState, number::to_u16};
 
 /// Draws the whole screen.
 pub fn view(model: &Model, frame: &mut Frame) {
     let parts = layout(frame.area());
-    let present = &super::context::present_context(model, frame.area());
+    let present = &super::model_context::present_context(model, frame.area());
     banner(model, present, &mut Canvas::new(frame.buffer_mut(), parts.banner));
     if let Some(least) = model.lacks_room() {
         return too_small(model, present, least, frame);
     }
     header(model, present, &mut Canvas::new(frame.buffer_mut(), parts.header));
-    let cx = &super::context::context(model, frame.area());
+    let cx = &super::model_context::context(model, frame.area());
     tab_bar(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.tabs));
     past::rule(model, cx, &mut Canvas::new(frame.buffer_mut(), parts.rule));
     match model.replay.page() {
@@ -57,7 +50,7 @@ pub fn view(model: &Model, frame: &mut Frame) {
     if let Some(modal) = &model.modal {
         // On the smallest screen a window has all rows below the banner but that of the keys.
         let room = if cx.size <= Size::Compact { parts.body.union(parts.status) } else { parts.body };
-        modal.view(cx, &model.tabs, frame, room);
+        modal.view(cx, frame, room);
     }
 }
 
@@ -173,7 +166,7 @@ fn is_urgent(model: &Model) -> bool {
 }
 
 /// A command and how it stands: `TIC-1.SV 60.0 → 70.0 °C verified 13:40:02`.
-pub fn last_command_label(cx: &ViewContext, pending: &LastCommand) -> (String, Style) {
+fn last_command_label(cx: &ViewContext, pending: &LastCommand) -> (String, Style) {
     let theme = cx.theme;
     // As the station took it: a write of what the device can hold.
     let (kind, old) =
@@ -196,77 +189,4 @@ pub fn last_command_label(cx: &ViewContext, pending: &LastCommand) -> (String, S
         false => (t!("{words}, NOT RECORDED", words), true),
     };
     (format!("{what}  {words} {at}"), if trouble { theme.trouble() } else { theme.done() })
-}
-
-/// An outcome in words, and whether the operator should worry.
-pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
-    match outcome {
-        Outcome::Pending => (t!("pending …").to_owned(), false),
-        Outcome::Verified => (t!("verified").to_owned(), false),
-        Outcome::Unchanged => (t!("unchanged, nothing written").to_owned(), false),
-        Outcome::Sent => (t!("sent to all units; a broadcast has no response").to_owned(), false),
-        Outcome::Refused(why) => (t!("REFUSED: {why}", why), true),
-        Outcome::NotConfirmed(NotConfirmed::NoReadBack) => (t!("accepted (cannot be read back)").to_owned(), false),
-        Outcome::NotConfirmed(how @ (NotConfirmed::PartlyWritten { .. } | NotConfirmed::PartlyAccepted { .. })) => {
-            (t!("STOPPED: {how}", how), true)
-        }
-        Outcome::NotConfirmed(
-            why @ (NotConfirmed::NotAnswered(_)
-            | NotConfirmed::NotApplied(_)
-            | NotConfirmed::Different(_)
-            | NotConfirmed::NotRead(_)
-            | NotConfirmed::StationStopped
-            | NotConfirmed::Reloaded
-            | NotConfirmed::ConnectionLost),
-        ) => (t!("NOT CONFIRMED: {why}", why), true),
-        Outcome::Failed(fault) => (t!("FAILED, may have taken effect: {fault}", fault), true),
-    }
-}
-
-/// What was requested, in words: `TIC-1.SV 60.0 → 70.0 °C`.
-pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<Exact>) -> String {
-    match kind {
-        CommandKind::Write { tag, value } => {
-            let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));
-            let text = format!(
-                "{} {old} → {} {}",
-                cx.def().tag(*tag).name,
-                cx.snapshot.format(*tag, *value),
-                cx.snapshot.unit(*tag)
-            );
-            text.trim_end().to_owned()
-        }
-        CommandKind::Alarm(alarm_command) => {
-            let (action, target, _) = alarm_action(cx.def(), alarm_command);
-            format!("{action} {target}")
-        }
-        CommandKind::Refresh(device) => t!("refresh {name}", name = cx.def().device(*device).name),
-        CommandKind::Connect(line, true) => t!("connect {name}", name = cx.def().line(*line).name),
-        CommandKind::Connect(line, false) => t!("disconnect {name}", name = cx.def().line(*line).name),
-        CommandKind::Configure(settings) => t!("settings of {name}", name = settings.name),
-        CommandKind::SaveSettings(line) => t!("save settings of {name}", name = cx.def().line(*line).name),
-        CommandKind::Test(line, diagnostic) => format!("{} {diagnostic}", cx.def().line(*line).name),
-        CommandKind::StopTest(line) => t!("stop test of {name}", name = cx.def().line(*line).name),
-        CommandKind::ReadSets => t!("read parameter sets").to_owned(),
-        CommandKind::SaveSet { device, name, .. } => {
-            t!("save set {name} of {name2}", name, name2 = cx.def().device(*device).name)
-        }
-        CommandKind::Restore(request) => {
-            t!(
-                "{from} to {name}, {count} changes",
-                from = request.from,
-                name = cx.def().device(request.device).name,
-                count = request.changes.len()
-            )
-        }
-        CommandKind::StopRestore(device) => t!("stop restore of {name}", name = cx.def().device(*device).name),
-        CommandKind::StartProcedure(id) => t!("start procedure {name}", name = cx.def().procedure(*id).name),
-        CommandKind::AbortProcedure(id) => t!("abort procedure {name}", name = cx.def().procedure(*id).name),
-        CommandKind::CorrectCounter { tag, amount } => {
-            let value = format!("{} {}", cx.snapshot.format(*tag, *amount), cx.snapshot.unit(*tag));
-            t!("correct {name} by {value}", name = cx.def().tag(*tag).name, value = value.trim_end())
-        }
-        CommandKind::HandOver => t!("hand over").to_owned(),
-        CommandKind::TakeOver => t!("take over").to_owned(),
-    }
 }

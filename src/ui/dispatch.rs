@@ -1,7 +1,9 @@
 //! What a key does: of a window, of the replay, of every tab, or of the shown tab.
 
 use super::*;
+use crate::text::translate;
 use global::{GlobalKey, Reach};
+use keys::Hint;
 use modal::{Next, Notice};
 use widgets::list::Motion;
 
@@ -62,7 +64,7 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return session_lock::on_typed(model, event);
     }
     let hears = |key: &GlobalKey| key.reaches(Reach::Small) || !model.small();
-    if let Some(key) = global::find(replay::KEYS, event).filter(|_| model.replay.shown().is_some()).filter(hears) {
+    if let Some(key) = global::find(replay_keys::KEYS, event).filter(|_| model.replay.shown().is_some()).filter(hears) {
         let actions = key.press(model);
         return actions.into_iter().chain(with_tabs(model, |tabs, cx| tabs.shown_mut().on_snapshot(cx))).collect();
     }
@@ -116,6 +118,30 @@ fn on_tab_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
     actions
 }
 
+/// Fills in the list of all keys while it is shown.
+pub(super) fn list_keys(model: &mut Model) {
+    if !matches!(model.modal, Some(Modal::Help(_))) {
+        return;
+    }
+    let (cx, tab) = (model.cx(), model.tabs.shown);
+    let heading = |text: &str| Hint::new("", text, "");
+    let own = model.tabs.shown().hints(&cx).into_iter().filter(|hint| !hint.help.is_empty());
+    let replayed = replay_keys::KEYS.iter().copied().map(GlobalKey::hint);
+    let past = [heading(""), heading(t!("past"))].into_iter().chain(replayed).filter(|_| cx.is_past());
+    let offered = Tab::offered(&cx);
+    let there = global::keys().into_iter().filter(|key| key.tab().is_none_or(|tab| offered.contains(&tab)));
+    let rows = [heading(translate(tab.title()))]
+        .into_iter()
+        .chain(own)
+        .chain(past)
+        .chain([heading(""), heading(t!("every tab"))])
+        .chain(there.map(GlobalKey::hint))
+        .collect();
+    if let Some(Modal::Help(help)) = &mut model.modal {
+        help.rows = rows;
+    }
+}
+
 /// What was chosen in the palette or in the help.
 fn go(model: &mut Model, target: Target) -> Vec<UiAction> {
     match target {
@@ -135,16 +161,6 @@ fn go(model: &mut Model, target: Target) -> Vec<UiAction> {
         }
     }
     palette::actions(&model.cx(), target)
-}
-
-/// Closes what lies on top of the first page of the tab; `false` if nothing does.
-pub(super) fn step_back(model: &mut Model) -> bool {
-    let mut closed = false;
-    with_tabs(model, |tabs, cx| {
-        closed = tabs.shown_mut().back(cx);
-        Vec::new()
-    });
-    closed
 }
 
 /// The screen has another size: a tab that it has no room for gives way to the values, as long as these are offered.
@@ -183,7 +199,7 @@ fn close_covered_picture(model: &mut Model) {
         || model.tabs.shown != Tab::Trends
         || model.small()
         || model.replay.page().is_some()
-        || session_lock::is_closed(&model.session)
+        || rights::is_closed(&model.session)
         || model.tabs.trends.pictured && model.tabs.trends.picture(&model.cx()).is_none();
     if covers {
         close_picture(model);

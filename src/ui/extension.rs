@@ -5,17 +5,20 @@ use std::{any::Any, fmt::Debug, sync::Arc};
 
 use ratatui::style::Style;
 
-use super::ViewContext;
+use super::theme::Theme;
 
 /// The state of an extension.
 pub trait Extension: Any + Debug + Send + Sync {
     /// Parts of the header, each with its rank: the greatest is left out first.
-    fn header(&self, cx: &ViewContext) -> Vec<(usize, String, Style)>;
+    fn header(&self, theme: &Theme) -> Vec<(usize, String, Style)>;
+
+    /// Is its tab offered?
+    fn has_tab(&self) -> bool;
 }
 
 /// The state of the extension, if it is of this type.
-pub fn state<'a, T: Extension>(cx: &ViewContext<'a>) -> Option<&'a T> {
-    let state: &dyn Any = cx.extension?;
+pub fn state<T: Extension>(extension: Option<&dyn Extension>) -> Option<&T> {
+    let state: &dyn Any = extension?;
     state.downcast_ref()
 }
 

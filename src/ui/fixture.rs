@@ -12,17 +12,20 @@ pub use traffic::more_frames;
 
 use super::{QueryNumbers, ViewContext, preferences::Preferences, theme::Theme};
 use crate::plant::{
+    alarm::{ActiveAlarm, SuppressedAlarm},
     alarm::{AlarmMetrics, AlarmState},
     control_run::ControlRun,
     def::*,
-    event::{Fault, LineCounters, LineState},
+    fault::Fault,
+    line_state::DeviceState,
+    line_state::{LineCounters, LineState},
     parameter_set::StoredSet,
     procedure::ProcedureRun,
     process_load::ProcessLoad,
     restore::Restore,
     sample::{Cause, Sample},
-    snapshot::{ActiveAlarm, DeviceState, DeviceStatus, HistoryStatus, LineStatus, Snapshot, SuppressedAlarm},
-    station::StationFault,
+    snapshot::{DeviceStatus, HistoryStatus, LineStatus, Snapshot},
+    station_fault::StationFault,
     tag::*,
     traffic::Exchange,
     tuning::Tuning,

@@ -4,16 +4,16 @@ use crossterm::event::{KeyCode, KeyEvent};
 
 use super::{
     Effect, Model, UiAction,
-    context::with_replay,
-    dispatch::step_back,
     keys::{Chord, Hint, char, code, ctrl},
     last_frame,
-    modal::{Modal, Palette, TerminalSettings},
+    modal::{Help, Modal, Palette, TerminalSettings, instant},
+    model_context::{with_replay, with_tabs},
     replay::{self, Replay},
-    screen_dump, session_lock,
-    tabs::{Tab, alarms::actions},
+    rights, screen_dump,
+    tabs::{Tab, alarms::actions, draw::around},
 };
 use crate::{
+    access::SessionRequest,
     plant::{alarm::AlarmCommand, command::CommandKind},
     t,
 };
@@ -77,6 +77,7 @@ impl GlobalKey {
         GlobalKey { rule: Rule::Unlocked, ..self }
     }
 
+    #[cfg(test)]
     pub fn chord(self) -> Chord {
         self.chord
     }
@@ -103,7 +104,7 @@ impl GlobalKey {
                 model.note = Some(replay::refused().into());
                 Vec::new()
             }
-            (Rule::Unlocked, _) if session_lock::is_closed(&model.session) => Vec::new(),
+            (Rule::Unlocked, _) if rights::is_closed(&model.session) => Vec::new(),
             (_, Does::Show(tab)) => show(model, tab),
             (_, Does::Run(run)) => run(model),
         }
@@ -148,8 +149,7 @@ const KEYS: &[GlobalKey] = &[
     })
     .unlocked(),
     GlobalKey::new(char('\''), "", "bookmarks: past times that were kept under a name", list_bookmarks).unlocked(),
-    GlobalKey::new(ctrl('k'), "", "lock this terminal; works in every window", |model| session_lock::lock(model))
-        .reach(Reach::Windows),
+    GlobalKey::new(ctrl('k'), "", "lock this terminal; works in every window", lock).reach(Reach::Windows),
     GlobalKey::new(char('L'), "", "change the language of the screens", next_language).reach(Reach::Small),
     GlobalKey::new(ctrl('t'), "", "change the language, in every window too", next_language).reach(Reach::Windows),
     GlobalKey::new(ctrl('s'), "", "silence the alarm sound (does not acknowledge)", silence).of_present(),
@@ -172,7 +172,7 @@ const KEYS: &[GlobalKey] = &[
     GlobalKey::new(ctrl('c'), "", "quit (asks first)", |_| vec![UiAction::Leave]).reach(Reach::Typed),
     GlobalKey::new(char('q'), "quit", "quit (asks first, and lists what stops)", |_| vec![UiAction::Leave])
         .reach(Reach::Small),
-    GlobalKey::new(char('?'), "help", "all keys", |_| vec![UiAction::Open(Modal::Help(0))]),
+    GlobalKey::new(char('?'), "help", "all keys", |_| vec![UiAction::Open(Modal::Help(Help::default()))]),
 ];
 
 fn show(model: &mut Model, tab: Tab) -> Vec<UiAction> {
@@ -190,7 +190,9 @@ fn show(model: &mut Model, tab: Tab) -> Vec<UiAction> {
 
 /// Shows the tab so many further on.
 fn step(model: &mut Model, by: isize) -> Vec<UiAction> {
-    vec![UiAction::Show(model.tabs.shown.step(&Tab::offered(&model.cx()), by))]
+    let offered = Tab::offered(&model.cx());
+    let place = offered.iter().position(|tab| *tab == model.tabs.shown).unwrap_or(0);
+    vec![UiAction::Show(offered[around(place, by, offered.len())])]
 }
 
 /// Shows the tab before, or after it again.
@@ -224,8 +226,21 @@ fn dismiss(model: &mut Model) -> Vec<UiAction> {
     Vec::new()
 }
 
+/// Closes what lies on top of the first page of the tab; `false` if nothing does.
+pub(super) fn step_back(model: &mut Model) -> bool {
+    let mut closed = false;
+    with_tabs(model, |tabs, cx| {
+        closed = tabs.shown_mut().back(cx);
+        Vec::new()
+    });
+    closed
+}
+
 fn open_palette(model: &mut Model) -> Vec<UiAction> {
-    let palette = Palette::new(&model.cx(), model.tabs.shown(), model.bookmarks(), &model.recent);
+    let (cx, here) = (model.cx(), [PALETTE, PALETTE_TOO]);
+    let global = KEYS.iter().filter(|key| !here.contains(&key.chord)).map(|key| key.hint());
+    let keys = model.tabs.shown().hints(&cx).into_iter().chain(global).collect();
+    let palette = Palette::new(&cx, keys, model.bookmarks(), &model.recent);
     vec![UiAction::Open(Modal::Palette(Box::new(palette)))]
 }
 
@@ -240,6 +255,12 @@ fn list_bookmarks(model: &mut Model) -> Vec<UiAction> {
 
 fn next_language(model: &mut Model) -> Vec<UiAction> {
     vec![UiAction::SetLocale(model.locale().language.next().locale())]
+}
+
+/// Locks at once if a user is logged in.
+fn lock(model: &mut Model) -> Vec<UiAction> {
+    let may = model.session.who.is_some() && !model.session.locked;
+    if may { vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)] } else { Vec::new() }
 }
 
 /// Asks for a past instant, to show it on the tab.
@@ -262,13 +283,13 @@ fn on_past(model: &mut Model, page: bool) -> Vec<UiAction> {
         None => {
             let of_alarms = model.tabs.shown == Tab::Alarms;
             let place = if page {
-                replay::Place::Page
+                instant::Place::Page
             } else if of_alarms {
-                replay::Place::TabOrPage
+                instant::Place::TabOrPage
             } else {
-                replay::Place::Tab
+                instant::Place::Tab
             };
-            vec![UiAction::Open(replay::ask_instant(&cx, tab, place))]
+            vec![UiAction::Open(instant::ask_instant(&cx, tab.moment(&cx), place))]
         }
     }
 }

@@ -2,29 +2,26 @@
 
 use crate::t;
 use crate::text::translate;
-use std::time::Duration;
 
 use ratatui::style::Style;
 
 use super::{
-    ViewContext,
-    modal::Notice,
-    rights,
-    widgets::{text::age, value},
+    ViewContext, rights,
+    widgets::{
+        actuator_mark::news,
+        text::{age, clock},
+        value,
+    },
 };
 use crate::plant::{
-    command::{CommandKind, CommandStatus, NotConfirmed, Outcome},
-    def::TagId,
+    command::CommandKind,
+    def::{DeviceId, TagId},
     exact::Exact,
     interlock::{self, ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
+    line_state::DeviceState,
+    line_state::LineState,
     tag::{DataType, TagDef},
-    time::elapsed,
 };
-
-/// How long the end of a command is marked in the mimic, in seconds of the operator.
-const DONE_S: f64 = 5.0;
-/// The same for one that did not end well.
-const FAILED_S: f64 = 60.0;
 
 /// The other of two states, if the tag has two and is in one of them for certain.
 pub fn other_state(cx: &ViewContext, tag: TagId) -> Option<f64> {
@@ -67,7 +64,7 @@ pub fn forbidden_text(cx: &ViewContext, tag: TagId) -> Option<String> {
         locks.find_map(|lock| interlock_text(cx, lock)).map(|(words, _)| words)
     };
     rights::missing(cx, &kind)
-        .or_else(|| Notice::why_unreachable(cx, def.device))
+        .or_else(|| why_unreachable(cx, def.device))
         .or_else(|| {
             // What is not read is not known, and need not be.
             let is_unknown = value.is_none() && def.is_read();
@@ -77,9 +74,29 @@ pub fn forbidden_text(cx: &ViewContext, tag: TagId) -> Option<String> {
         .or_else(|| unmet_text(cx, tag))
 }
 
+/// Why nothing can be written to this device now, as one sentence; `None` if it can be tried.
+pub fn why_unreachable(cx: &ViewContext, device: DeviceId) -> Option<String> {
+    let def = cx.def().device(device);
+    let line = &cx.def().line(def.line).name;
+    let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
+        (LineState::Disconnected, _) => t!("Line {line} was disconnected by an operator.", line),
+        (LineState::Testing, _) => t!("Line {line} is in use by a test (tab Bus).", line),
+        (LineState::NoTraffic, _) => t!("No traffic is heard on line {line}.", line),
+        (LineState::Waiting { why, .. }, _) => t!("Line {line} is not connected: {why}.", line, why),
+        (LineState::Connecting, _) => t!("Line {line} is connecting.", line),
+        (LineState::Connected, DeviceState::Down { since }) => {
+            t!("No data received since {clock}.", clock = clock(since, &cx.def().time_zone))
+        }
+        (LineState::Connected, DeviceState::Unknown | DeviceState::Responding | DeviceState::Failing(_)) => {
+            return None;
+        }
+    };
+    Some(why)
+}
+
 /// All there is to say before a value is written, with its look.
 pub fn before_write(cx: &ViewContext, tag: TagId, value: Exact) -> Vec<(String, Style)> {
-    let gone = Notice::why_unreachable(cx, cx.def().tag(tag).device);
+    let gone = why_unreachable(cx, cx.def().tag(tag).device);
     let gone = gone.map(|why| (t!("! Writing is not possible now. {why}", why), cx.theme.trouble()));
     let locks = interlock::of_write(cx.def(), tag, value, decimals(cx, tag));
     let locks = locks.filter_map(|lock| interlock_text(cx, lock));
@@ -250,68 +267,6 @@ fn taken_over(cx: &ViewContext, tag: TagId, value: f64) -> Vec<String> {
     }]
 }
 
-/// The latest command for a tag.
-fn last_command<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<&'a CommandStatus> {
-    let of_command = |status: &&CommandStatus| status.command.kind.written().is_some_and(|(tag, _)| tag == command);
-    cx.snapshot.commands.iter().find(of_command)
-}
-
-/// The latest command for a tag, while how it ended is news, and whether it went well.
-fn news<'a>(cx: &ViewContext<'a>, command: TagId) -> Option<(&'a Outcome, Option<bool>)> {
-    let status = last_command(cx, command)?;
-    let plant_s = elapsed(status.outcome_at, cx.now).as_secs_f64();
-    let real_s = plant_s / cx.snapshot.speed.clamp(0.01, 1e6);
-    let (well, lasts) = match status.outcome {
-        Outcome::Pending => (None, f64::MAX),
-        Outcome::Verified | Outcome::Unchanged | Outcome::Sent | Outcome::NotConfirmed(NotConfirmed::NoReadBack) => {
-            (Some(true), DONE_S)
-        }
-        Outcome::Refused(_) | Outcome::NotConfirmed(_) | Outcome::Failed(_) => (Some(false), FAILED_S),
-    };
-    (real_s <= lasts).then_some((&status.outcome, well))
-}
-
-/// The mark of an actuator in the mimic, by its output: what does not follow its command, how the last command went, what is blocked.
-pub fn mark(cx: &ViewContext, output: TagId) -> Option<(String, Style)> {
-    let theme = cx.theme;
-    let logic = &cx.def().logic;
-    let (place, actuator) = logic.actuator(output).filter(|(_, actuator)| actuator.output == output)?;
-    if cx.snapshot.actuators.feedback_mismatch(logic, place, cx.snapshot.at).is_some() {
-        let commanded = cx.snapshot.text(actuator.command).unwrap_or_default();
-        return Some((t!("{pick} not {commanded}", pick = theme.pick("≠", "!="), commanded), theme.trouble()));
-    }
-    let blocks = |lock: &&InterlockDef| lock.tag == actuator.command && lock.value != actuator.off;
-    let mut statuses = logic.interlocks.iter().filter(blocks).map(|lock| lock.status(cx.snapshot.sample(lock.of)));
-    let blocked = statuses.any(|status| status == InterlockStatus::Blocked);
-    match news(cx, actuator.command) {
-        Some((_, None)) => return Some((theme.pick(t!("… sent"), t!(".. sent")).to_owned(), theme.strong())),
-        Some((outcome, Some(false))) => {
-            let word = translate(outcome.label());
-            return Some((format!("{} {word}", theme.pick("✗", "x")), theme.trouble()));
-        }
-        // A command that cannot be read back was taken, which says nothing while it is blocked.
-        Some((Outcome::NotConfirmed(_) | Outcome::Sent, Some(true))) if blocked => {}
-        // Only while the output is as commanded: another mode may have taken over since.
-        Some((outcome, Some(true))) if follows_command(cx, actuator) => {
-            let word = match outcome {
-                Outcome::NotConfirmed(_) => t!("accepted"),
-                Outcome::Unchanged => t!("unchanged"),
-                Outcome::Sent => t!("sent"),
-                Outcome::Pending | Outcome::Verified | Outcome::Refused(_) | Outcome::Failed(_) => t!("done"),
-            };
-            return Some((format!("{} {word}", theme.pick("✓", t!("ok"))), theme.normal()));
-        }
-        Some((_, Some(true))) | None => {}
-    }
-    blocked.then(|| (theme.pick(t!("⊘ blocked"), t!("(/) blocked")).to_owned(), theme.dim()))
-}
-
-/// Is the output certainly as commanded? One that need not follow its command counts as such.
-fn follows_command(cx: &ViewContext, actuator: &ActuatorDef) -> bool {
-    let command = cx.snapshot.sample(actuator.command).good_value().map(|command| command != actuator.off);
-    actuator.travel.is_none() || (command.is_some() && value::is_on(cx, actuator.output) == command)
-}
-
 /// What a faceplate says of an actuator: (label, words, look).
 pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)> {
     let theme = cx.theme;
@@ -329,7 +284,7 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
     }
     let locks = logic.interlocks.iter().filter(|lock| lock.tag == actuator.command);
     rows.extend(locks.filter_map(|lock| interlock_text(cx, lock)).map(|(words, style)| (t!("blocked"), words, style)));
-    if let Some(lasts) = feedback_mismatch(cx, place) {
+    if let Some(lasts) = cx.snapshot.actuators.feedback_mismatch(logic, place, cx.snapshot.at) {
         let (wanted, is) = (commanded.text, value::show(cx, actuator.output).with_unit());
         let words = t!(
             "{pick} commanded {wanted}, still {is} after {age}",
@@ -346,8 +301,4 @@ pub fn facts(cx: &ViewContext, tag: TagId) -> Vec<(&'static str, String, Style)>
         rows.push((t!("last"), words, style));
     }
     rows
-}
-
-fn feedback_mismatch(cx: &ViewContext, place: usize) -> Option<Duration> {
-    cx.snapshot.actuators.feedback_mismatch(&cx.def().logic, place, cx.snapshot.at)
 }

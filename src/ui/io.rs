@@ -26,9 +26,9 @@ use super::{
     Effect, Leaving, Model, Msg, QueryId, TICK,
     extension::{Extension, ExtensionMessage},
     graphics::Graphics,
-    mouse::Pointer,
+    msg::{Pointer, Start},
     preferences::{Kept, PreferencesFile},
-    tabs::{Tab, registers::Start},
+    tabs::Tab,
     theme::Theme,
     update,
 };

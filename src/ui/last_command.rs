@@ -1,6 +1,6 @@
 //! The last command of this terminal, from the key to its outcome.
 
-use super::{Effect, Model, chrome, modal::Modal};
+use super::{Effect, Model, command_text::outcome_words, modal::Modal};
 use crate::t;
 use crate::{
     access::Credentials,
@@ -30,14 +30,14 @@ impl LastCommand {
     /// Has it ended in a way that its operator must read?
     pub fn is_trouble(&self) -> bool {
         let outcome = self.status.as_ref().map(|status| &status.outcome);
-        self.undelivered.is_some() || outcome.is_some_and(|outcome| chrome::outcome_words(outcome).1)
+        self.undelivered.is_some() || outcome.is_some_and(|outcome| outcome_words(outcome).1)
     }
 
     /// Has it ended well? Such an outcome leaves the screen by itself; trouble stays, with its time, until it is
     /// dismissed.
     fn is_done(&self) -> bool {
         let outcome = self.status.as_ref().map(|status| &status.outcome);
-        outcome.is_some_and(|outcome| *outcome != Outcome::Pending && !chrome::outcome_words(outcome).1)
+        outcome.is_some_and(|outcome| *outcome != Outcome::Pending && !outcome_words(outcome).1)
     }
 
     /// Has its outcome been on the screen for long enough?

@@ -3,45 +3,21 @@
 //! Keys alone change nothing unseen: what they lead to follows from what is on the screen. News do, between two frames; then a
 //! key that would act on another row than the drawn one, or on the same in another state, does nothing and says so.
 
-use std::hash::{DefaultHasher, Hash, Hasher};
-
 use crossterm::event::{KeyCode, KeyEvent};
 use jiff::Timestamp;
 
 use super::{
     Model, UiAction,
-    tabs::{Tab, alarms::actions},
+    tabs::{Rows, Tab, alarms::actions},
 };
 use crate::{
-    plant::{def::AlarmId, snapshot::ActiveAlarm},
+    plant::{alarm::ActiveAlarm, def::AlarmId},
     t,
 };
 
 /// Shown where a key was ignored.
 pub(super) fn changed() -> &'static str {
     t!("The list has changed, press again")
-}
-
-/// The rows of a list that keys act on, each with its state, and the selected one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Rows {
-    all: u64,
-    selected: u64,
-}
-
-impl Rows {
-    /// The rows of a list, and the place of the selected one.
-    pub fn of<T: Hash>(rows: impl IntoIterator<Item = T>, selected: usize) -> Rows {
-        let mut all = DefaultHasher::new();
-        let mut chosen = DefaultHasher::new();
-        for (place, row) in rows.into_iter().enumerate() {
-            row.hash(&mut all);
-            if place == selected {
-                row.hash(&mut chosen);
-            }
-        }
-        Rows { all: all.finish(), selected: chosen.finish() }
-    }
 }
 
 /// What a frame showed, as far as a key may mean it that is pressed before the next one.

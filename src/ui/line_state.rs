@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 
 use super::ViewContext;
-use crate::plant::{def::LineDef, event::LineState, snapshot::LineStatus, time::elapsed};
+use crate::plant::{def::LineDef, line_state::LineState, snapshot::LineStatus, time::elapsed};
 
 /// Is a line connected, does it reply, and has it time for its polls?
 pub fn is_well(cx: &ViewContext, line: &LineDef) -> bool {

@@ -5,21 +5,27 @@ pub(crate) mod graphics;
 pub mod theme;
 pub(crate) mod preferences;
 pub(crate) mod extension;
-pub(crate) mod msg;
 mod context;
-pub(crate) mod bell;
-pub(crate) mod last_frame;
 pub(crate) mod keys;
-pub(crate) mod line_state;
 pub(crate) mod rights;
+pub(crate) mod tab;
+pub(crate) mod msg;
+pub(crate) mod bell;
+pub(crate) mod line_state;
 pub(crate) mod glyph_filter;
 pub(crate) mod widgets;
-pub(crate) mod modal;
-pub(crate) mod screen_dump;
 pub(crate) mod interlock;
+pub(crate) mod modal;
+pub(crate) mod key_table;
+pub(crate) mod screen_dump;
+mod alarm_text;
+mod command_text;
 pub(crate) mod tabs;
 pub(crate) mod replay;
+mod model_context;
+pub(crate) mod last_frame;
 pub(crate) mod global;
+mod replay_keys;
 mod effects;
 mod tour;
 mod visited;
@@ -36,10 +42,11 @@ pub(crate) mod fixture;
 #[cfg(test)]
 mod tests;
 
+use context::view_context;
 pub use context::{QueryNumbers, ViewContext};
-use context::{past_context, view_context, with_replay, with_tabs};
 use dispatch::on_key;
 use effects::perform;
+use model_context::{past_context, with_replay, with_tabs};
 use std::{borrow::Cow, sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind};
@@ -57,8 +64,9 @@ use graphics::Picture;
 pub use last_command::LastCommand;
 use last_frame::LastFrame;
 use layout::Size;
+pub use modal::UiAction;
 use modal::{Confirm, Modal, Target, palette};
-pub use msg::{Effect, Leaving, Msg, QueryId, UiAction};
+pub use msg::{Effect, Leaving, Msg, QueryId};
 use preferences::{Bell, Preferences, PreferencesFile};
 use replay::Replay;
 use screen_dump::ScreenDump;
@@ -228,7 +236,10 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
-    model.locale().within(|| on_msg(model, msg))
+    let effects = model.locale().within(|| on_msg(model, msg));
+    // In the language that the message may have chosen.
+    model.locale().within(|| dispatch::list_keys(model));
+    effects
 }
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {

@@ -6,20 +6,9 @@ mod tests;
 use crossterm::event::KeyCode;
 use ratatui::{Terminal, backend::TestBackend, layout::Position, style::Modifier};
 
-use super::{Model, UiAction, chrome, context::with_tabs, dispatch::on_key, keys, last_frame, layout};
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pointer {
-    /// Its left button went down.
-    Press(Position),
-    /// It moved with the left button down.
-    Drag(Position),
-    /// The wheel turned towards the user, or away.
-    Wheel {
-        /// Towards.
-        down: bool,
-    },
-}
+use super::{
+    Model, UiAction, chrome, dispatch::on_key, keys, last_frame, layout, model_context::with_tabs, msg::Pointer,
+};
 
 pub(super) fn on_pointer(model: &mut Model, pointer: Pointer) -> Vec<UiAction> {
     if !model.preferences.mouse || model.small() {
@@ -103,7 +92,7 @@ fn rows(model: &Model) -> Vec<Row> {
     let cx = super::ViewContext { phase: 2, ..model.cx() };
     let body = layout::layout(model.screen).body;
     let Ok(_) = terminal.draw(|frame| match &model.modal {
-        Some(modal) => modal.view(&cx, &model.tabs, frame, body),
+        Some(modal) => modal.view(&cx, frame, body),
         None => model.tabs.shown().view(&cx, frame, body),
     });
     let cells = terminal.backend().buffer().content.chunks(usize::from(width.max(1)));

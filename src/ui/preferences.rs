@@ -10,7 +10,6 @@ use jiff::Timestamp;
 use super::{
     Model,
     graphics::Pictures,
-    modal::Modal,
     theme::{Glyphs, Theme, ThemeName},
 };
 use crate::{
@@ -304,32 +303,11 @@ impl Model {
         locale.language == Language::ENGLISH || self.theme.has_all_letters()
     }
 
-    /// The language of the texts: as chosen, else as kept; one whose letters the terminal has. The window of the settings
-    /// shows what is chosen in it.
-    pub(super) fn locale(&self) -> Locale {
-        let is_tried = matches!(self.modal, Some(Modal::TerminalSettings(_)));
-        let ways = [
-            self.chosen_locale.filter(|_| !is_tried),
-            self.preferences.language.map(Language::locale),
-            Some(self.locale),
-        ];
-        ways.into_iter().flatten().find(|locale| self.can_show(*locale)).unwrap_or(Locale::ENGLISH)
-    }
-
     /// The preferences were kept, or not: that is said.
     pub(super) fn on_kept(&mut self, kept: Result<PreferencesFile, String>) {
         match kept {
             Ok(file) => self.preferences_file = file,
             Err(why) => self.note = Some(t!("Not kept: {why}", why).into()),
         }
-    }
-
-    /// Follows what the user has chosen, or tries in the window of the settings: whatever closes it ends the trial.
-    pub(super) fn apply_preferences(&mut self) {
-        self.preferences = match &self.modal {
-            Some(Modal::TerminalSettings(window)) => window.chosen,
-            Some(_) | None => self.preferences_file.of(self.user()),
-        };
-        self.theme = self.preferences.theme(&self.limits);
     }
 }

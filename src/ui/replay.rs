@@ -2,8 +2,6 @@
 //!
 //! What stands above the tab, header and banner, stays that of the present.
 
-mod instant;
-mod keys;
 mod page;
 mod refusal;
 mod search;
@@ -12,7 +10,7 @@ use std::{collections::VecDeque, sync::Arc};
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{UiAction, ViewContext};
+use super::{UiAction, ViewContext, modal::instant::stamp};
 use crate::{
     history::{Answer, HistoryError, Query},
     plant::{
@@ -23,11 +21,10 @@ use crate::{
     },
     t,
 };
-pub use instant::{Asked, Place, ask_instant, ask_name, instant, stamp, typed};
-pub use keys::KEYS;
 pub use page::EventPage;
 pub(super) use refusal::{gives_command, refuse_commands, refused};
 use search::Search;
+pub use search::Searched;
 
 /// Half a second of playing is this many times as long in the plant; 0 is paused.
 const SPEEDS: [i32; 5] = [0, 1, 10, 60, 600];
@@ -216,7 +213,7 @@ impl Replay {
     }
 
     /// Plays, faster with each call, then pauses.
-    fn play(&mut self, present: &ViewContext) -> Vec<UiAction> {
+    pub fn play(&mut self, present: &ViewContext) -> Vec<UiAction> {
         self.speed = (self.speed + 1) % SPEEDS.len();
         (self.requested, self.search, self.sample, self.trouble) = (None, None, None, None);
         self.forget_prefetched();

@@ -3,7 +3,7 @@
 use super::ViewContext;
 use crate::t;
 use crate::{
-    access::right,
+    access::{SessionStatus, right},
     plant::{command::CommandKind, def::TagId, heard, interlock, role::Role},
 };
 
@@ -48,4 +48,9 @@ pub fn lacks(cx: &ViewContext, role: Role) -> Option<String> {
         )),
         Some(_) => None,
     }
+}
+
+/// Is everything but the login page closed?
+pub fn is_closed(session: &SessionStatus) -> bool {
+    session.who.as_ref().map_or(!session.may_view, |who| who.must_change)
 }

@@ -7,13 +7,12 @@ use crossterm::event::{KeyCode, KeyEvent};
 
 use super::{
     Effect, Model, QueryId, UiAction,
-    context::with_tabs,
     global::{self, Reach},
     keys,
-    modal::{Modal, Notice, UserForm, user_form::Purpose},
-    msg::Scope,
+    modal::{Modal, Notice, Scope, UserForm, user_form::Purpose},
+    model_context::with_tabs,
     replay::Replay,
-    screen_dump,
+    rights, screen_dump,
     tabs::{Keyed, Tab, Tabs, login},
     visited::Visited,
 };
@@ -40,11 +39,6 @@ pub struct SessionLock {
     active_at: Option<u32>,
     /// When the connection to the station was lost.
     gone_at: Option<u32>,
-}
-
-/// Is everything but the login page closed?
-pub fn is_closed(session: &SessionStatus) -> bool {
-    session.who.as_ref().map_or(!session.may_view, |who| who.must_change)
 }
 
 impl SessionLock {
@@ -88,7 +82,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
     }
     // A window closes when the user changes. A user who only unlocks finds the open window again.
     let user = |session: &SessionStatus| session.who.as_ref().map(|who| who.user.clone());
-    if user(&before) != user(&now) || is_closed(&now) {
+    if user(&before) != user(&now) || rights::is_closed(&now) {
         model.modal.take_if(|modal| !modal.is_quit());
         model.last_command = model.last_command.take_if(|_| user(&before) == user(&now));
         model.kept = None;
@@ -110,11 +104,11 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
     });
     let shown = model.tabs.shown;
     let let_in = shown == Tab::Login && now.who.is_some() && user(&before) != user(&now);
-    let opened = shown == Tab::Login && is_closed(&before);
+    let opened = shown == Tab::Login && rights::is_closed(&before);
     // The login page has every letter for itself: a locked terminal is for looking.
     let locked = shown == Tab::Login && !before.locked && now.locked;
     // Where everything may be seen without a user, the first one is made when someone wants to act.
-    if is_closed(&now) {
+    if rights::is_closed(&now) {
         return vec![UiAction::Show(Tab::Login)];
     }
     let offered = Tab::offered(&model.cx()).contains(&shown);
@@ -153,19 +147,13 @@ pub(super) fn on_typed(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         let session = model.session.clone();
         let changing = session.who.is_some() && !session.locked;
         model.tabs.login.leave_form(&session);
-        let leads = !changing && !is_closed(&session);
+        let leads = !changing && !rights::is_closed(&session);
         return if leads { vec![UiAction::Show(Tab::home(&model.snapshot.def))] } else { Vec::new() };
     }
     match global::find(&global::keys(), event).filter(|key| key.reaches(Reach::Typed)) {
         Some(key) => key.press(model),
         None => with_tabs(model, |tabs, cx| tabs.login.press(cx, event).unwrap_or_default()),
     }
-}
-
-/// Locks at once if a user is logged in.
-pub(super) fn lock(model: &Model) -> Vec<UiAction> {
-    let may = model.session.who.is_some() && !model.session.locked;
-    if may { vec![UiAction::SessionRequest(Tab::Login, SessionRequest::Lock)] } else { Vec::new() }
 }
 
 /// A key on a locked terminal that is meant for a window with work in it, as a faceplate opens one: the password is asked
@@ -292,7 +280,7 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
         tabs.shown = if Tab::offered(cx).contains(&shown) { shown } else { Tab::home(cx.def()) };
         Vec::new()
     });
-    let closed = is_closed(&model.session);
+    let closed = rights::is_closed(&model.session);
     model.modal = (!closed).then(|| Modal::Notice(Notice::new(t!("plant file"), words)));
     if closed { vec![UiAction::Show(Tab::Login)] } else { Vec::new() }
 }

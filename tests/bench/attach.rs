@@ -30,8 +30,9 @@ use sightglass::{
     plant::{
         Plant, PlantDef,
         def::{DeviceId, Framing},
-        event::{Event, LineState},
+        event::Event,
         line_report::{LineReport, PollReport},
+        line_state::LineState,
         request_stats::RequestStats,
         tag::{Poll, PollClass, Table},
         traffic::{Exchange, Frame, FrameResult},

@@ -19,7 +19,8 @@ use sightglass::{
     plant::{
         Plant, PlantDef,
         def::{Pen, TrendGroup},
-        event::{Event, LineState},
+        event::Event,
+        line_state::LineState,
         role::Role,
     },
     ui::{Model, Msg, theme::Theme, update, view},

@@ -6,7 +6,7 @@ use jiff::{SignedDuration, Timestamp};
 use sightglass::{
     bus::{ascii, capture, frame},
     plant::{
-        event::Fault,
+        fault::Fault,
         line::Framing,
         traffic::{Frame, FrameFault, FrameResult},
     },

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use jiff::Timestamp;
 use sightglass::{
     history::{HistoryError, io::store::Store},
-    plant::{record::AlarmEvent, station::StationFault},
+    plant::{record::AlarmEvent, station_fault::StationFault},
     profile::{self, Search},
 };
 

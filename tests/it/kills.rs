@@ -35,12 +35,12 @@ use sightglass::{
     },
     plant::{
         Snapshot,
+        alarm::ActiveAlarm,
         alarm::AlarmCommand,
         command::{Command, CommandId, CommandKind, Outcome},
         def::AlarmId,
         record::{AlarmEvent, AlarmRecord, SEAL_LOG},
         role::Role,
-        snapshot::ActiveAlarm,
     },
     profile::{self, Search},
     report::Period,

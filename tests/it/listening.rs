@@ -14,7 +14,7 @@ use std::{
 use sightglass::{
     access::io::own_user,
     attach::io::connect::connect,
-    plant::{Snapshot, event::LineState},
+    plant::{Snapshot, line_state::LineState},
     station::session::Session,
 };
 

@@ -11,8 +11,8 @@ use sightglass::{
         PlantDef, Snapshot,
         command::{Command, CommandId, CommandKind, Outcome, Refusal},
         def::{LineDef, LineId, Serial, Transport},
+        line_state::DeviceState,
         request_refusal::RequestRefusal,
-        snapshot::DeviceState,
     },
     profile::{self, PlantFile, Search},
     sim::{

@@ -27,7 +27,7 @@ use sightglass::{
         def::{AlarmId, ProcedureId, TagId},
         procedure::{ProcedureRun, ProcedureState},
         sample::{Quality, Sample},
-        station::StationFault,
+        station_fault::StationFault,
         tag::Poll,
     },
     profile::{self, Search},
@@ -344,7 +344,7 @@ impl Watch {
                 continue;
             }
             self.compared += 1;
-            if let Some(was) = self.is_wrong(tag.id, sample, snapshot.decimals[tag.id.index()]) {
+            if let Some(was) = self.is_wrong(tag.id, sample, snapshot) {
                 let (value, at) = (sample.value, sample.at);
                 wrong(format!("values: {} is shown as {value:?} and good, read at {at}; it was {was:?}", tag.name));
             }
@@ -379,8 +379,10 @@ impl Watch {
     }
 
     /// What it was about then, where that is something else.
-    fn is_wrong(&self, tag: TagId, sample: &Sample, decimals: u8) -> Option<(f64, f64)> {
-        let then = |at: Timestamp| sample.at - BEFORE <= at && at <= sample.at + AFTER;
+    fn is_wrong(&self, tag: TagId, sample: &Sample, snapshot: &Snapshot) -> Option<(f64, f64)> {
+        // What was true is known by steady time.
+        let (read, decimals) = (sample.at - snapshot.stepped, snapshot.decimals[tag.index()]);
+        let then = |at: Timestamp| read - BEFORE <= at && at <= read + AFTER;
         let of_then = self.truth.iter().filter(|(at, _)| then(*at)).filter_map(|(_, truth)| truth.get(&tag).copied());
         let of_then: Vec<f64> = of_then.collect();
         let (low, high) = of_then.iter().fold((f64::MAX, f64::MIN), |(low, high), now| (low.min(*now), high.max(*now)));

@@ -7,7 +7,7 @@ use crate::{
     bus::pdu::{self, MEI_IDENTIFICATION, READ_ONE_OBJECT},
     plant::{
         diagnostics::Finding,
-        event::{ExceptionCode, Fault},
+        fault::{ExceptionCode, Fault},
         tag::Table,
     },
 };

@@ -4,7 +4,7 @@ use super::{Ask, Job, Step, read};
 use crate::plant::{
     def::Serial,
     diagnostics::{DiagnosticStep, Finding, Scan, UnitReply},
-    event::Fault,
+    fault::Fault,
     number::{to_u8, to_u32},
     tag::Table,
 };

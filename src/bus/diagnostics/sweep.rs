@@ -7,7 +7,7 @@ use crate::{
     bus::pdu,
     plant::{
         diagnostics::{Conclusion, DiagnosticState, FINDINGS_MAX, Finding, SweepEnd},
-        event::{ExceptionCode, Fault},
+        fault::{ExceptionCode, Fault},
         live::AddressSpan,
         number::{to_u16, to_u32},
         sweep::{Sweep, SweptOutcome, SweptRange},

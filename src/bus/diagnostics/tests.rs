@@ -4,7 +4,7 @@ use super::*;
 use crate::plant::{
     command::{NotConfirmed, Outcome, Refusal},
     def::Framing,
-    event::ExceptionCode,
+    fault::ExceptionCode,
     line_trouble::LineTrouble,
 };
 use crate::{

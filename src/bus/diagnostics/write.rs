@@ -6,8 +6,8 @@ use crate::{
     plant::{
         command::{NotConfirmed, Outcome, Refusal},
         diagnostics::RegisterWrite,
-        event::Fault,
         exact::Exact,
+        fault::Fault,
         number::to_u16,
     },
 };

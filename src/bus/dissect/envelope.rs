@@ -7,7 +7,7 @@ use crate::{
         frame::{self, Mbap, hex},
         names::{Counted, counted},
     },
-    plant::{event::Fault, line::Framing},
+    plant::{fault::Fault, line::Framing},
     t,
 };
 

@@ -22,7 +22,7 @@ use super::{
     frame::{self, Request},
     names, pdu, request_lint,
 };
-use crate::plant::{event::Fault, line::Framing, traffic::Frame};
+use crate::plant::{fault::Fault, line::Framing, traffic::Frame};
 
 pub use envelope::{message_of, recognise};
 

@@ -11,7 +11,7 @@ use crate::{
         names::{self, Counted, comm_status, counted, modicon, span},
         pdu,
     },
-    plant::{event::ExceptionCode, number::to_u8},
+    plant::{fault::ExceptionCode, number::to_u8},
     t,
     text::translate,
 };

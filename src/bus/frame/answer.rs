@@ -4,7 +4,7 @@ use crate::{
     bus::pdu::{self, Function, Item, Length},
     plant::{
         def::Framing,
-        event::{ExceptionCode, Fault},
+        fault::{ExceptionCode, Fault},
         number::to_u16,
     },
 };

@@ -1,7 +1,7 @@
 //! The header of Modbus TCP: where a frame of a stream ends, and the exception answer whose header counts too many bytes.
 
 use super::{MESSAGE_MAX, check_answer};
-use crate::plant::{def::Framing, event::Fault};
+use crate::plant::{def::Framing, fault::Fault};
 
 /// What stands at the beginning of a TCP stream.
 #[derive(Debug, PartialEq, Eq)]
@@ -80,7 +80,7 @@ pub fn short_exception<'a>(stream: &[u8], asked: &impl Fn(u16) -> Option<&'a [u8
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::{bus::frame::with_mbap, plant::event::ExceptionCode};
+    use crate::{bus::frame::with_mbap, plant::fault::ExceptionCode};
 
     const ASKED: [u8; 6] = [1, 3, 0x7D, 0x64, 0, 5];
 

@@ -29,7 +29,8 @@ use crate::{
     bus::frame,
     plant::{
         def::{Framing, LineDef, Protocol},
-        event::{Fault, FaultKind, LineCounters},
+        fault::{Fault, FaultKind},
+        line_state::LineCounters,
         line_trouble::LineTrouble,
         number::to_u32,
         traffic::{Exchange, Frame, FrameFault, FrameResult},

@@ -8,7 +8,7 @@ use crate::{
         late_reply::LineReplies, other_master::OtherMaster, plan::Block, request_gap::RequestGaps,
         wide_addresses::WideAddresses,
     },
-    plant::{def::LineDef, event::LineCounters, line_finding::OtherMasterHeard, number::to_u16},
+    plant::{def::LineDef, line_finding::OtherMasterHeard, line_state::LineCounters, number::to_u16},
 };
 
 /// What a line remembers from one opening of its port to the next.

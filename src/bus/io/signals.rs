@@ -8,7 +8,7 @@ use super::{
     transport::serial_stream,
     uart::{self, PortWatch},
 };
-use crate::plant::{event::UartCounters, line::Serial, line_trouble::LineTrouble, port_signals::PortSignals};
+use crate::plant::{line::Serial, line_state::UartCounters, line_trouble::LineTrouble, port_signals::PortSignals};
 
 /// A port whose signals are set and read.
 pub struct SignalPort {

@@ -14,8 +14,8 @@ use super::{
     uart::{self, PortWatch},
 };
 use crate::plant::{
-    event::UartCounters,
     line::{Parity, Protocol, Serial, Transport},
+    line_state::UartCounters,
     line_trouble::LineTrouble,
     port_signals::OutputSignal,
 };

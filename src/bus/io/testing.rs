@@ -24,7 +24,7 @@ use crate::{
     plant::{
         def::{Framing, LineDef, Transport},
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState},
-        event::Fault,
+        fault::Fault,
         line_trouble::LineTrouble,
     },
 };

@@ -38,7 +38,9 @@ use crate::bus::frame;
 use crate::plant::{
     command::{BusRequest, WriteId, WriteJob},
     def::{DeviceId, LineDef, TagId},
-    event::{Event, ExceptionCode, Fault, LineState, WriteResult},
+    event::{Event, WriteResult},
+    fault::{ExceptionCode, Fault},
+    line_state::LineState,
     request_stats::RequestStats,
     tag::{Access, DataType, Poll, Table, TagDef},
 };

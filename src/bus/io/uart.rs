@@ -14,7 +14,7 @@ use tokio_serial::SerialStream;
 
 use crate::plant::{
     def::Rs485,
-    event::UartCounters,
+    line_state::UartCounters,
     port_signals::{OutputSignal, PortSignals},
 };
 

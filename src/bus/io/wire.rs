@@ -19,7 +19,7 @@ use crate::{
     },
     plant::{
         def::{Framing, LineDef},
-        event::LineCounters,
+        line_state::LineCounters,
         line_trouble::LineTrouble,
         number::to_u32,
         traffic::{FRAMES_MAX, Frame, FrameFault, FrameResult},

@@ -13,7 +13,8 @@ use crate::{
     plant::{
         Plant, PlantDef, Snapshot,
         def::{DeviceDef, DeviceId, Framing, LineId},
-        event::{Event, Fault, FaultKind},
+        event::Event,
+        fault::{Fault, FaultKind},
         id::TagId,
         traffic::{Exchange, Frame},
     },

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use crate::plant::{event::Fault, line::Framing, traffic::Frame};
+use crate::plant::{fault::Fault, line::Framing, traffic::Frame};
 
 /// What was heard.
 #[derive(Debug, Clone, PartialEq)]

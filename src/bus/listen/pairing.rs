@@ -15,7 +15,7 @@ use crate::{
         pdu::{self},
     },
     plant::{
-        event::Fault,
+        fault::Fault,
         line::Framing,
         time::elapsed,
         traffic::{FrameFault, FrameResult},

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use super::{Block, refused::RefusedPages};
 use crate::plant::{
-    def::READ_REGISTERS_MAX, event::ExceptionCode, line_finding::DeviceFinding, live::AddressSpan, number::to_u16,
+    def::READ_REGISTERS_MAX, fault::ExceptionCode, line_finding::DeviceFinding, live::AddressSpan, number::to_u16,
     tag::Table,
 };
 

@@ -9,7 +9,7 @@ use crate::{
     bus::{backoff::Backoff, plan::Block},
     plant::{
         def::DeviceId,
-        event::ExceptionCode,
+        fault::ExceptionCode,
         tag::{Poll, PollClass, Table},
         time::elapsed,
     },

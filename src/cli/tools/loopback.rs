@@ -8,7 +8,7 @@ use crate::{
     cli::{CliError, say},
     plant::{
         diagnostics::{Diagnostic, Finding},
-        event::Fault,
+        fault::Fault,
         line::Framing,
         time::elapsed,
     },

@@ -7,7 +7,7 @@ use crate::{
     plant::{
         def::LineDef,
         diagnostics::{Diagnostic, Finding},
-        event::Fault,
+        fault::Fault,
         live::AddressSpan,
         number::to_u16,
         tag::{ByteOrder, Table},

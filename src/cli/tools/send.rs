@@ -16,7 +16,7 @@ use crate::{
     plant::{
         def::Framing,
         diagnostics::{Diagnostic, Finding},
-        event::Fault,
+        fault::Fault,
     },
 };
 

@@ -11,7 +11,7 @@ use jiff::Timestamp;
 
 use super::store::{instant, utc};
 use crate::plant::{
-    alarm::def::Priority,
+    alarm_def::Priority,
     batch::{BatchEvent, BatchRecord},
     control_run::{ControlRun, Figure, RunCause, RunState},
     exact::Exact,

@@ -32,10 +32,10 @@ use crate::{
         def::{DeviceDef, MqttDef},
         event::Event,
         mqtt_request::MqttRequestStatus,
-        north_def::NorthStatus,
+        north_status::NorthStatus,
         sample::Sample,
         snapshot::HistoryStatus,
-        station::{FaultState, StationFault},
+        station_fault::{FaultState, StationFault},
         time::elapsed,
     },
 };

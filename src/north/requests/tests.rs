@@ -6,7 +6,7 @@ use crate::{
         payload::tests::mqtt,
         request::tests::{at, json, message},
     },
-    plant::{Plant, command::Refusal, event::Fault, fixture},
+    plant::{Plant, command::Refusal, fault::Fault, fixture},
 };
 
 const TERMINAL: u32 = 7;

@@ -3,16 +3,67 @@
 use std::{cmp::Reverse, sync::Arc};
 
 use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
 
 use super::{
-    AlarmCommand, AlarmManager,
+    AlarmManager,
     state::{AlarmState, AlarmStateMachine, OperatorNote},
 };
-use crate::plant::{
-    command::CommandKind,
-    def::AlarmId,
-    snapshot::{ActiveAlarm, Snapshot, SuppressedAlarm},
-};
+use crate::plant::{exact::Exact, id::AlarmId, record::FirstOut};
+
+/// An alarm that an operator should see.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ActiveAlarm {
+    /// Which.
+    pub id: AlarmId,
+    /// Unacknowledged, acknowledged, returned, latched; never one of those that are suppressed.
+    pub state: AlarmState,
+    /// When it was raised.
+    pub raised_at: Timestamp,
+    /// When it was last annunciated; identifies what the operator saw, see [`super::alarm::AlarmCommand::Acknowledge`].
+    pub annunciated_at: Timestamp,
+    /// When it returned to normal, if it did.
+    pub returned_at: Option<Timestamp>,
+    /// The value that raised it.
+    pub value: Option<Exact>,
+    /// Who acknowledged it, when, with which note.
+    pub acknowledged: Option<OperatorNote>,
+    /// The steps of its action that were done: who, when, and the step as the reason.
+    pub steps: Vec<OperatorNote>,
+    /// Activations since the station started.
+    pub times: u32,
+    /// Its place among the alarms that were raised together.
+    pub first_out: Option<FirstOut>,
+}
+
+impl ActiveAlarm {
+    /// An alarm without value, actions and first-out group.
+    pub fn new(id: AlarmId, state: AlarmState, raised_at: Timestamp) -> ActiveAlarm {
+        let (returned_at, value, acknowledged, steps, times, first_out) = (None, None, None, Vec::new(), 1, None);
+        let annunciated_at = raised_at;
+        ActiveAlarm { id, state, raised_at, annunciated_at, returned_at, value, acknowledged, steps, times, first_out }
+    }
+
+    /// Who did this step of the action, and when.
+    pub fn step(&self, text: &str) -> Option<&OperatorNote> {
+        self.steps.iter().find(|ticked| ticked.reason.as_deref() == Some(text))
+    }
+}
+
+/// An alarm that is suppressed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SuppressedAlarm {
+    /// Which.
+    pub id: AlarmId,
+    /// Shelved, suppressed or out of service.
+    pub state: AlarmState,
+    /// Who suppressed it, when and why; no operator if by design.
+    pub note: OperatorNote,
+    /// When it comes back by itself, if it is shelved.
+    pub until: Option<Timestamp>,
+    /// Its condition holds all the same.
+    pub active: bool,
+}
 
 /// What a snapshot shows of the manager. Shared, because most snapshots show the same.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -65,19 +116,6 @@ impl AlarmManager {
             (self.def.alarm(alarm.id).priority, !waits, Reverse(alarm.raised_at))
         });
         Lists { active: Arc::new(active), suppressed: Arc::new(suppressed), sound }
-    }
-}
-
-impl Snapshot {
-    /// The command to acknowledge all that waits here, as it is seen; `None` if nothing does.
-    pub fn acknowledge_all(&self) -> Option<CommandKind> {
-        let waits = self.alarms.iter().any(|alarm| alarm.state.needs_acknowledgement());
-        waits.then_some(CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: None, seen: self.annunciations }))
-    }
-    /// The most urgent alarm that waits for an acknowledgement, else the most urgent one: what every page names.
-    pub fn foremost_alarm(&self) -> Option<&ActiveAlarm> {
-        let mut waiting = self.alarms.iter().filter(|alarm| alarm.state.needs_acknowledgement());
-        waiting.next().or_else(|| self.alarms.first())
     }
 }
 

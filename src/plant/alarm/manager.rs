@@ -9,16 +9,16 @@ use std::{
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    condition::{ConditionMemory, Facts, holds},
     lists::Lists,
     state::{AlarmDelays, AlarmState, AlarmStateMachine},
     succession,
 };
 use crate::plant::{
+    condition::{ConditionMemory, Facts, holds},
     def::{AlarmDef, AlarmId, LineId, PlantDef, Subject},
     exact::Exact,
     record::{AlarmEvent, AlarmIdentity, AlarmRecord, FirstOut},
-    station::STATION,
+    station_fault::STATION,
 };
 
 /// A suppressed alarm whose enabling has been unknown for so long comes back: an unknown condition must not keep

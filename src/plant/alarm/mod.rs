@@ -2,8 +2,6 @@
 
 pub(crate) mod manager;
 pub(crate) mod command;
-pub(crate) mod condition;
-pub(crate) mod def;
 pub(crate) mod lists;
 pub(crate) mod monitor;
 pub(crate) mod metrics;
@@ -14,6 +12,7 @@ pub(crate) mod succession;
 mod tests;
 
 pub use command::{AlarmCommand, AlarmRefusal};
+pub use lists::{ActiveAlarm, SuppressedAlarm};
 pub use manager::AlarmManager;
 pub use metrics::{AlarmMetrics, PeriodMetrics};
 pub use monitor::AlarmMonitor;

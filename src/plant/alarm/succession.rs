@@ -14,11 +14,11 @@ use jiff::Timestamp;
 
 use super::{
     AlarmManager,
-    condition::{Condition, Level},
     manager::{name_of, subject_name},
     state::{AlarmState, AlarmStateMachine, OperatorNote},
 };
 use crate::plant::{
+    condition::{Condition, Level},
     def::{AlarmDef, AlarmId, PlantDef, Subject},
     place,
     record::{AlarmEvent, AlarmIdentity, AlarmRecord},

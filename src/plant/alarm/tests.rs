@@ -10,7 +10,8 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use proptest::prelude::*;
 
-use super::{AlarmManager, AlarmRefusal, AlarmState, condition::Facts, state::OperatorNote};
+use super::{AlarmManager, AlarmRefusal, AlarmState, state::OperatorNote};
+use crate::plant::condition::Facts;
 use crate::plant::{
     def::{AlarmDef, AlarmId, Condition, Level, PlantDef, Subject},
     fixture::{self, HIGH, PV, SILENT},

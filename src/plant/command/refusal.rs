@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::{
     plant::{
         alarm::AlarmRefusal,
-        event::{ExceptionCode, Fault},
         exact::Exact,
+        fault::{ExceptionCode, Fault},
         parameter_set::Problem,
         request_refusal::RequestRefusal,
     },

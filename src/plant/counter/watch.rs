@@ -11,7 +11,7 @@ use crate::plant::{
     exact::Exact,
     process_image::ProcessImage,
     record::{ActionRecord, Record},
-    station::STATION,
+    station_fault::STATION,
     tag::TagDef,
 };
 

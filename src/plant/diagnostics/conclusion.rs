@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::FINDINGS_MAX;
 use crate::{
     plant::{
-        event::ExceptionCode,
+        fault::ExceptionCode,
         port_signals::{PortSignals, SignalTest},
     },
     t,

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{super::command::Outcome, Conclusion};
 use crate::{
     plant::{
-        event::{ExceptionCode, Fault},
+        fault::{ExceptionCode, Fault},
         line::Serial,
         port_signals::PortSignals,
         sweep::SweptRange,

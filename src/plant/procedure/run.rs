@@ -10,8 +10,8 @@ use super::{
 };
 use crate::plant::{
     command::{CommandId, Outcome},
-    event::Fault,
     exact::Exact,
+    fault::Fault,
     id::{DeviceId, TagId},
     time::elapsed,
 };

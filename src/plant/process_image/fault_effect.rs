@@ -3,7 +3,7 @@
 use jiff::Timestamp;
 
 use crate::plant::{
-    event::{ExceptionCode, Fault, FaultKind},
+    fault::{ExceptionCode, Fault, FaultKind},
     sample::{Cause, Sample},
 };
 

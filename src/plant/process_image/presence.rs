@@ -45,8 +45,8 @@ mod tests {
 
     use super::*;
     use crate::plant::{
-        event::Fault,
         expr::{Compare, Expr},
+        fault::Fault,
         fixture::{self, DP, PV},
     };
 
@@ -75,7 +75,7 @@ mod tests {
         assert_eq!(image.sample(PV).quality, ABSENT, "read or not");
         image.read(&[(DP, 1.0)], at(1_000));
         image.failed(&[PV], Fault::Timeout, at(1_001));
-        image.failed(&[PV], Fault::Exception(crate::plant::event::ExceptionCode::ILLEGAL_ADDRESS), at(1_002));
+        image.failed(&[PV], Fault::Exception(crate::plant::fault::ExceptionCode::ILLEGAL_ADDRESS), at(1_002));
         assert_eq!(image.sample(PV).quality, ABSENT, "refused or not");
         image.read(&[(DP, 2.0)], at(1_003));
         assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::NotRead), "there again");

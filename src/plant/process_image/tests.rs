@@ -3,7 +3,7 @@
 use super::*;
 use crate::plant::fixture::{self, DP, FAULT, PV, RUN, SV, TIC};
 use crate::plant::{
-    event::ExceptionCode,
+    fault::ExceptionCode,
     tag::{DataType, StorePolicy},
 };
 

@@ -2,18 +2,21 @@
 
 use super::{Effects, Plant};
 use crate::plant::{
-    alarm::{AlarmCommand, AlarmRefusal, Succession, condition::Facts, state::OperatorNote},
+    alarm::{AlarmCommand, AlarmRefusal, Succession, state::OperatorNote},
     command::{CommandStatus, NotConfirmed, Outcome, Refusal},
+    condition::Facts,
     def::{AlarmDef, AlarmId, Condition, DeviceId, PlantDef, Subject},
     device_time::DeviceTime,
-    event::LineState,
     exact::Exact,
+    line_state::DeviceState,
+    line_state::LineState,
     ne107::{Reason, Signal},
     process_image::ProcessImage,
     record::{AlarmEvent, AlarmRecord, Record},
     sample::{Cause, Quality},
-    snapshot::{DeviceState, DeviceStatus, LineStatus},
-    station::{STATION, StationFault, StationFaults},
+    snapshot::{DeviceStatus, LineStatus},
+    station_alarms::StationFaults,
+    station_fault::{STATION, StationFault},
 };
 
 impl Plant {

@@ -7,10 +7,11 @@ use jiff::Timestamp;
 use super::Plant;
 use crate::plant::{
     def::{DeviceId, LineId, TagId},
-    event::{Fault, FaultKind, LineState},
+    fault::{Fault, FaultKind},
+    line_state::DeviceState,
+    line_state::LineState,
     record::ActionRecord,
     sample::Cause,
-    snapshot::DeviceState,
 };
 
 impl Plant {

@@ -89,9 +89,10 @@ mod tests {
     use crate::plant::{
         command::{Command, CommandId, CommandStatus},
         def::{ActionDef, LineId},
-        event::{Event, LineState, WriteResult},
+        event::{Event, WriteResult},
         fixture::{self, DP, PLC, PV, SV, TIC},
         id::WriteId,
+        line_state::LineState,
         ne107::Reason,
     };
 

@@ -15,12 +15,12 @@ use crate::plant::{
     def::{DeviceId, ProcedureId, TagId},
     exact::Exact,
     interlock,
+    line_state::DeviceState,
     number::to_u16,
     procedure::{self, Instruction, ProcedureEnd, ProcedureRun, View},
     record::{ActionRecord, Record},
     scale,
-    snapshot::DeviceState,
-    station::{FaultState, StationFault},
+    station_fault::{FaultState, StationFault},
 };
 
 impl Plant {

@@ -179,7 +179,7 @@ impl Plant {
                     Some(ended) => run.end_write(ended.clone()),
                     // The command is forgotten: the write may or may not have taken effect.
                     None => run.end_write(Outcome::NotConfirmed(NotConfirmed::NotAnswered(
-                        crate::plant::event::Fault::Timeout,
+                        crate::plant::fault::Fault::Timeout,
                     ))),
                 }
             }

@@ -3,7 +3,7 @@
 use super::Plant;
 use crate::plant::{
     snapshot::HistoryStatus,
-    station::{FaultState, StationFault},
+    station_fault::{FaultState, StationFault},
 };
 
 impl Plant {

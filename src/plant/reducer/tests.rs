@@ -11,7 +11,7 @@ use crate::plant::{
     alarm::AlarmState,
     command::{Command, CommandId, NotConfirmed, Refusal, WriteJob},
     def::{ActionDef, AlarmDef, AlarmId, Condition, Subject},
-    event::{ExceptionCode, Fault},
+    fault::{ExceptionCode, Fault},
     fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
     interlock::{InterlockCondition, InterlockDef},
     line_report::LineReport,

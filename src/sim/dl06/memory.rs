@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::plant::{event::ExceptionCode, tag::Table};
+use crate::plant::{fault::ExceptionCode, tag::Table};
 
 /// Bits of one kind, sixteen to a word, lowest number in the lowest bit.
 #[derive(Debug, Clone)]

@@ -10,7 +10,7 @@ use sequence::{Conditions, Sequence, Step};
 
 use super::pdu::{Identity, Registers};
 use super::tank::{Actuators, Readings, control_level_cm};
-use crate::plant::event::ExceptionCode;
+use crate::plant::fault::ExceptionCode;
 use crate::plant::{def::Limits, number::to_u16, tag::Table};
 
 /// Time of one scan.

@@ -225,7 +225,7 @@ impl Task {
 mod tests {
     use super::*;
     use crate::plant::{
-        event::Fault,
+        fault::Fault,
         fixture::{self, TIC},
         record::AlarmEvent,
     };

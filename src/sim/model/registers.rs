@@ -7,7 +7,7 @@ use std::{
 
 use crate::{
     bus::codec,
-    plant::event::ExceptionCode,
+    plant::fault::ExceptionCode,
     plant::{
         def::{DeviceDef, Limits, TagId},
         number::to_u32,

@@ -1,6 +1,6 @@
 //! What a device says of itself: report server id (11) and device identification (2B/0E).
 
-use crate::plant::event::ExceptionCode;
+use crate::plant::fault::ExceptionCode;
 use crate::{bus::pdu::MEI_IDENTIFICATION, plant::number::to_u8};
 
 /// Basic and regular objects, as a stream and one by one.

@@ -22,7 +22,7 @@ use crate::{
     history::{HistoryError, io::thread as history},
     plant::{
         Plant, PlantDef,
-        station::{FaultState, StationFault},
+        station_fault::{FaultState, StationFault},
     },
     station::{
         audit_queue::AuditQueue,

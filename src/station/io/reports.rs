@@ -34,7 +34,7 @@ use crate::{
         record::{ActionRecord, Record},
         report::{ReportEvent, ReportRecord},
         snapshot::HistoryStatus,
-        station::{FaultState, StationFault},
+        station_fault::{FaultState, StationFault},
         time::elapsed,
     },
     report::{

@@ -16,7 +16,7 @@ use crate::{
         PlantDef, Redefined, SetWork,
         command::{BusRequest, CommandStatus},
         event::Event,
-        station::{FaultState, StationFault},
+        station_fault::{FaultState, StationFault},
     },
     profile::PlantFile,
     station::{audit_queue::AuditMessage, entries, past::Past},

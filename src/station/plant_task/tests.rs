@@ -12,7 +12,7 @@ use crate::{
         alarm::AlarmCommand,
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome},
         def::{AlarmId, TagId},
-        event::Fault,
+        fault::Fault,
         fixture,
         record::{AlarmEvent, ChainHash},
     },

@@ -65,7 +65,7 @@ pub(super) fn header_parts(model: &Model, cx: &ViewContext, role: bool, lines: L
         (0, clock(cx.now, &cx.def().time_zone), theme.normal())
     };
     let mut parts = vec![time, who_text(model, cx, role)];
-    parts.extend(cx.extension.iter().flat_map(|extension| extension.header(cx)));
+    parts.extend(cx.extension.iter().flat_map(|extension| extension.header(cx.theme)));
     if cx.snapshot.speed != 1.0 {
         parts.push((8, t!("speed ×{speed}", speed = cx.snapshot.speed), theme.strong()));
     }

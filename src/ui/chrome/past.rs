@@ -9,7 +9,9 @@ use crate::{
     ui::{
         global::GlobalKey,
         keys::{Hint, code},
-        replay::{self, Event, stamp},
+        modal::instant::stamp,
+        replay::Event,
+        replay_keys,
         tabs::alarms::{action_text, event_text},
         widgets::text::age,
     },
@@ -60,6 +62,7 @@ pub(super) fn hints(model: &Model, cx: &ViewContext) -> Vec<Hint> {
     };
     let is_escape = |hint: &Hint| hint.chord.is_some_and(|chord| chord == code(KeyCode::Esc));
     let (escape, own): (Vec<Hint>, Vec<Hint>) = own.into_iter().partition(is_escape);
-    let replay = replay::KEYS.iter().copied().map(GlobalKey::hint).filter(|hint| escape.is_empty() || !is_escape(hint));
+    let replay =
+        replay_keys::KEYS.iter().copied().map(GlobalKey::hint).filter(|hint| escape.is_empty() || !is_escape(hint));
     escape.iter().cloned().chain(replay).chain(own).collect()
 }

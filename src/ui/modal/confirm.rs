@@ -8,7 +8,7 @@ use super::{
     Faceplate, Modal, Next,
     confirmed_value::ConfirmedValue,
     form::{Field, Form, KeyOutcome},
-    window,
+    plant_command, window,
 };
 use crate::{
     access::{Credentials, control::reauthentication},
@@ -25,7 +25,6 @@ use crate::{
     },
     ui::{
         Effect, Leaving, UiAction, ViewContext, interlock, keys, rights,
-        tabs::mimic,
         widgets::{
             text::{Canvas, width, wrap},
             value,
@@ -222,7 +221,7 @@ impl Confirm {
             }
         } else {
             let write = matches!(self.action, ConfirmAction::Command(CommandKind::Write { .. }));
-            let other = mimic::command_of(cx, event).filter(|_| write);
+            let other = plant_command::command_of(cx, event).filter(|_| write);
             Next::Stay(other.unwrap_or(Modal::Confirm(self)))
         }
     }

@@ -8,6 +8,7 @@ use ratatui::{Frame, layout::Rect};
 use super::{
     Confirm, Modal, Next, Notice, Why,
     confirm::wire_text,
+    plant_command,
     sheet::{Fact, Sheet},
     window,
 };
@@ -15,11 +16,11 @@ use crate::{
     access::right,
     plant::{
         command::CommandKind,
-        def::{AlarmId, Condition, DeviceId, TagId},
+        def::{AlarmId, Condition, DeviceId, Subject, TagId},
         entry,
-        event::LineState,
+        line_state::DeviceState,
+        line_state::LineState,
         ne107::Reason,
-        snapshot::DeviceState,
         tag::{Access, Poll},
         time::elapsed,
     },
@@ -27,8 +28,8 @@ use crate::{
         ViewContext, interlock, keys,
         keys::Hint,
         rights,
-        tabs::mimic,
         widgets::{
+            actuator_mark,
             text::{age, clock, fit, pad, width},
             value,
         },
@@ -47,6 +48,18 @@ impl Faceplate {
     /// A faceplate; `None` for an item without tags.
     pub fn new(title: impl Into<String>, tags: Vec<TagId>) -> Option<Faceplate> {
         (!tags.is_empty()).then(|| Faceplate { title: title.into(), tags, selected: 0 })
+    }
+
+    /// The faceplate of what an alarm watches.
+    pub fn of(cx: &ViewContext, subject: Subject) -> Option<Faceplate> {
+        match subject {
+            Subject::Tag(tag) => Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]),
+            Subject::Device(device) => {
+                let tags = cx.def().tags_of(device).take(8).map(|tag| tag.id).collect();
+                Faceplate::new(format!("{} {}", cx.def().device(device).name, device_text(cx, device)), tags)
+            }
+            Subject::Line(_) | Subject::Station => None,
+        }
     }
 
     pub(super) fn hints(&self, cx: &ViewContext) -> Vec<Hint> {
@@ -92,7 +105,7 @@ impl Faceplate {
             KeyCode::Char('q') => return Next::Close,
             _ => {}
         }
-        Next::Stay(mimic::command_of(cx, event).unwrap_or(Modal::Faceplate(self)))
+        Next::Stay(plant_command::command_of(cx, event).unwrap_or(Modal::Faceplate(self)))
     }
 
     /// The other state of the selected actuator: its command, and the value.
@@ -142,7 +155,7 @@ impl Faceplate {
             let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
             let left = canvas.width().saturating_sub(x + 2);
             let x = canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
-            if let Some((words, style)) = interlock::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
+            if let Some((words, style)) = actuator_mark::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
                 let left = canvas.width().saturating_sub(x + 2);
                 canvas.text(x + 2, y, &fit(&words, left), style);
             }

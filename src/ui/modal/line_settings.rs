@@ -18,9 +18,9 @@ use crate::{
     plant::{
         command::{CommandKind, Outcome},
         def::{LineDef, LineId},
-        event::LineState,
+        line_state::DeviceState,
+        line_state::LineState,
         number::to_u16,
-        snapshot::DeviceState,
     },
     ui::{
         UiAction, ViewContext, keys,

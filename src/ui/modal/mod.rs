@@ -3,15 +3,18 @@
 pub(crate) mod choice;
 pub(crate) mod confirm;
 pub(crate) mod correction;
+mod action;
 pub(crate) mod audit_entry;
 pub(crate) mod entry;
 pub(crate) mod faceplate;
 pub(crate) mod form;
 pub(crate) mod guidance;
-pub(crate) mod help;
+mod help;
+pub(crate) mod instant;
 pub(crate) mod line;
 pub(crate) mod notice;
 pub(crate) mod palette;
+pub(crate) mod plant_command;
 pub(crate) mod prompt;
 pub(crate) mod reason;
 pub(crate) mod confirmed_value;
@@ -25,6 +28,7 @@ use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
+pub use action::{Scope, UiAction};
 pub use audit_entry::AuditEntryDialog;
 pub use choice::Choice;
 pub use confirm::Confirm;
@@ -32,6 +36,7 @@ pub use correction::Correction;
 pub use entry::Entry;
 pub use faceplate::Faceplate;
 pub use guidance::Guidance;
+pub use help::Help;
 pub use line_settings::LineSettings;
 pub use notice::Notice;
 pub use palette::{Palette, Target};
@@ -42,9 +47,10 @@ pub use user_form::UserForm;
 pub use why::Why;
 
 use super::{
-    UiAction, ViewContext,
+    ViewContext,
     keys::{self, Hint},
-    tabs::{Tab, Tabs, bus},
+    tab::Tab,
+    tabs::{Tabs, bus},
     widgets::text::{Canvas, fit, width},
 };
 use crate::plant::{
@@ -54,8 +60,8 @@ use crate::plant::{
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Modal {
-    /// All keys; the number is the first row shown.
-    Help(usize),
+    /// All keys.
+    Help(Help),
     Confirm(Confirm),
     Entry(Entry),
     Choice(Choice),
@@ -138,7 +144,7 @@ impl Modal {
             return Next::Both(self, vec![UiAction::Leave]);
         }
         match self {
-            Modal::Help(row) => help::on_key(row, cx, tabs, event),
+            Modal::Help(help) => help.on_key(cx, event),
             Modal::Confirm(confirm) => confirm.on_key(cx, event),
             Modal::Entry(entry) => entry.on_key(cx, event),
             Modal::Choice(choice) => choice.on_key(cx, event),
@@ -285,9 +291,9 @@ impl Modal {
     }
 
     /// Draws it in the middle of the body.
-    pub fn view(&self, cx: &ViewContext, tabs: &Tabs, frame: &mut Frame, body: Rect) {
+    pub fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         match self {
-            Modal::Help(row) => help::view(*row, cx, tabs, frame, body),
+            Modal::Help(help) => help.view(cx, frame, body),
             Modal::Confirm(confirm) => confirm.view(cx, frame, body),
             Modal::Entry(entry) => entry.view(cx, frame, body),
             Modal::Choice(choice) => choice.view(cx, frame, body),

@@ -6,12 +6,12 @@ use ratatui::{Frame, layout::Rect};
 
 use super::{Modal, Next, window};
 use crate::{
-    plant::{command::CommandKind, def::DeviceId, event::LineState, snapshot::DeviceState},
+    plant::{command::CommandKind, def::DeviceId},
     ui::{
-        UiAction, ViewContext, rights,
+        UiAction, ViewContext, interlock, rights,
         widgets::{
             list::{Motion, Scroll, on_screen},
-            text::{clock, width, wrap},
+            text::{width, wrap},
         },
     },
 };
@@ -32,30 +32,10 @@ impl Notice {
     /// Why nothing can be written to this device now; `None` if it can be tried.
     pub fn unreachable(cx: &ViewContext, device: DeviceId) -> Option<Notice> {
         let def = cx.def().device(device);
-        let why = Notice::why_unreachable(cx, device)?;
+        let why = interlock::why_unreachable(cx, device)?;
         let words =
             vec![t!("{name} is not responding", name = def.name), why, t!("Writing is not possible now.").to_owned()];
         Some(Notice::for_form(def.name.clone(), words))
-    }
-
-    /// The same as one sentence.
-    pub fn why_unreachable(cx: &ViewContext, device: DeviceId) -> Option<String> {
-        let def = cx.def().device(device);
-        let line = &cx.def().line(def.line).name;
-        let why = match (&cx.snapshot.line(def.line).state, cx.snapshot.device(device).state) {
-            (LineState::Disconnected, _) => t!("Line {line} was disconnected by an operator.", line),
-            (LineState::Testing, _) => t!("Line {line} is in use by a test (tab Bus).", line),
-            (LineState::NoTraffic, _) => t!("No traffic is heard on line {line}.", line),
-            (LineState::Waiting { why, .. }, _) => t!("Line {line} is not connected: {why}.", line, why),
-            (LineState::Connecting, _) => t!("Line {line} is connecting.", line),
-            (LineState::Connected, DeviceState::Down { since }) => {
-                t!("No data received since {clock}.", clock = clock(since, &cx.def().time_zone))
-            }
-            (LineState::Connected, DeviceState::Unknown | DeviceState::Responding | DeviceState::Failing(_)) => {
-                return None;
-            }
-        };
-        Some(why)
     }
 
     /// Opens a form that ends in this command, or says why the present user may not give it, before anything is filled in.

@@ -10,7 +10,7 @@ use nucleo_matcher::{
 };
 use ratatui::{Frame, layout::Rect};
 
-use super::{Faceplate, Guidance, Modal, Next, line::Line, window};
+use super::{Faceplate, Guidance, Modal, Next, instant, line::Line, window};
 use crate::{
     plant::{
         def::{AlarmId, DeviceId, ProcedureId, TagId},
@@ -20,13 +20,11 @@ use crate::{
     text::{searchable, translate},
     ui::{
         UiAction, ViewContext,
-        global::{self, GlobalKey},
-        keys::{self, Chord},
+        keys::{self, Chord, Hint},
         layout::Size,
         modal::reason::subject,
         preferences::Bookmark,
-        replay,
-        tabs::{Tab, TabView, alarms},
+        tab::Tab,
         widgets::{
             list::{Motion, first, on_screen},
             text::{fit, pad, width},
@@ -122,9 +120,9 @@ pub struct Palette {
 }
 
 impl Palette {
-    /// Everything that there is, what was chosen before at first.
-    pub fn new(cx: &ViewContext, tab: &dyn TabView, bookmarks: &[Bookmark], recent: &[Target]) -> Palette {
-        let mut rows = rows(cx, tab);
+    /// Everything that there is, with the keys of the moment; what was chosen before at first.
+    pub fn new(cx: &ViewContext, keys: Vec<Hint>, bookmarks: &[Bookmark], recent: &[Target]) -> Palette {
+        let mut rows = rows(cx, keys);
         rows.extend(bookmark_rows(cx, bookmarks));
         let place = |row: &Found| recent.iter().position(|target| *target == row.target).unwrap_or(recent.len());
         rows.sort_by_key(place);
@@ -254,18 +252,18 @@ fn instant(cx: &ViewContext, text: &str) -> Option<Found> {
     // A bench has no history, the smallest screen no row that says that a past is shown.
     let has_past = !cx.def().is_bench() && Size::Compact < cx.size;
     let at = (has_past && text.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
-        .then(|| replay::instant(cx, text).ok())??;
-    Some(Found::new(Target::Instant(at), t!("time"), &replay::stamp(cx, at), t!("replay")))
+        .then(|| instant::instant(cx, text).ok())??;
+    Some(Found::new(Target::Instant(at), t!("time"), &instant::stamp(cx, at), t!("replay")))
 }
 
 fn bookmark_rows<'a>(cx: &'a ViewContext, bookmarks: &'a [Bookmark]) -> impl DoubleEndedIterator<Item = Found> + 'a {
     let row = |mark: &Bookmark| {
-        Found::new(Target::Bookmark(mark.at), t!("bookmark"), &mark.name, &replay::stamp(cx, mark.at))
+        Found::new(Target::Bookmark(mark.at), t!("bookmark"), &mark.name, &instant::stamp(cx, mark.at))
     };
     bookmarks.iter().map(row)
 }
 
-fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Found> {
+fn rows(cx: &ViewContext, keys: Vec<Hint>) -> Vec<Found> {
     let def = cx.def();
     let tabs = Tab::offered(cx).into_iter();
     let tabs = tabs.map(|tab| Found::new(Target::Tab(tab), t!("tab"), translate(tab.title()), translate(tab.help())));
@@ -280,10 +278,7 @@ fn rows(cx: &ViewContext, tab: &dyn TabView) -> Vec<Found> {
     let active = cx.snapshot.alarms.iter().map(|active| alarm(active.id, translate(active.state.word())));
     let is_active = |id: AlarmId| cx.snapshot.alarms.iter().any(|active| active.id == id);
     let others = def.alarms.iter().filter(|def| !is_active(def.id)).map(|def| alarm(def.id, ""));
-    let here = [global::PALETTE, global::PALETTE_TOO];
-    let global = global::keys().into_iter().filter(|key| key.tab().is_none() && !here.contains(&key.chord()));
-    let global = global.map(GlobalKey::hint);
-    let keys = tab.hints(cx).into_iter().chain(global).filter_map(|hint| {
+    let keys = keys.into_iter().filter_map(|hint| {
         let help = if hint.help.is_empty() { &hint.label } else { &hint.help };
         Some(Found::new(Target::Key(hint.chord?), t!("key"), &hint.key, help))
     });
@@ -319,7 +314,7 @@ pub fn actions(cx: &ViewContext, target: Target) -> Vec<UiAction> {
             vec![UiAction::ShowOnTrends(tag, (before, cx.now))]
         }
         Target::Alarm(id) => {
-            let faceplate = alarms::faceplate(cx, cx.def().alarm(id).subject);
+            let faceplate = Faceplate::of(cx, cx.def().alarm(id).subject);
             vec![UiAction::Open(Modal::Guidance(Box::new(Guidance::new(id, faceplate))))]
         }
         Target::Key(_) => Vec::new(),

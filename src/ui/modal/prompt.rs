@@ -4,10 +4,10 @@ use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Modal, Next, line::Line, window};
+use super::{Modal, Next, instant, line::Line, window};
 use crate::plant::number::to_u16;
 use crate::ui::{
-    UiAction, ViewContext, keys, replay,
+    UiAction, ViewContext, keys,
     tabs::{ListPage, Tabs},
     widgets::{
         list::Motion,
@@ -31,7 +31,7 @@ pub struct Prompt {
 enum Taker {
     Tab,
     /// The replay: it is an instant.
-    Replay(replay::Asked),
+    Replay(instant::Asked),
     /// The list of the tab, with each letter; it had this filter before.
     Filter(String),
 }
@@ -43,7 +43,7 @@ impl Prompt {
     }
 
     /// The answer is an instant to replay.
-    pub fn for_replay(self, asked: replay::Asked) -> Prompt {
+    pub fn for_replay(self, asked: instant::Asked) -> Prompt {
         Prompt { taker: Taker::Replay(asked), ..self }
     }
 
@@ -68,7 +68,7 @@ impl Prompt {
         if keys::code(KeyCode::Enter).is(event) {
             let text = self.line.text();
             let taken = match self.taker {
-                Taker::Replay(asked) => replay::typed(cx, &text, asked),
+                Taker::Replay(asked) => instant::typed(cx, &text, asked),
                 Taker::Tab => tabs.shown_mut().on_text(cx, &text),
                 Taker::Filter(_) => Ok(filter(cx, tabs, |list| list.set_filter(cx, &text))),
             };

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     plant::{def::Priority, number::to_u16},
     t,
-    text::{Language, translate},
+    text::{Language, Locale, translate},
     ui::{
         Model, UiAction, ViewContext,
         graphics::{Pictures, Protocol},
@@ -201,5 +201,28 @@ fn sample(cx: &ViewContext, canvas: &mut Canvas, y: u16) {
     x = canvas.text(x, y, "███", theme.liquid()) + 1;
     for pen in 0..8 {
         x = canvas.text(x, y, chart::mark(theme, pen), theme.pen(pen)) + 1;
+    }
+}
+
+impl Model {
+    /// The language of the texts: as chosen, else as kept; one whose letters the terminal has. The window of the settings
+    /// shows what is chosen in it.
+    pub(in crate::ui) fn locale(&self) -> Locale {
+        let is_tried = matches!(self.modal, Some(Modal::TerminalSettings(_)));
+        let ways = [
+            self.chosen_locale.filter(|_| !is_tried),
+            self.preferences.language.map(Language::locale),
+            Some(self.locale),
+        ];
+        ways.into_iter().flatten().find(|locale| self.can_show(*locale)).unwrap_or(Locale::ENGLISH)
+    }
+
+    /// Follows what the user has chosen, or tries in the window of the settings: whatever closes it ends the trial.
+    pub(in crate::ui) fn apply_preferences(&mut self) {
+        self.preferences = match &self.modal {
+            Some(Modal::TerminalSettings(window)) => window.chosen,
+            Some(_) | None => self.preferences_file.of(self.user()),
+        };
+        self.theme = self.preferences.theme(&self.limits);
     }
 }

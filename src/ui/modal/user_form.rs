@@ -23,7 +23,7 @@ use crate::{
     ui::{
         UiAction, ViewContext,
         keys::{self, Hint},
-        tabs::Tab,
+        tab::Tab,
         widgets::text::{Canvas, width, wrap},
     },
 };

@@ -2,7 +2,10 @@
 
 use crate::{
     t,
-    ui::{Model, UiAction, modal::Modal, msg::Scope},
+    ui::{
+        Model, UiAction,
+        modal::{Modal, Scope},
+    },
 };
 
 /// While the past is shown no command is given, and no form for one is opened.

@@ -30,7 +30,7 @@ struct Span {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Searched {
+pub enum Searched {
     /// Alarm events and actions of operators.
     Events,
     /// Begins and ends of batches.
@@ -100,7 +100,7 @@ impl Span {
 
 impl Replay {
     /// Asks for the next event in a direction.
-    pub(super) fn search(
+    pub fn search(
         &mut self,
         what: Searched,
         direction: Direction,
@@ -140,12 +140,7 @@ impl Replay {
     }
 
     /// Asks when the next value of what is drawn was stored, or the previous one.
-    pub(super) fn search_sample(
-        &mut self,
-        direction: Direction,
-        at: Timestamp,
-        present: &ViewContext,
-    ) -> Vec<UiAction> {
+    pub fn search_sample(&mut self, direction: Direction, at: Timestamp, present: &ViewContext) -> Vec<UiAction> {
         self.pause();
         (self.requested, self.search, self.trouble) = (None, None, None);
         let tags: Vec<TagId> = self.drawn().iter().map(|pen| pen.tag).collect();

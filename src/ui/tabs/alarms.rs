@@ -24,16 +24,12 @@ mod tests;
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        alarm::{ActiveAlarm, SuppressedAlarm},
         def::{AlarmClass, AlarmId, Priority, Subject},
-        snapshot::{ActiveAlarm, SuppressedAlarm},
     },
-    ui::{
-        layout::Size,
-        modal::{Guidance, faceplate::device_text},
-    },
+    ui::{layout::Size, modal::Guidance},
 };
 use filter::{Filter, Sort};
-pub use go::faceplate;
 use handover::Handover;
 pub(in crate::ui) use handover::NO_CHANGE;
 pub use handover::suppressed_words;
@@ -163,7 +159,7 @@ impl KeyTable for Alarms {
     }
 
     #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
+    fn chords() -> crate::ui::key_table::PageChords {
         Page::ALL.map(|page| (page.title(), keys::table(page).chords())).to_vec()
     }
 }

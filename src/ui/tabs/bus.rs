@@ -26,7 +26,7 @@ use super::{line_switch, registers::Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        event::LineState, line_minute::LineMinute, line_report::LineReport, request_refusal::RequestRefusal,
+        line_minute::LineMinute, line_report::LineReport, line_state::LineState, request_refusal::RequestRefusal,
         snapshot::LineStatus,
     },
     ui::{

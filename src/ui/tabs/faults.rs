@@ -16,8 +16,9 @@ use crate::{
     ui::{
         Effect,
         extension::{self, Extension, ExtensionMessage},
-        rights, session_lock,
+        rights,
         tabs::bus,
+        theme::Theme,
     },
 };
 
@@ -31,7 +32,7 @@ pub struct Faults {
     verdict: bool,
 }
 
-type Key = crate::ui::keys::Key<Faults>;
+type Key = crate::ui::key_table::Key<Faults>;
 
 const KEYS: &[Key] = &[
     Key::change(code(KeyCode::Up), "", "select the fault above", |faults, cx| faults.step(cx, -1)),
@@ -42,7 +43,9 @@ const KEYS: &[Key] = &[
     Key::new(code(KeyCode::Right), "number", "increase its parameter", |faults, cx| faults.change_parameter(cx, true)),
     Key::new(char('c'), "clear all", "clear all faults", |_, cx| cleared(cx, SimCommand::ClearAll)),
     Key::change(char('v'), "points", "score of the drill, or the fault", |faults, _| faults.verdict = !faults.verdict)
-        .when(|_, cx| Offer::only_if(extension::state::<Status>(cx).is_some_and(|status| status.scenario.is_some()))),
+        .when(|_, cx| {
+            Offer::only_if(extension::state::<Status>(cx.extension).is_some_and(|status| status.scenario.is_some()))
+        }),
 ];
 
 impl TabView for Faults {
@@ -62,10 +65,6 @@ impl TabView for Faults {
     fn new(_snapshot: &Snapshot) -> Faults {
         Faults::default()
     }
-
-    fn is_offered(cx: &ViewContext) -> bool {
-        !session_lock::is_closed(cx.session) && open(cx).is_some()
-    }
 }
 
 impl KeyTable for Faults {
@@ -74,7 +73,7 @@ impl KeyTable for Faults {
     }
 
     #[cfg(test)]
-    fn chords() -> keys::PageChords {
+    fn chords() -> key_table::PageChords {
         vec![("faults", Keys::of(&[KEYS]).chords())]
     }
 }
@@ -127,39 +126,44 @@ impl Faults {
 }
 
 impl Extension for Status {
-    fn header(&self, cx: &ViewContext) -> Vec<(usize, String, Style)> {
-        [demo_part(cx, self)].into_iter().chain(result_part(cx, self)).collect()
+    fn header(&self, theme: &Theme) -> Vec<(usize, String, Style)> {
+        [demo_part(theme, self)].into_iter().chain(result_part(theme, self)).collect()
+    }
+
+    /// An exam hides it.
+    fn has_tab(&self) -> bool {
+        self.is_open()
     }
 }
 
 /// That the plant is simulated, and how many faults are active, which an exam hides.
-fn demo_part(cx: &ViewContext, status: &Status) -> (usize, String, Style) {
+fn demo_part(theme: &Theme, status: &Status) -> (usize, String, Style) {
     match (status.is_open(), status.active.len()) {
         (false, _) => {
             let left = |progress: &Progress| running(progress.duration.saturating_sub(progress.elapsed));
             let left =
                 status.scenario.as_ref().map_or(String::new(), |progress| t!(" {left} left", left = left(progress)));
-            (2, t!("EXAM{left}", left), cx.theme.strong())
+            (2, t!("EXAM{left}", left), theme.strong())
         }
-        (true, 0) => (2, t!("DEMO").to_owned(), cx.theme.strong()),
-        (true, 1) => (2, t!("DEMO 1 FAULT").to_owned(), cx.theme.trouble()),
-        (true, count) => (2, t!("DEMO {count} FAULTS", count), cx.theme.trouble()),
+        (true, 0) => (2, t!("DEMO").to_owned(), theme.strong()),
+        (true, 1) => (2, t!("DEMO 1 FAULT").to_owned(), theme.trouble()),
+        (true, count) => (2, t!("DEMO {count} FAULTS", count), theme.trouble()),
     }
 }
 
 /// The result of the drill, once it is over.
-fn result_part(cx: &ViewContext, status: &Status) -> Option<(usize, String, Style)> {
+fn result_part(theme: &Theme, status: &Status) -> Option<(usize, String, Style)> {
     let verdict = status.scenario.as_ref().map(|progress| &progress.verdict).filter(|verdict| verdict.over)?;
     let (words, style) = match verdict.passed() {
-        true => (t!("drill PASSED: see 8"), cx.theme.strong()),
-        false => (t!("drill FAILED: see 8"), cx.theme.trouble()),
+        true => (t!("drill PASSED: see 8"), theme.strong()),
+        false => (t!("drill FAILED: see 8"), theme.trouble()),
     };
     Some((5, words.to_owned(), style))
 }
 
 /// The state of the simulator, unless an exam hides it.
 fn open<'a>(cx: &ViewContext<'a>) -> Option<&'a Status> {
-    extension::state::<Status>(cx).filter(|status| status.is_open())
+    extension::state::<Status>(cx.extension).filter(|status| status.is_open())
 }
 
 fn rows(status: &Status) -> Vec<(FaultTarget, InjectedFault)> {

@@ -1,6 +1,6 @@
 //! Closing a line and opening it again, from every tab that shows its devices.
 
-use crate::plant::event::LineState;
+use crate::plant::line_state::LineState;
 use crate::ui::tabs::prelude::*;
 
 /// Asks for the line of the selected tags; without any for the one that is closed, or the only one.

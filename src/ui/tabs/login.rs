@@ -11,7 +11,7 @@ use crate::{
     ui::modal::user_form::{Purpose, UserForm},
 };
 
-type Key = crate::ui::keys::Key<Login>;
+type Key = crate::ui::key_table::Key<Login>;
 
 /// Keys of this tab while a user is logged in.
 const KEYS: &[Key] = &[
@@ -78,10 +78,6 @@ impl TabView for Login {
     fn new(_snapshot: &Snapshot) -> Login {
         Login::default()
     }
-
-    fn is_offered(_cx: &ViewContext) -> bool {
-        true
-    }
 }
 
 impl KeyTable for Login {
@@ -90,7 +86,7 @@ impl KeyTable for Login {
     }
 
     #[cfg(test)]
-    fn chords() -> keys::PageChords {
+    fn chords() -> key_table::PageChords {
         vec![("login", Keys::of(&[KEYS]).chords())]
     }
 }

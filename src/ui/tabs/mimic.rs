@@ -2,7 +2,6 @@
 
 mod attention;
 mod cards;
-mod command;
 mod companions;
 mod forecast;
 mod keys;
@@ -18,7 +17,6 @@ mod totals;
 #[cfg(test)]
 mod tests;
 
-pub use command::command_of;
 use companions::{Companions, Parts, parts};
 use neighbour::neighbour;
 use overview::Overview;
@@ -156,7 +154,7 @@ impl KeyTable for Mimic {
     }
 
     #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
+    fn chords() -> crate::ui::key_table::PageChords {
         vec![("mimic", Keys::of(&[keys::KEYS]).chords())]
     }
 }

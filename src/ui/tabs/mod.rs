@@ -1,4 +1,4 @@
-//! The tabs: the table of them, and the trait that each of them implements.
+//! The state of the tabs, and the trait that each of them implements.
 
 pub(crate) mod alarms;
 pub(crate) mod bus;
@@ -9,6 +9,7 @@ mod listing;
 mod overlay;
 mod periodic_query;
 mod prelude;
+mod rows;
 pub(crate) mod registers;
 pub(crate) mod faults;
 pub(crate) mod login;
@@ -26,20 +27,18 @@ use ratatui::{
     layout::{Position, Rect},
 };
 
+#[cfg(test)]
+use super::key_table::PageChords;
+pub use super::tab::Tab;
 pub use listing::ListPage;
 pub use periodic_query::{Answered, Queries};
+pub use rows::Rows;
 
-use super::{
-    Effect, UiAction, ViewContext,
-    keys::{self, Hint, Keys},
-    last_frame::Rows,
-    layout::Size,
-    session_lock,
-};
+use super::{Effect, UiAction, ViewContext, key_table::Keys, keys::Hint};
 use crate::{
     access::{SessionRequest, audit_log::sha256},
     history::{Answer, HistoryError},
-    plant::{PlantDef, number::to_u32, request_refusal::RequestRefusal, snapshot::Snapshot},
+    plant::{request_refusal::RequestRefusal, snapshot::Snapshot},
 };
 
 /// A file that is written once the station has put on record that it is.
@@ -62,20 +61,12 @@ impl Outgoing {
     }
 }
 
-/// What every tab answers. A new tab is a file with this trait and [`KeyTable`], and a row of [`tabs!`].
+/// What every tab answers. A new tab is a file with this trait and [`KeyTable`], and a row of [`tabs!`] and of [`Tab`].
 pub trait TabView: Keyed {
     /// The tab as it is at the start.
     fn new(snapshot: &Snapshot) -> Self
     where
         Self: Sized;
-
-    /// Is it offered here? Before a login nothing but the login page, unless the plant file lets anonymous users look.
-    fn is_offered(cx: &ViewContext) -> bool
-    where
-        Self: Sized,
-    {
-        !session_lock::is_closed(cx.session)
-    }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect);
 
@@ -170,7 +161,7 @@ pub trait KeyTable: TabView + Sized + 'static {
 
     /// The chords of each page, for the test that no key means two things.
     #[cfg(test)]
-    fn chords() -> keys::PageChords;
+    fn chords() -> PageChords;
 
     /// A key was pressed: what the last one led to has been read.
     fn before_key(&mut self) {}
@@ -212,35 +203,9 @@ fn all_keys<T: KeyTable>(page: &T, cx: &ViewContext) -> Keys<T> {
     if page.list(cx).is_some() { listing::all_keys(own) } else { own }
 }
 
-/// The table of tabs, in the order of their number keys from 0: name, field, state, title, help.
+/// The state of each tab: its name, field and type.
 macro_rules! tabs {
-    ($($tab:ident $field:ident $state:ty: $title:literal, $help:literal;)+) => {
-        #[allow(missing_docs)]
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        pub enum Tab {
-            $($tab),+
-        }
-
-        impl Tab {
-            /// Every tab, in the order of its number key.
-            pub const ALL: [Tab; [$(Tab::$tab),+].len()] = [$(Tab::$tab),+];
-
-            pub fn title(self) -> &'static str {
-                match self { $(Tab::$tab => $title),+ }
-            }
-            /// What its number key shows, for the help.
-            pub fn help(self) -> &'static str {
-                match self { $(Tab::$tab => $help),+ }
-            }
-            fn is_offered(self, cx: &ViewContext) -> bool {
-                match self { $(Tab::$tab => <$state>::is_offered(cx)),+ }
-            }
-            #[cfg(test)]
-            pub fn chords(self) -> keys::PageChords {
-                match self { $(Tab::$tab => <$state as KeyTable>::chords()),+ }
-            }
-        }
-
+    ($($tab:ident $field:ident $state:ty;)+) => {
         #[allow(missing_docs)]
         #[derive(Debug)]
         pub struct Tabs {
@@ -250,7 +215,7 @@ macro_rules! tabs {
 
         impl Tabs {
             pub fn new(snapshot: &Snapshot) -> Tabs {
-                                Tabs { shown: Tab::home(&snapshot.def), $($field: <$state>::new(snapshot)),+ }
+                Tabs { shown: Tab::home(&snapshot.def), $($field: <$state>::new(snapshot)),+ }
             }
             fn of(&self, tab: Tab) -> &dyn TabView {
                 match tab { $(Tab::$tab => &self.$field),+ }
@@ -258,69 +223,25 @@ macro_rules! tabs {
             pub fn of_mut(&mut self, tab: Tab) -> &mut dyn TabView {
                 match tab { $(Tab::$tab => &mut self.$field),+ }
             }
+            #[cfg(test)]
+            pub fn chords(tab: Tab) -> PageChords {
+                match tab { $(Tab::$tab => <$state as KeyTable>::chords()),+ }
+            }
         }
     };
 }
 
 tabs! {
-    Login login login::Login: "Login", "log in, log out, password";
-    Mimic mimic mimic::Mimic: "Mimic", "mimic";
-    Trends trends trends::Trends: "Trends", "trends";
-    Alarms alarms alarms::Alarms: "Alarms", "alarms";
-    Controllers controllers controllers::Controllers: "Controllers", "controllers";
-    Reports reports reports::Reports: "Reports", "reports";
-    Bus bus bus::Bus: "Bus", "bus: lines, frames, tests";
-    Users users users::Users: "Users", "users and audit log: for a Supervisor";
-    Faults faults faults::Faults: "Faults", "faults: of a simulated plant only";
-    Registers registers registers::Registers: "Registers", "the registers of a device, without a plant file";
-}
-
-impl Tab {
-    pub fn offered(cx: &ViewContext) -> Vec<Tab> {
-        Tab::ALL
-            .into_iter()
-            .filter(|tab| tab.is_of_bench() || !cx.def().is_bench())
-            .filter(|tab| *tab != Tab::Bus || !cx.def().lines.is_empty())
-            .filter(|tab| tab.is_offered(cx) && (tab.has_past() || !cx.is_past()))
-            .filter(|tab| tab.is_compact() || cx.size != Size::Compact)
-            .collect()
-    }
-
-    /// The tab that a terminal begins with.
-    pub fn home(def: &PlantDef) -> Tab {
-        if def.is_bench() { Tab::Registers } else { Tab::Mimic }
-    }
-
-    /// Does it show the plant, so that it can show it as it was? A report is of a period of its own.
-    pub fn has_past(self) -> bool {
-        matches!(self, Tab::Mimic | Tab::Trends | Tab::Alarms | Tab::Controllers | Tab::Bus)
-    }
-
-    /// Is it a list that the smallest screens have room for?
-    pub fn is_compact(self) -> bool {
-        matches!(self, Tab::Mimic | Tab::Alarms)
-    }
-
-    /// Has it something to show where no plant file says what the registers of a device mean?
-    fn is_of_bench(self) -> bool {
-        matches!(self, Tab::Bus | Tab::Registers)
-    }
-
-    /// The digit of its number key.
-    pub fn number(self) -> usize {
-        Tab::ALL.iter().position(|tab| *tab == self).unwrap_or(0)
-    }
-
-    /// The number key that shows it.
-    pub fn key(self) -> keys::Chord {
-        keys::char(char::from_digit(to_u32(self.number()), 10).unwrap_or('0'))
-    }
-
-    /// The tab so many further on among those that are offered, around the end.
-    pub fn step(self, offered: &[Tab], by: isize) -> Tab {
-        let place = offered.iter().position(|tab| *tab == self).unwrap_or(0);
-        offered[draw::around(place, by, offered.len())]
-    }
+    Login login login::Login;
+    Mimic mimic mimic::Mimic;
+    Trends trends trends::Trends;
+    Alarms alarms alarms::Alarms;
+    Controllers controllers controllers::Controllers;
+    Reports reports reports::Reports;
+    Bus bus bus::Bus;
+    Users users users::Users;
+    Faults faults faults::Faults;
+    Registers registers registers::Registers;
 }
 
 impl Tabs {

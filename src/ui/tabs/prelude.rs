@@ -11,7 +11,7 @@ pub(super) use ratatui::{
 };
 
 pub(super) use super::{
-    KeyTable, Keyed, Tab, TabView,
+    KeyTable, Keyed, Rows, Tab, TabView,
     draw::{self, around, open, row_style},
     listing::{self, Column, Heading, List, ListPage, Listing, left, rest, right},
     periodic_query::{Answered, Asked, FromAnswer, PeriodicQuery, Queries, real},
@@ -23,20 +23,21 @@ pub(super) use crate::{
         command::CommandKind,
         def::{DeviceDef, DeviceId, LineDef, LineId, ProcedureId, TagId},
         exact::Exact,
+        line_state::DeviceState,
         number::{digits, to_u16},
         role::Role,
-        snapshot::{DeviceState, Snapshot},
+        snapshot::Snapshot,
         time::elapsed,
     },
     t,
     text::translate,
     ui::{
         UiAction, ViewContext,
-        keys::{self, Below, Hint, Keys, Offer, char, code},
-        last_frame::Rows,
+        key_table::{self, Below, Keys, Offer, motions},
+        keys::{self, Hint, char, code},
         modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why},
         widgets::{
-            list::{self, Motion, Scroll, Selected, Words, first, motions, on_screen},
+            list::{self, Motion, Scroll, Selected, Words, first, on_screen},
             text::{self, Canvas, clock, fit, fit_words, moment, pad, pad_left, running, width, wrap},
             value,
         },

@@ -29,7 +29,7 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 #[cfg(test)]
 pub use self::keys::chords_of_page;
-pub use self::watch::start::{Start, parse_all as parse_watched};
+pub use self::watch::start::parse_all as parse_watched;
 use self::{cells::Cells, recognise::Recognition};
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -174,10 +174,6 @@ impl TabView for Registers {
     }
 
     /// Where a plant file says what the registers mean, the other tabs show them.
-    fn is_offered(cx: &ViewContext) -> bool {
-        cx.def().is_bench()
-    }
-
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
         self.list(cx).map_or_else(|| view::copied(self, cx), |list| list.copied(cx))
     }

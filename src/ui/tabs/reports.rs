@@ -31,7 +31,7 @@ use crate::{
     ui::{tabs::trends::span::View, widgets::chart},
 };
 
-type Key = crate::ui::keys::Key<Reports>;
+type Key = crate::ui::key_table::Key<Reports>;
 
 const KEYS: &[Key] = &[
     Key::change(code(KeyCode::Left), "earlier", "previous shift", |reports, cx| reports.step(cx, -1)),
@@ -259,7 +259,7 @@ impl KeyTable for Reports {
     }
 
     #[cfg(test)]
-    fn chords() -> keys::PageChords {
+    fn chords() -> key_table::PageChords {
         let pages: [(_, &[&'static [Key]]); 6] = [
             ("reports", &[KEYS, BATCHES, counters::KEYS, &SCROLL]),
             ("rows", rows::KEYS),

@@ -11,11 +11,11 @@ use crate::{
     access::UserRow,
     ui::{
         modal::{UserForm, user_form::Purpose},
-        rights, session_lock,
+        rights,
     },
 };
 
-type Key = crate::ui::keys::Key<Users>;
+type Key = crate::ui::key_table::Key<Users>;
 
 const LIST: &[Key] = &[
     Key::new(char('n'), "new", "add a user", Users::add)
@@ -91,11 +91,6 @@ impl TabView for Users {
     fn new(_snapshot: &Snapshot) -> Users {
         Users::default()
     }
-
-    fn is_offered(cx: &ViewContext) -> bool {
-        let supervisor = cx.session.who.as_ref().is_some_and(|who| who.role == Role::Supervisor);
-        !session_lock::is_closed(cx.session) && supervisor
-    }
 }
 
 impl KeyTable for Users {
@@ -104,7 +99,7 @@ impl KeyTable for Users {
     }
 
     #[cfg(test)]
-    fn chords() -> keys::PageChords {
+    fn chords() -> key_table::PageChords {
         vec![("users", Keys::of(&[LIST]).chords()), ("audit", Keys::of(&[audit::KEYS]).chords())]
     }
 }

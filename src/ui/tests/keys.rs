@@ -17,11 +17,12 @@ use crate::{
     plant::{
         command::{Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
         def::{AlarmId, Priority},
-        event::{Fault, LineState},
+        fault::Fault,
+        line_state::DeviceState,
+        line_state::LineState,
         record::{ActionRecord, AlarmEvent, AlarmRecord},
         request_refusal::RequestRefusal,
         sample::{Cause, Sample},
-        snapshot::DeviceState,
     },
     ui::{
         Effect, Model, Msg, UiAction,

@@ -12,8 +12,8 @@ use crate::{
     plant::{
         alarm::AlarmState,
         def::Priority,
-        event::LineState,
         interlock::ActuatorDef,
+        line_state::LineState,
         ne107::Reason,
         sample::{Cause, Quality, Sample},
         snapshot::Snapshot,

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{LANGUAGES, model, replay::replayed, screen, type_keys};
 use crate::{
-    plant::{def::AlarmId, station::StationFault},
+    plant::{def::AlarmId, station_fault::StationFault},
     text::{Language, Locale, translate},
     ui::{
         Msg,

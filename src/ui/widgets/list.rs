@@ -14,26 +14,6 @@ pub enum Motion {
     Last,
 }
 
-/// The rows of a key table that move in a list: `motions!("select", Alarms::select)`.
-macro_rules! motions {
-    ($label:literal, $move:expr) => {{
-        use crossterm::event::KeyCode;
-        use $crate::ui::{
-            keys::{Key, code},
-            widgets::list::Motion,
-        };
-        [
-            Key::change(code(KeyCode::Up), "", "a row up", |page, cx| $move(page, cx, Motion::Rows(-1))),
-            Key::change(code(KeyCode::Down), $label, "a row down", |page, cx| $move(page, cx, Motion::Rows(1))),
-            Key::change(code(KeyCode::PageUp), "", "a page up", |page, cx| $move(page, cx, Motion::Pages(-1))),
-            Key::change(code(KeyCode::PageDown), "", "a page down", |page, cx| $move(page, cx, Motion::Pages(1))),
-            Key::change(code(KeyCode::Home), "", "first row", |page, cx| $move(page, cx, Motion::First)),
-            Key::change(code(KeyCode::End), "", "last row", |page, cx| $move(page, cx, Motion::Last)),
-        ]
-    }};
-}
-pub(crate) use motions;
-
 impl Motion {
     /// The movement of a key in a window.
     pub fn from_key(event: KeyEvent) -> Option<Motion> {

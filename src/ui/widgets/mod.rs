@@ -1,5 +1,6 @@
 //! Small drawings that tabs are made of.
 
+pub(crate) mod actuator_mark;
 pub(crate) mod axes;
 pub(crate) mod chart;
 pub(crate) mod line_trend;

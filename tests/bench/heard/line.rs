@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use sightglass::{
     bus::frame::{self, wrap},
-    plant::{event::Fault, line::Framing},
+    plant::{fault::Fault, line::Framing},
 };
 
 use super::dice::Dice;

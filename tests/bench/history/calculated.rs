@@ -17,7 +17,7 @@ use rustix::time::{ClockId, clock_gettime};
 use sightglass::{
     bus::io::{clock::Clock, transport::Connector},
     history::io::thread::{self as history, offer},
-    plant::{def::Limits, event::ExceptionCode, record::Record, tag::Table},
+    plant::{def::Limits, fault::ExceptionCode, record::Record, tag::Table},
     profile::{self, Search},
     sim::pdu::{self, Registers},
     station::io as station,

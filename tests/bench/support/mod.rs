@@ -8,7 +8,7 @@ pub use paced::PacedSlave;
 pub use tcp::TcpSlave;
 
 use sightglass::{
-    plant::{def::Limits, event::ExceptionCode, tag::Table},
+    plant::{def::Limits, fault::ExceptionCode, tag::Table},
     sim::pdu::{self, Registers},
 };
 

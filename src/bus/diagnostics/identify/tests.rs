@@ -7,7 +7,7 @@ use crate::{
     bus::frame,
     plant::{
         diagnostics::{Diagnostic, DiagnosticRun, Finding},
-        event::{ExceptionCode, Fault},
+        fault::{ExceptionCode, Fault},
         line::Framing,
     },
 };

@@ -5,7 +5,7 @@ use std::time::Duration;
 use tokio::time::Instant;
 
 use super::Link;
-use crate::plant::event::Fault;
+use crate::plant::fault::Fault;
 
 impl Link {
     /// Nothing is sent to a unit for this long (plant time).

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 use super::{Link, LinkError, receive::RECEIVE_MAX};
 use crate::{
     bus::{frame, framing},
-    plant::{def::Framing, event::Fault, number::to_u32, traffic::FrameResult},
+    plant::{def::Framing, fault::Fault, number::to_u32, traffic::FrameResult},
 };
 
 impl Link {

@@ -12,7 +12,7 @@ use crate::{
     },
     plant::{
         def::Framing,
-        event::Fault,
+        fault::Fault,
         number::to_u32,
         traffic::{FrameFault, FrameResult},
     },

@@ -18,7 +18,7 @@ use under_way::{Owner, SHORT_WAIT, Transaction};
 use super::{FrameFault, FrameResult, Link, LinkError};
 use crate::{
     bus::frame,
-    plant::{def::Framing, event::Fault, line_trouble::LineTrouble, traffic::Exchange},
+    plant::{def::Framing, fault::Fault, line_trouble::LineTrouble, traffic::Exchange},
 };
 
 /// This many bytes that are no frame are shown.

@@ -15,7 +15,7 @@ use crate::{
         plan::Block,
         schedule::{Next, Schedule},
     },
-    plant::{def::DeviceId, event::Fault, time::elapsed},
+    plant::{def::DeviceId, fault::Fault, time::elapsed},
 };
 
 /// A read that is under way over Modbus TCP.

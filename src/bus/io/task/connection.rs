@@ -7,7 +7,7 @@ use crate::{
         io::{link::Link, transport::Opened},
         schedule::{Patience, Schedule},
     },
-    plant::{event::LineState, line_trouble::LineTrouble},
+    plant::{line_state::LineState, line_trouble::LineTrouble},
 };
 
 impl Task<'_> {

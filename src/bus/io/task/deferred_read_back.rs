@@ -15,7 +15,8 @@ use crate::{
     plant::{
         command::WriteId,
         def::TagId,
-        event::{Event, Fault, WriteResult},
+        event::{Event, WriteResult},
+        fault::Fault,
     },
 };
 

@@ -9,7 +9,7 @@ use crate::{
         schedule::{Failure, Next, Schedule},
     },
     plant::{
-        event::Fault,
+        fault::Fault,
         line_finding::{DeviceFinding, LineFinding},
         time::elapsed,
     },

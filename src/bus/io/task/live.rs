@@ -11,7 +11,7 @@ use crate::{
     },
     plant::{
         def::DeviceId,
-        event::Fault,
+        fault::Fault,
         live::AddressSpan,
         tag::{Poll, PollClass},
         time::elapsed,

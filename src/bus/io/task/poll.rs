@@ -16,7 +16,8 @@ use crate::{
     },
     plant::{
         def::Framing,
-        event::{Event, Fault, FaultKind},
+        event::Event,
+        fault::{Fault, FaultKind},
         line_trouble::LineTrouble,
         time::elapsed,
         traffic::Exchange,

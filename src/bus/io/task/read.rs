@@ -10,7 +10,7 @@ use crate::{
         pdu,
         plan::Block,
     },
-    plant::{event::Fault, exact::Exact, number::to_u16, tag::TagDef},
+    plant::{exact::Exact, fault::Fault, number::to_u16, tag::TagDef},
 };
 
 /// What came in between may have shown that the unit sends what it was not asked for.

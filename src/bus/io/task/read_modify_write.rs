@@ -8,12 +8,7 @@ use crate::{
         pdu::Pdu,
         plan,
     },
-    plant::{
-        event::{Fault, WriteResult},
-        exact::Exact,
-        line_trouble::LineTrouble,
-        tag::TagDef,
-    },
+    plant::{event::WriteResult, exact::Exact, fault::Fault, line_trouble::LineTrouble, tag::TagDef},
 };
 
 impl Task<'_> {

@@ -5,11 +5,7 @@ use jiff::Timestamp;
 use super::{LinkExit, Task};
 use crate::{
     bus::{diagnostics::Job, io::requests::Interrupt, schedule::Schedule},
-    plant::{
-        command::BusRequest,
-        event::{Fault, LineState, WriteResult},
-        line_trouble::LineTrouble,
-    },
+    plant::{command::BusRequest, event::WriteResult, fault::Fault, line_state::LineState, line_trouble::LineTrouble},
 };
 
 impl Task<'_> {

@@ -12,8 +12,9 @@ use crate::{
     plant::{
         command::{BusRequest, WriteJob},
         def::{ActionDef, DeviceDef},
-        event::{Event, Fault, WriteResult},
+        event::{Event, WriteResult},
         exact::Exact,
+        fault::Fault,
         line_trouble::LineTrouble,
         scale,
         tag::{Table, TagDef},

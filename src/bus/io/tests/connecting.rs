@@ -15,7 +15,9 @@ use crate::{
         PlantDef,
         command::{BusRequest, WriteId, WriteJob},
         def::{Framing, Protocol, TagId, Transport},
-        event::{Event, Fault, LineState, WriteResult},
+        event::{Event, WriteResult},
+        fault::Fault,
+        line_state::LineState,
     },
 };
 

@@ -12,7 +12,8 @@ use crate::plant::{
     command::{BusRequest, CommandId, WriteId, WriteJob},
     def::{Serial, TagId},
     diagnostics::{Diagnostic, DiagnosticState, Finding, Scan},
-    event::{Event, LineState, WriteResult},
+    event::{Event, WriteResult},
+    line_state::LineState,
     line_trouble::LineTrouble,
     port_signals::{OutputSignal, SignalTest},
 };

@@ -9,9 +9,9 @@ use super::{slave::correct, *};
 use crate::plant::{
     Plant, PlantDef, Snapshot,
     def::{AlarmDef, AlarmId, Condition, Subject},
+    line_state::DeviceState,
     number::to_u16,
     sample::{Cause, Quality},
-    snapshot::DeviceState,
     tag::Decimals,
     traffic::Exchange,
 };

@@ -8,7 +8,8 @@ use crate::{
     bus::io::live_reads::LiveRequest,
     plant::{
         def::LineId,
-        event::{Event, Fault},
+        event::Event,
+        fault::Fault,
         live::{AddressSpan, LiveRead, LiveReading},
         tag::Table,
     },

@@ -12,7 +12,7 @@ use tokio::{
 use super::slave::{Line, MS, Mode, line, plant};
 use crate::{
     bus::frame,
-    plant::event::{Event, LineState},
+    plant::{event::Event, line_state::LineState},
 };
 
 /// Registers hold the time of the device in these steps.

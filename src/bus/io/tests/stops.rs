@@ -14,7 +14,8 @@ use super::slave::{Line, MS, Mode, SlaveAction, line, plant, until_silent};
 use crate::plant::{
     command::{BusRequest, WriteId, WriteJob},
     def::{DeviceId, TagId},
-    event::{Event, Fault, WriteResult},
+    event::{Event, WriteResult},
+    fault::Fault,
 };
 
 /// The first tag of each unit is register 10, which holds 10 whatever is written.

@@ -7,10 +7,7 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream};
 use super::slave::{Line, MS, Mode, SlaveAction, correct, line, plant};
 use crate::{
     bus::frame,
-    plant::{
-        PlantDef,
-        event::{Event, Fault},
-    },
+    plant::{PlantDef, event::Event, fault::Fault},
 };
 
 /// Modes without transaction ids.

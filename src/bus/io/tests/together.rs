@@ -16,7 +16,8 @@ use crate::plant::{
     PlantDef,
     command::{BusRequest, WriteId, WriteJob},
     def::{DeviceId, TagId},
-    event::{Event, Fault, WriteResult},
+    event::{Event, WriteResult},
+    fault::Fault,
     tag::Poll,
 };
 

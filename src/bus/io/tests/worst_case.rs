@@ -11,8 +11,9 @@ use crate::{
         Plant, PlantDef,
         def::{AlarmDef, AlarmId, Condition, Subject},
         device_time::TimeSource,
-        event::{Event, LineState},
+        event::Event,
         line_report::LineReport,
+        line_state::LineState,
         record::Record,
     },
 };

@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     bus::frame,
-    plant::event::{ExceptionCode, Fault},
+    plant::fault::{ExceptionCode, Fault},
 };
 
 /// Two blocks of the same length.

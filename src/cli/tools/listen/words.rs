@@ -13,9 +13,10 @@ use crate::{
     cli::tools::shown,
     plant::{
         Snapshot,
-        event::{Fault, UartCounters},
+        fault::Fault,
         id::TagId,
         line::{Framing, LineDef},
+        line_state::UartCounters,
         request_stats::RequestStats,
         sample::{Cause, Quality},
     },

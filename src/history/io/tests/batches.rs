@@ -6,8 +6,9 @@ use crate::{
     plant::{
         Plant,
         batch::{BatchDef, BatchEvent, BatchRecord},
-        event::{Event, Fault},
+        event::Event,
         expr::{Compare, Expr},
+        fault::Fault,
         fixture::{self, DP, FAULT, PLC, PV, RUN, TIC},
     },
     report::batch::BatchReport,

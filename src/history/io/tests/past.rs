@@ -7,10 +7,13 @@ use crate::{
         Plant,
         alarm::AlarmCommand,
         command::{Command, CommandId, CommandKind, CommandStatus},
-        event::{Event, Fault, LineState},
+        event::Event,
+        fault::Fault,
         fixture::{self, DP, FAULT, HIGH, PLC, PV, RUN, SV, TIC},
+        line_state::DeviceState,
+        line_state::LineState,
         sample::Quality,
-        snapshot::{DeviceState, Snapshot},
+        snapshot::Snapshot,
     },
 };
 

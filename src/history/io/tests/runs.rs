@@ -8,7 +8,8 @@ use crate::{
     plant::{
         Plant,
         control_run::{ControlRun, DURATION_MAX, Figure, RunDef, RunState, STEADY_FOR},
-        event::{Event, Fault},
+        event::Event,
+        fault::Fault,
         fixture::{self, DP, FAULT, PV, SV, TIC},
     },
     report::control_runs::RunPart,

@@ -107,7 +107,7 @@ fn remembered(journal: &[AlarmRecord]) -> Vec<AlarmRecord> {
 /// What a restart must bring back: all but the count since the start and what sounds.
 fn lasting(manager: &AlarmManager) -> impl PartialEq + std::fmt::Debug {
     let active =
-        manager.lists().active.iter().map(|alarm| crate::plant::snapshot::ActiveAlarm { times: 0, ..alarm.clone() });
+        manager.lists().active.iter().map(|alarm| crate::plant::alarm::ActiveAlarm { times: 0, ..alarm.clone() });
     let machine = manager.machine(HIGH);
     let kept = (machine.active, machine.latched, machine.suppressed, machine.shelved.clone());
     (active.collect::<Vec<_>>(), manager.lists().suppressed.clone(), kept)

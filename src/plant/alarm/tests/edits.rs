@@ -332,8 +332,8 @@ fn an_alarm_whose_wording_changes_stands_as_it_did() {
             station.reload(def)
         }
         let after = station.manager.lists();
-        let times = |alarms: &[crate::plant::snapshot::ActiveAlarm]| -> Vec<_> {
-            let of_one = |alarm: &crate::plant::snapshot::ActiveAlarm| {
+        let times = |alarms: &[crate::plant::alarm::ActiveAlarm]| -> Vec<_> {
+            let of_one = |alarm: &crate::plant::alarm::ActiveAlarm| {
                 (alarm.id, alarm.state, alarm.raised_at, alarm.acknowledged.clone(), alarm.value)
             };
             alarms.iter().map(of_one).collect()

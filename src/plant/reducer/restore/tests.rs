@@ -4,7 +4,8 @@ use super::{super::tests::actions, *};
 use crate::plant::{
     command::BusRequest,
     def::{DeviceId, PlantDef},
-    event::{Event, Fault, WriteResult},
+    event::{Event, WriteResult},
+    fault::Fault,
     fixture::{self, DP, FAULT, SV, TIC},
     parameter_set::{ParameterSet, SetValue, plan},
     tag::{Access, Bound, ByteOrder, DataType, Point, Table, TagDef},

@@ -6,8 +6,8 @@ use crate::{
     plant::{
         command::CommandKind,
         def::{Framing, LineDef, LineId, Parity, Protocol, Serial, Transport},
-        event::LineState,
-        snapshot::DeviceState,
+        line_state::DeviceState,
+        line_state::LineState,
     },
     ui::{
         Model,

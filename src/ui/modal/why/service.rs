@@ -8,9 +8,9 @@ use crate::ui::modal::sheet::Fact;
 use crate::{
     plant::{
         def::DeviceDef,
-        event::LineState,
+        line_state::DeviceState,
+        line_state::LineState,
         sample::Cause,
-        snapshot::DeviceState,
         tag::{Poll, TagDef},
         time::elapsed,
         traffic::Exchange,

@@ -11,7 +11,8 @@ use crate::{
     },
     plant::{
         def::TagId,
-        event::{Fault, LineState},
+        fault::Fault,
+        line_state::LineState,
         sample::{Cause, Quality},
         scale,
         tag::{Access, Decimals, Poll, TagDef},

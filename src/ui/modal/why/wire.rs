@@ -13,7 +13,7 @@ use crate::{
     },
     plant::{
         def::DeviceDef,
-        event::LineState,
+        line_state::LineState,
         tag::{Access, ByteOrder, Poll, TagDef},
         time::elapsed,
         traffic::Exchange,

@@ -3,9 +3,9 @@
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        alarm::{ActiveAlarm, SuppressedAlarm},
         alarm::{AlarmCommand, AlarmState},
         def::{AlarmId, Subject},
-        snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
         modal::{

@@ -3,8 +3,8 @@
 use super::{Alarms, guidance, list::AlarmRow};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{def::Subject, snapshot::ActiveAlarm},
-    ui::{chrome, layout::Size, modal::reason::subject},
+    plant::{alarm::ActiveAlarm, def::Subject},
+    ui::{alarm_text::since, layout::Size, modal::reason::subject},
 };
 
 /// Columns of priority and state, with the blanks around them.
@@ -105,7 +105,7 @@ impl AlarmColumns {
             tab.recent.ribbon(cx, alarm, self.ribbon),
             respond,
             translate(alarm.state.word()).to_owned(),
-            running(elapsed(chrome::since(alarm), cx.now)),
+            running(elapsed(since(alarm), cx.now)),
             alarm.acknowledged.as_ref().and_then(|note| note.by.as_deref()).unwrap_or_default().to_owned(),
         ];
         self.row(cx.theme.priority_mark(def.priority), cells.each_ref().map(String::as_str))

@@ -1,9 +1,9 @@
 //! Which alarms the list shows, by priority, state, area and words, and in which order; pure.
 
 use crate::plant::{
+    alarm::ActiveAlarm,
     alarm::{AlarmState, manager::subject_name},
     def::{AlarmDef, PlantDef, Priority},
-    snapshot::ActiveAlarm,
 };
 use crate::ui::tabs::prelude::*;
 

@@ -22,7 +22,7 @@ impl Alarms {
     }
 
     pub(super) fn open_guidance(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let guidance = |id| Guidance::new(id, faceplate(cx, cx.def().alarm(id).subject));
+        let guidance = |id| Guidance::new(id, Faceplate::of(cx, cx.def().alarm(id).subject));
         open(self.target(cx).map(|id| Modal::Guidance(Box::new(guidance(id)))))
     }
 
@@ -55,17 +55,5 @@ impl Alarms {
             Some(Subject::Device(device)) => Why::of_device(cx, device),
             Some(Subject::Line(_) | Subject::Station) | None => None,
         })
-    }
-}
-
-/// The faceplate of what an alarm watches.
-pub fn faceplate(cx: &ViewContext, subject: Subject) -> Option<Faceplate> {
-    match subject {
-        Subject::Tag(tag) => Faceplate::new(cx.def().tag(tag).label.clone(), vec![tag]),
-        Subject::Device(device) => {
-            let tags = cx.def().tags_of(device).take(8).map(|tag| tag.id).collect();
-            Faceplate::new(format!("{} {}", cx.def().device(device).name, device_text(cx, device)), tags)
-        }
-        Subject::Line(_) | Subject::Station => None,
     }
 }

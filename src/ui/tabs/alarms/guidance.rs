@@ -3,9 +3,9 @@
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        alarm::ActiveAlarm,
         def::{AlarmDef, AlarmId, Subject},
-        snapshot::ActiveAlarm,
-        station::STATION,
+        station_fault::STATION,
     },
     ui::{
         modal::{

@@ -4,10 +4,10 @@ use super::{journal::action_text, metrics::stale, span};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        alarm::SuppressedAlarm,
         commands::{HAND_OVER, TAKE_OVER},
-        event::LineState,
+        line_state::LineState,
         record::ActionRecord,
-        snapshot::SuppressedAlarm,
     },
     report::Period,
     ui::modal::{faceplate::device_text, reason::subject},

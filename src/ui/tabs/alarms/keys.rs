@@ -3,7 +3,7 @@
 use super::{Alarms, Page, actions, filter};
 use crate::{plant::alarm::AlarmState, ui::tabs::prelude::*};
 
-type Key = crate::ui::keys::Key<Alarms>;
+type Key = crate::ui::key_table::Key<Alarms>;
 
 const MOVE: [Key; 6] = motions!("select", Alarms::step);
 

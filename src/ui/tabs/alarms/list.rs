@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use jiff::Timestamp;
 
 use crate::plant::{
+    alarm::ActiveAlarm,
     alarm::AlarmState,
     def::{PlantDef, Priority},
-    snapshot::ActiveAlarm,
 };
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,11 +4,11 @@ use super::span;
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
+        alarm::ActiveAlarm,
         alarm::{
             PeriodMetrics,
             metrics::{METRIC_TARGETS, TargetStatus},
         },
-        snapshot::ActiveAlarm,
     },
     report::{Period, alarm_metrics},
     ui::{modal::reason::subject, theme::Theme},

@@ -5,10 +5,10 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::{
+        alarm::ActiveAlarm,
         alarm::{AlarmState, manager::subject_name},
         def::{AlarmDef, Pen, Subject},
         record::{ActionRecord, AlarmEvent, AlarmRecord, NOT_PROCESS_ACTIONS},
-        snapshot::ActiveAlarm,
     },
     ui::{layout::Size, tabs::trends::span::View, widgets::chart},
 };

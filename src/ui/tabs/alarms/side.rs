@@ -3,7 +3,7 @@
 use super::{Alarms, guidance, journal::event_text, recent};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::snapshot::ActiveAlarm,
+    plant::alarm::ActiveAlarm,
     ui::{modal::reason::subject, rights},
 };
 

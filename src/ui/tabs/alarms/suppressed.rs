@@ -2,7 +2,7 @@
 
 use super::{handover::suppressed_words, view};
 use crate::{
-    plant::{def::AlarmId, snapshot::SuppressedAlarm},
+    plant::{alarm::SuppressedAlarm, def::AlarmId},
     ui::tabs::prelude::*,
 };
 

@@ -11,6 +11,7 @@ use jiff::SignedDuration;
 use crate::{
     history::{Answer, Query},
     plant::{
+        alarm::{ActiveAlarm, SuppressedAlarm},
         alarm::{
             AlarmCommand, AlarmState, PeriodMetrics,
             metrics::{Frequent, Named},
@@ -20,7 +21,6 @@ use crate::{
         def::{AlarmClass, AlarmDef, AlarmId, Priority},
         record::{ActionRecord, AlarmEvent, AlarmRecord, FirstOut},
         role::Role,
-        snapshot::{ActiveAlarm, SuppressedAlarm},
     },
     ui::{
         Effect, Model, Msg,

@@ -5,8 +5,8 @@ use ratatui::style::Modifier;
 use super::{Alarms, Page, columns::AlarmColumns, guidance, handover::suppressed_words, list::AlarmRow, on_page, side};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{def::AlarmId, snapshot::ActiveAlarm},
-    ui::{chrome::history_text, layout::Size, preferences::Bell},
+    plant::{alarm::ActiveAlarm, def::AlarmId},
+    ui::{alarm_text::history_text, layout::Size, preferences::Bell},
 };
 
 /// Rows above the list: views, filter, headings.

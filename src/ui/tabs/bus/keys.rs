@@ -3,7 +3,7 @@
 use super::*;
 use crate::ui::modal::LineSettings;
 
-type Key = crate::ui::keys::Key<Bus>;
+type Key = crate::ui::key_table::Key<Bus>;
 
 const MOVE: [Key; 6] = motions!("select", Bus::scroll);
 const SCROLL: [Key; 6] = motions!("scroll", Bus::scroll);
@@ -103,7 +103,7 @@ impl KeyTable for Bus {
     }
 
     #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
+    fn chords() -> crate::ui::key_table::PageChords {
         let of_page = |page: &Page| match page {
             Page::Registers => [table(*page).chords(), super::super::registers::chords_of_page()].concat(),
             page => table(*page).chords(),

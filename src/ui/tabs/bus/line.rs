@@ -11,11 +11,7 @@ use super::{
 use crate::ui::tabs::prelude::*;
 use crate::{
     bus::names,
-    plant::{
-        event::{Fault, LineState},
-        line_report::LineReport,
-        request_stats::RequestStats,
-    },
+    plant::{fault::Fault, line_report::LineReport, line_state::LineState, request_stats::RequestStats},
     ui::{modal::faceplate::retry_text, tabs::controllers::signal_mark, widgets::spark},
 };
 
@@ -201,7 +197,7 @@ struct DeviceStats {
     length: u64,
     foreign: u64,
     retries: u64,
-    exceptions: Vec<(crate::plant::event::ExceptionCode, u64)>,
+    exceptions: Vec<(crate::plant::fault::ExceptionCode, u64)>,
     /// Has one of the latest requests failed?
     lately: bool,
 }
@@ -346,7 +342,7 @@ mod tests {
         plant::{
             command::Outcome,
             mqtt_request::{LastMqttRequest, MqttRequestStatus, MqttResult},
-            north_def::NorthStatus,
+            north_status::NorthStatus,
         },
         ui::fixture::{Fixture, with_cx},
     };

@@ -5,7 +5,7 @@ use super::{
     rows::{Spans, plain},
 };
 use crate::{
-    plant::event::LineState,
+    plant::line_state::LineState,
     ui::{line_state::is_well, tabs::prelude::*},
 };
 

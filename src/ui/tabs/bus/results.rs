@@ -7,7 +7,7 @@ use super::{
     rows::{Spans, plain},
     window::{dissection_rows, exchange_rows},
 };
-use crate::ui::{chrome::outcome_words, tabs::prelude::*};
+use crate::ui::{command_text::outcome_words, tabs::prelude::*};
 use crate::{
     bus::{
         diagnostics::tally,
@@ -17,7 +17,7 @@ use crate::{
     },
     plant::{
         diagnostics::{Diagnostic, DiagnosticRun, DiagnosticState, Finding, PatternTally},
-        event::Fault,
+        fault::Fault,
         number::to_u32,
         port_signals::PortSignals,
         sweep::{SweptOutcome, SweptRange},

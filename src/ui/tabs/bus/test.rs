@@ -21,12 +21,7 @@ use crate::{
         hex_input::{self, FramedRequest},
         meaning, names, request_lint,
     },
-    plant::{
-        command::Refusal,
-        def::Framing,
-        diagnostics::Diagnostic,
-        event::{Fault, LineState},
-    },
+    plant::{command::Refusal, def::Framing, diagnostics::Diagnostic, fault::Fault, line_state::LineState},
     ui::modal::{Next, line::Line},
 };
 

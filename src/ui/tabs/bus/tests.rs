@@ -17,10 +17,11 @@ use crate::{
         diagnostics::{
             Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, DiagnosticStep, Finding, Scan, UnitReply,
         },
-        event::{Fault, LineState},
+        fault::Fault,
         line_minute::LineMinute,
+        line_state::DeviceState,
+        line_state::LineState,
         ne107::Reason,
-        snapshot::DeviceState,
         traffic::Exchange,
     },
     ui::{

@@ -11,7 +11,7 @@ use crate::{
         parameter_set::{self, Compared, PlannedChange, Problem},
         restore::{Restore, State},
     },
-    ui::chrome::outcome_words,
+    ui::command_text::outcome_words,
 };
 
 #[derive(Debug, Clone, PartialEq, Eq)]

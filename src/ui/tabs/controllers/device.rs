@@ -9,7 +9,7 @@ use crate::{
     history::Series,
     plant::ne107::{Reason, Signal},
     ui::{
-        chrome::{command_label, outcome_words},
+        command_text::{command_label, outcome_words},
         layout::Size,
         modal::faceplate::{device_text, retry_text},
         rights,

@@ -3,7 +3,7 @@
 use super::{Controllers, Page, compare::Compare, lamps, sets::Source};
 use crate::ui::tabs::prelude::*;
 
-type Key = crate::ui::keys::Key<Controllers>;
+type Key = crate::ui::key_table::Key<Controllers>;
 
 const SELECT: [Key; 6] = motions!("select", Controllers::step);
 const SCROLL: [Key; 6] = motions!("scroll", Controllers::step);
@@ -229,7 +229,7 @@ impl KeyTable for Controllers {
     }
 
     #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
+    fn chords() -> crate::ui::key_table::PageChords {
         let compare = Page::Compare(Compare::new(Source::Set(String::new())));
         let pages = [Page::List, Page::Device, Page::Lamps, Page::Program, Page::Sets, compare];
         let runs = [Page::Runs, Page::Procedures, Page::Overlay, Page::Guide(0)];

@@ -1,7 +1,7 @@
 //! The first page: every device in one row, with how it stands and what it controls.
 
 use super::device::{signal_mark, status_text};
-use crate::plant::{def::Subject, snapshot::ActiveAlarm};
+use crate::plant::{alarm::ActiveAlarm, def::Subject};
 use crate::ui::{modal::faceplate::unknown_text, tabs::prelude::*};
 
 /// Widths that depend on the plant and the screen.

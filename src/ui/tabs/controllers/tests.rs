@@ -13,15 +13,16 @@ use jiff::SignedDuration;
 
 use crate::{
     plant::{
+        alarm::ActiveAlarm,
         alarm::AlarmState,
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
         control_run::RunState,
         def::{ActionDef, AlarmId, DeviceId},
+        line_state::DeviceState,
         ne107::Reason,
         parameter_set::StoredSet,
         restore::{Restore, RestoreRequest, State},
         sample::{Cause, Sample},
-        snapshot::{ActiveAlarm, DeviceState},
         tag::Confidence,
         tuning::{TunedParameter, Tuning},
     },
@@ -170,7 +171,7 @@ fn half_done(fixture: &Fixture, state: State) -> Restore {
     run.steps[0].outcome = Some(Outcome::Verified);
     run.steps[1].command = Some(id);
     if state == State::Failed {
-        run.end_write(Outcome::Refused(Refusal::NotSent(crate::plant::event::Fault::BackedOff)));
+        run.end_write(Outcome::Refused(Refusal::NotSent(crate::plant::fault::Fault::BackedOff)));
     }
     run
 }

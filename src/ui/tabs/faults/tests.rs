@@ -108,7 +108,7 @@ fn faults_go_on_and_off_by_enter_with_their_numbers() {
 
 #[test]
 fn clearing_faults_polls_silent_devices_at_once() {
-    use crate::plant::{command::CommandKind, def::DeviceId, snapshot::DeviceState};
+    use crate::plant::{command::CommandKind, def::DeviceId, line_state::DeviceState};
     let mut fixture = Fixture::normal();
     fixture.devices[0].state = DeviceState::Down { since: fixture::now() };
     let mut model = with(&fixture, status(&fixture), Theme::FULL);

@@ -1,7 +1,7 @@
 //! The keys of every list, from one place.
 
 use super::Can;
-use crate::ui::{keys::Key, tabs::prelude::*};
+use crate::ui::{key_table::Key, tabs::prelude::*};
 
 /// The keys of a page that is a list: those that move the selection, its own, and what can be done in every list. A key that
 /// the page itself has is the page's.

@@ -4,7 +4,7 @@ use super::Login;
 use crate::text::Locale;
 use crate::ui::tabs::prelude::*;
 use crate::ui::{
-    chrome::{alarm_words, counts},
+    alarm_text::{alarm_words, counts},
     rights,
 };
 

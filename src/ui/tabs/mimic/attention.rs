@@ -3,15 +3,15 @@
 use crate::ui::tabs::{alarms::suppressed_words, prelude::*};
 use crate::{
     plant::{
+        alarm::ActiveAlarm,
         alarm::AlarmState,
         command::{CommandStatus, Outcome},
         def::Subject,
-        event::LineState,
+        line_state::LineState,
         sample::Cause,
-        snapshot::ActiveAlarm,
     },
     ui::{
-        chrome::since,
+        alarm_text::since,
         modal::{
             faceplate::{device_text, line_state_text},
             reason::subject,
@@ -193,9 +193,9 @@ mod tests {
     use super::*;
     use crate::{
         plant::{
+            alarm::SuppressedAlarm,
             command::{Command, CommandId, Refusal},
             sample::{Quality, Sample},
-            snapshot::SuppressedAlarm,
         },
         ui::fixture::{Fixture, now, with_cx},
     };

@@ -1,18 +1,19 @@
 //! The keys of the mimic tab, and what they do on a picture and on the overview.
 
-use super::{Mimic, command, neighbour};
+use super::{Mimic, neighbour};
 use crate::{
     access::right,
     plant::def::MimicItem,
     ui::{
         layout::Size,
+        modal::plant_command,
         rights,
         tabs::{line_switch, prelude::*},
         widgets::mimic::{list, tags, title},
     },
 };
 
-type Key = crate::ui::keys::Key<Mimic>;
+type Key = crate::ui::key_table::Key<Mimic>;
 
 /// Keys of this tab; [`PLANT`] lists the four arrows as one.
 pub(super) const KEYS: &[Key] = &[
@@ -22,9 +23,7 @@ pub(super) const KEYS: &[Key] = &[
     Key::change(code(KeyCode::Down), "", "", |mimic, cx| mimic.step(cx, (0, 1))),
     Key::new(code(KeyCode::Enter), "open", "faceplate of the selected item", Mimic::open),
     Key::new(char('w'), "why", "explain the value: quality, scaling, bytes", Mimic::why),
-    Key::new(char('C'), "commands", "all valves, pumps and heaters with their commands", |_, cx| {
-        command::actuators(cx)
-    }),
+    Key::new(char('C'), "commands", "all valves, pumps and heaters with their commands", |_, cx| actuators(cx)),
     Key::new(char('v'), "overview", "all devices at a glance, or the mimic", Mimic::toggle_overview)
         .when(|_, cx| Offer::footer_if(!cx.def().mimic.pages.is_empty() && Size::Normal <= cx.size)),
     Key::new(char('D'), "", "disconnect a line, or connect it again (asks first)", |mimic, cx| {
@@ -41,7 +40,7 @@ pub(super) const KEYS: &[Key] = &[
 
 /// The commands of the plant file.
 pub(super) const PLANT: Below<Mimic> =
-    Below { hints: |_, cx| hints(cx), press: |_, cx, event| command::command_of(cx, event).map(open) };
+    Below { hints: |_, cx| hints(cx), press: |_, cx, event| plant_command::command_of(cx, event).map(open) };
 
 fn hints(cx: &ViewContext) -> Vec<Hint> {
     let commands = cx.def().mimic.commands.iter().map(|command| {
@@ -111,4 +110,10 @@ impl Mimic {
         let turns = 1 < pages && !self.is_overview(cx);
         if turns { self.show_page(cx, around(self.page, by, pages)) } else { Vec::new() }
     }
+}
+
+/// The commands of all actuators, in one faceplate.
+fn actuators(cx: &ViewContext) -> Vec<UiAction> {
+    let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
+    open(Faceplate::new(t!("commands"), outputs).map(Modal::Faceplate))
 }

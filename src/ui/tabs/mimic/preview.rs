@@ -9,9 +9,10 @@ use crate::{
     access::SessionStatus,
     plant::{
         PlantDef,
-        event::LineState,
+        line_state::DeviceState,
+        line_state::LineState,
         sample::Sample,
-        snapshot::{DeviceState, Snapshot},
+        snapshot::Snapshot,
         tag::{Bound, Decimals, TagDef},
     },
     ui::{Clock, QueryNumbers, context::view_context, preferences::Preferences, tabs::TabView, theme::Theme},

@@ -3,7 +3,8 @@
 use super::Registers;
 use crate::plant::{
     def::{Framing, Transport},
-    event::{Fault, FaultKind, LineState},
+    fault::{Fault, FaultKind},
+    line_state::LineState,
 };
 use crate::ui::tabs::prelude::*;
 

@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use crate::{
     bus::live::Outcome,
     plant::{
-        event::Fault,
+        fault::Fault,
         live::{AddressSpan, LiveReading},
         number::to_u16,
         tag::Table,

@@ -5,7 +5,7 @@ use crate::ui::tabs::bus;
 #[cfg(test)]
 use crate::ui::tabs::trends;
 
-type Key = crate::ui::keys::Key<Registers>;
+type Key = crate::ui::key_table::Key<Registers>;
 
 const MOVE: [Key; 6] = motions!("", Registers::scroll);
 const TABLES_KEYS: &[Key] = &[
@@ -130,7 +130,7 @@ impl KeyTable for Registers {
     }
 
     #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
+    fn chords() -> crate::ui::key_table::PageChords {
         let graph = trends::Trends::chords().into_iter().map(|(_, chords)| {
             let log = Keys::of(&[LOG]).chords();
             ("graph", [chords, log].concat())

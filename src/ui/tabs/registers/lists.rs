@@ -102,7 +102,7 @@ impl Listing for Picks {
     }
 }
 
-type Key = keys::Key<Registers>;
+type Key = key_table::Key<Registers>;
 
 /// Its own keys; those of every list come with it.
 pub const KEYS: &[Key] = &[

@@ -31,7 +31,7 @@ pub struct Preview {
     top: usize,
 }
 
-type Key = keys::Key<Registers>;
+type Key = key_table::Key<Registers>;
 
 const SCROLL: [Key; 6] = motions!("", Registers::scroll_list);
 const LIST: &[Key] = &[
@@ -61,7 +61,7 @@ const KEEP: &[Key] =
     &[Key::new(char('S'), "profile", "save all of it as a device profile", |registers, _| registers.keep_list())];
 const CANCEL: &[Key] = &[Key::elsewhere(code(KeyCode::Esc), "cancel", "take nothing of this list")];
 
-pub const KEYS: &[&[keys::Key<Registers>]] = &[&SCROLL, LIST, KEEP, CANCEL];
+pub const KEYS: &[&[key_table::Key<Registers>]] = &[&SCROLL, LIST, KEEP, CANCEL];
 
 impl Preview {
     fn new(bytes: Vec<u8>, context: ListContext) -> Preview {

@@ -14,7 +14,7 @@ use crate::{
     plant::{
         address::{AddressBase, TABLES},
         diagnostics::{Diagnostic, DiagnosticState},
-        event::LineState,
+        line_state::LineState,
         tag::{ByteOrder, DataType},
     },
     register_map::named::Named,

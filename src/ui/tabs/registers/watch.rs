@@ -12,7 +12,7 @@ use super::{
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        event::Fault,
+        fault::Fault,
         live::{AddressSpan, LiveReading},
         number::{to_f32, to_u32},
         sample::{Cause, Quality, Sample},

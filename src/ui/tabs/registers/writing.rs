@@ -4,13 +4,13 @@
 mod tests;
 
 use super::{AddressSpan, Registers};
-use crate::ui::{chrome::outcome_words, tabs::prelude::*};
+use crate::ui::{command_text::outcome_words, tabs::prelude::*};
 use crate::{
     bus::codec,
     plant::{
         command::{CommandId, Outcome, Refusal},
         diagnostics::{Diagnostic, DiagnosticState, Finding, RegisterWrite},
-        event::ExceptionCode,
+        fault::ExceptionCode,
         live::number,
         scale,
         tag::{ByteOrder, DataType, Encoding, Point, Table},

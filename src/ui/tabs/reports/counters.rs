@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// The key of a plant that counts something.
-pub const KEYS: &[keys::Key<Reports>] = &[keys::Key::new(
+pub const KEYS: &[key_table::Key<Reports>] = &[key_table::Key::new(
     char('x'),
     "correct",
     "correct what a counter counted, with a reason",

@@ -3,7 +3,7 @@
 use super::{Asking, RATES, Trends, WINDOWS, overlay, plots::Plot, window::Direction};
 use crate::ui::tabs::prelude::*;
 
-pub(super) type Key = crate::ui::keys::Key<Trends>;
+pub(super) type Key = crate::ui::key_table::Key<Trends>;
 
 pub(super) const CURVES: &[Key] = &[
     Key::elsewhere(code(KeyCode::Esc), "close", "close the picture, as every key does")
@@ -135,7 +135,7 @@ impl KeyTable for Trends {
     }
 
     #[cfg(test)]
-    fn chords() -> crate::ui::keys::PageChords {
+    fn chords() -> crate::ui::key_table::PageChords {
         [CURVES, VALUES, overlay::KEYS].map(|keys| ("trends", Keys::of(&[keys]).chords())).to_vec()
     }
 }

@@ -28,7 +28,7 @@ fn acknowledging_takes_the_most_urgent_or_the_selected() {
 #[test]
 fn what_came_after_the_last_frame_is_not_acknowledged_unseen() {
     let mut fixture = Fixture::alarm();
-    let newer = crate::plant::snapshot::ActiveAlarm { id: AlarmId(1), ..fixture.alarms[0].clone() };
+    let newer = crate::plant::alarm::ActiveAlarm { id: AlarmId(1), ..fixture.alarms[0].clone() };
     for tab in ["", "3"] {
         let mut model = model(&fixture, Theme::FULL);
         type_keys(&mut model, tab);
@@ -54,7 +54,7 @@ fn a_selected_alarm_stays_selected_when_the_list_moves() {
     let mut model = model(&fixture, Theme::FULL);
     type_keys(&mut model, "3↓↓");
     let chosen = fixture.alarms[2].id;
-    let newer = crate::plant::snapshot::ActiveAlarm { id: AlarmId(1), ..fixture.alarms[0].clone() };
+    let newer = crate::plant::alarm::ActiveAlarm { id: AlarmId(1), ..fixture.alarms[0].clone() };
     fixture.alarms.insert(0, newer);
     update(&mut model, Msg::Snapshot(fixture.snapshot()));
     assert_eq!(model.tabs.alarms.selected(&model.cx()).map(|alarm| alarm.id), Some(chosen));

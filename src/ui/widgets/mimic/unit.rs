@@ -5,8 +5,9 @@ use crate::t;
 use crate::{
     plant::def::TagId,
     ui::{
-        ViewContext, interlock,
+        ViewContext,
         widgets::{
+            actuator_mark,
             text::{Canvas, fit, width},
             value,
         },
@@ -72,7 +73,7 @@ const MARK_REACH: (u16, u16) = (14, 6);
 /// What there is to say of an actuator beyond its state: blocked, sent, failed, feedback mismatch. It is drawn when all else is,
 /// in the first of these rows that has room for its word, else for its shape: it never hides a number.
 pub fn mark(cx: &ViewContext, canvas: &mut Canvas, x: u16, rows: &[u16], tag: TagId) {
-    let Some((words, style)) = interlock::mark(cx, tag) else { return };
+    let Some((words, style)) = actuator_mark::mark(cx, tag) else { return };
     let shape = words.split(' ').next().unwrap_or_default().to_owned();
     for text in [&words, &shape] {
         let columns = || (x..=x.saturating_add(MARK_REACH.0)).chain((x.saturating_sub(MARK_REACH.1)..x).rev());
@@ -98,7 +99,7 @@ pub fn labelled(cx: &ViewContext, canvas: &mut Canvas, at: Bounds, label: &str, 
     let x = if label.is_empty() { at.x } else { canvas.text(at.x, at.y, &label, style) + 1 };
     let room = at.width.saturating_sub(x.saturating_sub(at.x));
     let end = put_value(cx, canvas, x, at.y, tag, room);
-    if let Some((words, style)) = interlock::mark(cx, tag) {
+    if let Some((words, style)) = actuator_mark::mark(cx, tag) {
         let room = (at.x + at.width).saturating_sub(end + 1);
         let shape = words.split(' ').next().unwrap_or_default().to_owned();
         // The shape alone where there is no room for its word; the faceplate has the words.

@@ -12,9 +12,10 @@ use crate::{
         number::{to_u16, to_u32},
     },
     ui::{
-        ViewContext, interlock,
+        ViewContext,
         theme::Colours,
         widgets::{
+            actuator_mark,
             text::{Canvas, fit, width},
             value,
         },
@@ -154,7 +155,7 @@ fn liquid(cx: &ViewContext, canvas: &mut Canvas, eighths: u32) {
 
 /// The mark of an actuator inside the vessel: its shape alone, the faceplate has the words.
 fn shape_of_mark(cx: &ViewContext, canvas: &mut Canvas, x: u16, y: u16, output: TagId) {
-    if let Some((words, style)) = interlock::mark(cx, output) {
+    if let Some((words, style)) = actuator_mark::mark(cx, output) {
         canvas.text(x, y, words.split(' ').next().unwrap_or_default(), style);
     }
 }

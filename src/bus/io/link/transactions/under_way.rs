@@ -10,7 +10,7 @@ use crate::{
         frame::{self, Mbap, ShortException},
         framing,
     },
-    plant::{def::Framing, event::Fault},
+    plant::{def::Framing, fault::Fault},
 };
 
 /// Ids of requests that were given up are remembered, and not used again, as long as there are no more than these.

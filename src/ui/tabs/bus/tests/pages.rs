@@ -138,7 +138,7 @@ fn running_frames_are_taken_in_every_two_seconds() {
 #[test]
 fn a_map_that_fails_shows_its_ranges_and_the_whole_reason() {
     use crate::plant::{
-        event::ExceptionCode,
+        fault::ExceptionCode,
         sweep::{Sweep, SweptOutcome, SweptRange},
     };
     let mut fixture = Fixture::traffic();
@@ -279,9 +279,9 @@ fn a_listening_line_shows_only_what_is_heard() {
 #[test]
 fn a_silent_master_is_said_once() {
     use crate::plant::{
+        alarm::ActiveAlarm,
         alarm::AlarmState,
         def::{AlarmDef, AlarmId, Condition, Subject},
-        snapshot::ActiveAlarm,
     };
     let mut fixture = Fixture::listening();
     fixture.line.state = LineState::NoTraffic;

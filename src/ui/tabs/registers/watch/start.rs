@@ -1,29 +1,14 @@
 //! What `sightglass open` begins with: what is watched, and where it is logged.
 
-use std::path::PathBuf;
-
 use super::{Named, Registers, WATCHED_MAX, Watched, named};
 use crate::{
     plant::{
         live::AddressSpan,
         tag::{ByteOrder, DataType},
     },
-    report::value_log::reader::ValueLog,
     t,
-    ui::tabs::prelude::*,
+    ui::{msg::Start, tabs::prelude::*},
 };
-
-/// What the tab of the registers begins with.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Start {
-    pub watch: Vec<Named>,
-    /// Where it is logged.
-    pub log: Option<PathBuf>,
-    /// Time between two reads.
-    pub every: Option<SignedDuration>,
-    /// A log to look at instead of a device, and what it is called.
-    pub shown: Option<(String, ValueLog)>,
-}
 
 /// Reads `NAME=ADDRESS[:COUNT] [TYPE] [ORDER] [SCALE] [UNIT]`, with blanks or commas between: `SV=41003 int16 0.1 °C`.
 /// COUNT values stand one behind the other, and are called NAME1, NAME2 and so on.

@@ -108,7 +108,7 @@ fn a_trend_that_is_opened_leaves_the_marked_pens() {
     };
     let other = stand.model.snapshot.def.tags.iter().map(|tag| tag.id).find(|tag| !of_group(tag)).expect("a tag");
     let model = &mut stand.model;
-    crate::ui::context::with_tabs(model, |tabs, cx| {
+    crate::ui::model_context::with_tabs(model, |tabs, cx| {
         tabs.trends.open_tag(cx, other);
         Vec::new()
     });

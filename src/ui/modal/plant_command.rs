@@ -1,14 +1,16 @@
-//! The plant's commands on the keys of the mimic.
+//! The windows of the commands that a plant file puts on keys of the mimic.
 
-use crate::ui::tabs::prelude::*;
+use crossterm::event::KeyEvent;
+
+use super::{Choice, Confirm, Modal, Notice};
 use crate::{
     plant::def::MimicCommand,
-    ui::{interlock, modal::Choice},
+    ui::{ViewContext, interlock, keys},
 };
 
 /// The window of the plant's command on this key. Other windows ask too, so that a stop never waits for one to close.
 pub fn command_of(cx: &ViewContext, event: KeyEvent) -> Option<Modal> {
-    let command = cx.def().mimic.commands.iter().find(|command| char(command.key).is(event))?;
+    let command = cx.def().mimic.commands.iter().find(|command| keys::char(command.key).is(event))?;
     command_window(cx, command)
 }
 
@@ -34,9 +36,4 @@ fn command_window(cx: &ViewContext, command: &MimicCommand) -> Option<Modal> {
         [_, _] => Some(Modal::Choice(Choice::values(cx, tag))),
         _ => Modal::write(cx, tag),
     }
-}
-
-pub fn actuators(cx: &ViewContext) -> Vec<UiAction> {
-    let outputs = cx.def().logic.actuators.iter().map(|actuator| actuator.output).collect();
-    open(Faceplate::new(t!("commands"), outputs).map(Modal::Faceplate))
 }

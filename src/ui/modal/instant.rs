@@ -2,15 +2,12 @@
 
 use jiff::Timestamp;
 
+use super::{Modal, Prompt};
 use crate::{
     report::period_parser::{self, PeriodError},
     t,
     text::date,
-    ui::{
-        UiAction, ViewContext,
-        modal::{Modal, Prompt},
-        tabs::TabView,
-    },
+    ui::{UiAction, ViewContext},
 };
 
 /// Characters of the name of a bookmark.
@@ -36,9 +33,8 @@ pub enum Place {
     TabOrPage,
 }
 
-/// Asks for an instant; Enter alone takes that of what is selected on the tab.
-pub fn ask_instant(cx: &ViewContext, tab: &dyn TabView, place: Place) -> Modal {
-    let selected = tab.moment(cx);
+/// Asks for an instant; Enter alone takes that of what is selected.
+pub fn ask_instant(cx: &ViewContext, selected: Option<Timestamp>, place: Place) -> Modal {
     let hint = t!("03:12   2026-11-20 22:15   -10m   -2h   -3d");
     let hint = match selected {
         Some(at) => t!("{hint}   Enter alone: {at}", hint, at = stamp(cx, at)),

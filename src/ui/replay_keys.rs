@@ -4,16 +4,15 @@ use crossterm::event::KeyCode;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    Direction::{Earlier, Later},
-    Replay, ask_name,
-    search::Searched,
-};
-use crate::ui::{
     Model, UiAction, ViewContext,
-    context::with_replay,
-    dispatch,
     global::{self, GlobalKey, Reach},
     keys::{char, code},
+    modal::instant::ask_name,
+    model_context::with_replay,
+    replay::{
+        Direction::{Earlier, Later},
+        Replay, Searched,
+    },
 };
 
 /// Keys while the past is shown; they come before those of the tab.
@@ -63,7 +62,7 @@ fn step(seconds: i64) -> Vec<UiAction> {
 /// What lies on top of the tab closes before the past does.
 fn leave(model: &mut Model) -> Vec<UiAction> {
     let on_tab = model.replay.page().is_none() && !model.small();
-    if !(on_tab && dispatch::step_back(model)) {
+    if !(on_tab && global::step_back(model)) {
         model.replay.leave();
     }
     Vec::new()

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use serde::{Deserialize, Serialize};
 
 pub use super::condition::{Condition, Level};
-use crate::plant::{
+use super::{
     expr::Expr,
     id::{AlarmId, DeviceId, LineId, TagId},
     keyword::keyword_enum,
