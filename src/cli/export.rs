@@ -62,7 +62,7 @@ pub struct Args {
     #[arg(long, value_name = "FORMAT", default_value = "csv", value_parser = ["csv", "parquet"])]
     format: String,
     /// File to write, `-` for standard output
-    #[arg(long, value_name = "FILE", default_value = "-")]
+    #[arg(long, short, value_name = "FILE", default_value = "-")]
     out: PathBuf,
     #[command(flatten)]
     csv: CsvArgs,

@@ -28,7 +28,7 @@ pub struct ListArgs {
     #[arg(long)]
     json: bool,
     /// Write CSV to this file instead, `-` for standard output: a row for each
-    #[arg(long, value_name = "FILE", conflicts_with = "json")]
+    #[arg(long, short, value_name = "FILE", conflicts_with = "json")]
     out: Option<PathBuf>,
     #[command(flatten)]
     csv: CsvArgs,

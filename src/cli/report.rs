@@ -64,7 +64,7 @@ pub struct WriteArgs {
     #[command(flatten)]
     history: HistoryArgs,
     /// File to write, `-` for standard output; a folder for several formats [default: the plant's report folder]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     #[arg(long, value_name = "FORMATS", help = report::formats_help(), value_parser = report::format,
           value_delimiter = ',', default_value = report::FORMATS[0].name())]

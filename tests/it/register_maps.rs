@@ -42,7 +42,7 @@ fn a_list_becomes_a_profile_that_passes_its_check() {
 #[test]
 fn a_plant_is_written_only_where_it_is_asked_for() {
     let folder = folder();
-    let args = ["profile", "import", "-", "--output", "meter.toml", "--unit", "7"];
+    let args = ["profile", "import", "-", "--out", "meter.toml", "--unit", "7"];
     let (code, said) = run(folder.path(), &args, LIST.as_bytes());
     assert_eq!((code, fs::read_dir(folder.path()).unwrap().count()), (Some(0), 1), "{said}");
     let args = [&args[..], &["--force", "--plant", "plant.toml"]].concat();
@@ -79,7 +79,7 @@ fn what_cannot_be_read_or_has_two_readings_writes_nothing() {
 fn an_export_is_imported_again() {
     let folder = folder();
     let (code, said) =
-        run(folder.path(), &["profile", "export", "eastron_sdm120", "--format", "csv", "--output", "m.csv"], b"");
+        run(folder.path(), &["profile", "export", "eastron_sdm120", "--format", "csv", "--out", "m.csv"], b"");
     assert!(code == Some(0) && said.contains("tags as csv"), "{said}");
     let (code, said) = run(folder.path(), &["profile", "import", "m.csv"], b"");
     assert_eq!(code, Some(0), "{said}");
@@ -110,19 +110,19 @@ fn a_column_that_may_mean_two_things_is_asked_about() {
 fn what_is_written_is_two_files_and_neither_is_a_pipe() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
-    let args = ["profile", "import", "-", "--output", "a.toml", "--plant", "./a.toml", "--force"];
+    let args = ["profile", "import", "-", "--out", "a.toml", "--plant", "./a.toml", "--force"];
     let (code, said) = run(folder.path(), &args, LIST.as_bytes());
     assert!(code == Some(2) && said.contains("the profile and the plant file"), "{said}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     let mode = rustix::fs::Mode::from_raw_mode(0o600);
     rustix::fs::mknodat(rustix::fs::CWD, at("pipe.toml"), rustix::fs::FileType::Fifo, mode, 0).unwrap();
     let (code, said) =
-        run(folder.path(), &["profile", "import", "-", "--output", "pipe.toml", "--force"], LIST.as_bytes());
+        run(folder.path(), &["profile", "import", "-", "--out", "pipe.toml", "--force"], LIST.as_bytes());
     assert!(code == Some(1) && said.contains("not a regular file"), "{said}");
-    let (code, said) = run(folder.path(), &["profile", "import", "pipe.toml", "--output", "b.toml"], b"");
+    let (code, said) = run(folder.path(), &["profile", "import", "pipe.toml", "--out", "b.toml"], b"");
     assert!(code == Some(1) && said.contains("not a regular file"), "{said}");
     fs::write(at("file"), "").unwrap();
-    let args = ["profile", "import", "-", "--output", "c.toml", "--plant", "file/p.toml"];
+    let args = ["profile", "import", "-", "--out", "c.toml", "--plant", "file/p.toml"];
     let (code, said) = run(folder.path(), &args, LIST.as_bytes());
     assert!(code == Some(1) && !at("c.toml").exists(), "nothing is left half done: {said}");
 }

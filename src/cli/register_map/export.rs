@@ -18,7 +18,7 @@ pub struct Args {
     format: Target,
     /// File to write; an existing one is never overwritten [default: standard output]
     #[arg(long, short, value_name = "FILE")]
-    output: Option<PathBuf>,
+    out: Option<PathBuf>,
 }
 
 /// Writes the text; what is not in it goes to standard error.
@@ -37,7 +37,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     if exported.count == 0 {
         return Err(CliError::Failed("nothing of it can be said there".to_owned()));
     }
-    match &args.output {
+    match &args.out {
         Some(path) => {
             atomic::write_new(path, exported.text.as_bytes()).map_err(CliError::io(path.display().to_string()))
         }

@@ -39,7 +39,7 @@ pub struct Args {
     format: Option<Format>,
     /// The profile to write [default: the name of the file, in this folder]
     #[arg(long, short, value_name = "FILE.toml")]
-    output: Option<PathBuf>,
+    out: Option<PathBuf>,
     /// Write a plant file as well, with this device on a serial line
     #[arg(long, value_name = "FILE.toml")]
     plant: Option<PathBuf>,
@@ -105,7 +105,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
         return Err(CliError::Usage(format!("{title}: {why}")));
     }
     let stem = if is_input { "imported".to_owned() } else { name_of(&args.file) };
-    let path = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}.toml")));
+    let path = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}.toml")));
     let name = name_of(&path);
     check_free(&path, args)?;
     if let Some(plant) = &args.plant {
@@ -171,7 +171,7 @@ fn name_of(path: &Path) -> String {
 fn check_free(path: &Path, args: &Args) -> Result<(), CliError> {
     if path.exists() && !args.force {
         return Err(CliError::Usage(format!(
-            "{} exists: --force overwrites it, --output names another file",
+            "{} exists: --force overwrites it, --out names another file",
             path.display()
         )));
     }
