@@ -123,7 +123,7 @@ fn parts_of_a_model_that_the_device_counts_are_a_repeat() {
         assert_eq!(tag("module2.V").decimals, Decimals::PowerFrom(tag("V_SF").id), "a factor of all of them");
         let counted = tag(counted_by).id;
         let has = |short: &str, number: f64| {
-            tag(short).when.as_ref().unwrap().holds(&|of| (of == counted).then_some(number.into()))
+            tag(short).when.as_ref().expect("a condition").holds(&|of| (of == counted).then_some(number.into()))
         };
         assert_eq!(
             [has("module1.V", first), has("module2.V", first), has("module2.V", second)],
