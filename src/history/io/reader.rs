@@ -60,8 +60,8 @@ pub type Answerer = Arc<dyn Fn(&Store, &Query, Timestamp) -> Result<Answer, Hist
 /// What the reader asks of the writer.
 #[derive(Debug)]
 pub enum WriterRequest {
-    /// Store what is pending, and say how many records could not be stored: `None` while that is not known.
-    Commit(oneshot::Sender<Option<u64>>),
+    /// Store what is pending, and say how many records could not be stored, once that is known.
+    Commit(oneshot::Sender<u64>),
     /// Report to the operator what cannot be read.
     Unreadable(String),
 }
@@ -227,7 +227,7 @@ fn counts_a_period(query: &Query) -> bool {
 async fn commit_first(writer: &mpsc::Sender<WriterRequest>) -> Option<u64> {
     let (done, committed) = oneshot::channel();
     writer.try_send(WriterRequest::Commit(done)).ok()?;
-    timeout(COMMIT_MAX, committed).await.ok()?.ok()?
+    timeout(COMMIT_MAX, committed).await.ok()?.ok()
 }
 
 /// Interrupts work until it has ended; `false` for what hangs in the disk, which is left behind.

@@ -203,7 +203,7 @@ async fn run(
     mut jobs: mpsc::Receiver<JobRequest>,
     outputs: &mut Outputs,
 ) -> Option<Opening> {
-    let (mut opening, mut restoring) = (None, None);
+    let (mut opening, mut restoring, mut asked) = (None, None, Vec::new());
     let mut archiver = Archiver::new(commit_every);
     let mut tick = tokio::time::interval(commit_every);
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -237,7 +237,12 @@ async fn run(
                     writer.commit(clock.utc());
                     outputs.publish(writer);
                 },
-                Some(HistoryInput::Completed) => writer.completed(),
+                Some(HistoryInput::Completed) => {
+                    writer.completed();
+                    writer.commit(clock.utc());
+                    outputs.publish(writer);
+                    say_unstored(writer, &mut asked);
+                }
                 Some(HistoryInput::Definition(Definition { def, queries, restored })) => {
                     writer.redefine(def, queries, clock.utc());
                     restoring = restored.or(restoring);
@@ -250,14 +255,25 @@ async fn run(
                 WriterRequest::Commit(done) => {
                     writer.commit(clock.utc());
                     outputs.publish(writer);
-                    // The query may have been cancelled meanwhile.
-                    let _ = done.send(writer.unstored());
+                    asked.push(done);
+                    say_unstored(writer, &mut asked);
                 }
                 WriterRequest::Unreadable(what) => {
                     writer.unreadable(what);
                     outputs.publish(writer);
                 }
             }
+        }
+    }
+}
+
+/// Answers those who wait for the commit, once it is known what the store lacks: a start compares it with the audit log.
+fn say_unstored(writer: &Writer, asked: &mut Vec<oneshot::Sender<u64>>) {
+    // A query may have been cancelled meanwhile, or waits no longer.
+    asked.retain(|done| !done.is_closed());
+    if let Some(records) = writer.unstored() {
+        for done in asked.drain(..) {
+            let _ = done.send(records);
         }
     }
 }

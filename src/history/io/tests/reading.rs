@@ -207,11 +207,27 @@ async fn a_report_waits_for_the_commit_but_not_for_ever() {
         let Some(WriterRequest::Commit(done)) = reader.requests.recv().await else { panic!("no commit asked for") };
         assert!(answer.try_recv().is_err(), "answered before the commit");
         if let Some(waiting) = stored {
-            done.send(Some(waiting)).unwrap();
+            done.send(waiting).unwrap();
         }
         let Ok(Ok(Answer::Report(report))) = answer.await else { panic!("no report") };
         assert_eq!(report.unstored, stored, "what is missing in it is said");
     }
+}
+
+#[tokio::test]
+async fn a_report_at_the_start_waits_until_the_log_was_compared() {
+    let (_folder, db) = folder();
+    let mut handle = thread::start(&db, def(), Clock::starting_at(sec(10), 1.0)).unwrap();
+    assert!(handle.restored.take().unwrap().await.unwrap().entries.is_some());
+    let (reply, answer) = oneshot::channel();
+    let period = Period::free(sec(0), sec(9));
+    handle.queries.send((1, QueryRequest { query: Query::Report { period }, reply })).await.unwrap();
+    // What the log had more, and that this was all.
+    handle.records.send(vec![good(PV, 5, 27.0)].into()).await.unwrap();
+    handle.records.send(HistoryInput::Completed).await.unwrap();
+    let Ok(Ok(Answer::Report(report))) = answer.await else { panic!("no report") };
+    assert_eq!((report.unstored, report.until), (Some(0), sec(9)));
+    handle.ended().await;
 }
 
 #[test]
