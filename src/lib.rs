@@ -138,7 +138,8 @@
 //!
 //! # Modules, in reading order
 //!
-//! They form a line, not a graph: a module uses only what stands above it. A test holds this and law 4.
+//! They form a line, not a graph: a module uses only what stands above it, and so does each room of it, in the order of its
+//! `mod.rs`. A test holds this and law 4.
 
 #![cfg_attr(test, allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss))]
 
