@@ -2,6 +2,7 @@
 
 use std::{path::Path, sync::Arc, time::Duration};
 
+use jiff::Timestamp;
 use tokio::{
     sync::{mpsc, oneshot, watch},
     time::MissedTickBehavior,
@@ -239,9 +240,7 @@ async fn run(
                 },
                 Some(HistoryInput::Completed) => {
                     writer.completed();
-                    writer.commit(clock.utc());
-                    outputs.publish(writer);
-                    say_unstored(writer, &mut asked);
+                    commit_first(writer, clock.utc(), outputs, &mut asked);
                 }
                 Some(HistoryInput::Definition(Definition { def, queries, restored })) => {
                     writer.redefine(def, queries, clock.utc());
@@ -253,10 +252,8 @@ async fn run(
             Some(request) = jobs.recv(), if opening.is_none() => archiver.take_up(request),
             Some(request) = requests.recv() => match request {
                 WriterRequest::Commit(done) => {
-                    writer.commit(clock.utc());
-                    outputs.publish(writer);
                     asked.push(done);
-                    say_unstored(writer, &mut asked);
+                    commit_first(writer, clock.utc(), outputs, &mut asked);
                 }
                 WriterRequest::Unreadable(what) => {
                     writer.unreadable(what);
@@ -267,8 +264,11 @@ async fn run(
     }
 }
 
-/// Answers those who wait for the commit, once it is known what the store lacks: a start compares it with the audit log.
-fn say_unstored(writer: &Writer, asked: &mut Vec<oneshot::Sender<u64>>) {
+/// Stores what is pending and answers those who wait for it, once it is known what the store lacks: a start compares it with
+/// the audit log.
+fn commit_first(writer: &mut Writer, now: Timestamp, outputs: &mut Outputs, asked: &mut Vec<oneshot::Sender<u64>>) {
+    writer.commit(now);
+    outputs.publish(writer);
     // A query may have been cancelled meanwhile, or waits no longer.
     asked.retain(|done| !done.is_closed());
     if let Some(records) = writer.unstored() {
