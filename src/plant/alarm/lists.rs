@@ -20,7 +20,7 @@ pub struct ActiveAlarm {
     pub state: AlarmState,
     /// When it was raised.
     pub raised_at: Timestamp,
-    /// When it was last annunciated; identifies what the operator saw, see [`super::alarm::AlarmCommand::Acknowledge`].
+    /// When it was last annunciated; identifies what the operator saw, see [`super::AlarmCommand::Acknowledge`].
     pub annunciated_at: Timestamp,
     /// When it returned to normal, if it did.
     pub returned_at: Option<Timestamp>,
