@@ -102,7 +102,9 @@ fn write(args: &WriteArgs) -> Result<(), CliError> {
         let (source, period) = args.history.open(&def).await?;
         let Answer::Report(report) = source.query(Query::Report { period }).await? else { return Err(unexpected()) };
         if report.unstored != Some(0) {
-            say_error("the history has not stored all records yet: what they say of the period is missing");
+            say_error(
+                "the history lacks records that wait, or that only the audit log has: what they say of the period is missing",
+            );
         }
         for gap in &report.unreadable {
             let [from, to] = [gap.from, gap.to].map(|at| at.to_zoned(def.time_zone.clone()).strftime("%F %T"));

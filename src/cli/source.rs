@@ -9,7 +9,7 @@ use jiff::{SignedDuration, Timestamp};
 use tokio::sync::oneshot;
 
 use crate::{
-    access::{SessionRequest, audit_log::sha256},
+    access::{SessionRequest, audit_log::sha256, io::audit_log},
     history::{
         Answer, HistoryError, Query,
         io::{QueryRequest, archive::sync_and_hash, store::Store},
@@ -20,7 +20,7 @@ use crate::{
     station::Session,
 };
 
-use super::{CliError, StationArgs, client, load, own_files, paths, put_out, put_out_file, say};
+use super::{CliError, StationArgs, client, load, own_files, paths, put_out, put_out_file, say, say_error};
 
 /// The plant, the period and the login of a command that reads the history.
 #[derive(Debug, clap::Args)]
@@ -115,6 +115,8 @@ pub enum Source {
     File {
         /// The file.
         store: Box<Store>,
+        /// The audit log beside it.
+        log: PathBuf,
         /// Up to when it is read: now, or what a demonstration that ran ahead of time has stored.
         until: Timestamp,
     },
@@ -138,7 +140,7 @@ impl Source {
         })?;
         let now = Timestamp::now();
         let until = store.extent().map_or(now, |(_, last)| last.max(now));
-        Ok(Source::File { store: Box::new(store), until })
+        Ok(Source::File { store: Box::new(store), log: audit_log::beside(&path), until })
     }
 
     /// The time of the plant: a demonstration may have run ahead of time.
@@ -152,7 +154,15 @@ impl Source {
     /// Queries the history.
     pub async fn query(&self, query: Query) -> Result<Answer, CliError> {
         match self {
-            Source::File { store, until } => Ok(store.answer(&query, *until)?),
+            Source::File { store, log, until } => {
+                let mut answer = store.answer(&query, *until)?;
+                if let Answer::Report(report) = &mut answer {
+                    let number = report.audit.map_or(0, |last| last.number);
+                    let behind = audit_log::count_behind(log, number, report.until);
+                    report.unstored = behind.inspect_err(|error| say_error(&error.to_string())).ok();
+                }
+                Ok(answer)
+            }
             Source::Station(session) => query_station(session, query).await,
         }
     }

@@ -4,12 +4,15 @@ use std::{path::Path, process::Output, sync::Arc, time::Instant};
 
 use jiff::{SignedDuration, Timestamp};
 use sightglass::{
-    access::io::own_user,
+    access::io::{
+        audit_log::{AuditLog, beside},
+        own_user,
+    },
     history::io::store::Store,
     plant::{
         PlantDef,
         def::Priority,
-        record::{AlarmEvent, AlarmRecord, Record},
+        record::{ActionRecord, AlarmEvent, AlarmRecord, Record},
         sample::Sample,
     },
     profile::{self, Search},
@@ -83,6 +86,36 @@ fn a_report_over_a_damaged_span_names_it_and_has_the_rest() {
     assert!((minutes - lost / 60).abs() <= 2 * 800 / 60 + 2, "{minutes} minutes of {lost} s");
     let (code, _, err) = run("alarms", &path, &[&period[..], &["--stats"]].concat());
     assert_eq!(code, Some(0), "{err}");
+}
+
+/// A station that was killed has them in its log, and its history gets them at the next start.
+#[test]
+fn a_report_says_which_entries_only_the_audit_log_has() {
+    let folder = folder();
+    let path = folder.path().join("tank.duckdb");
+    history(&path, |_, _| Vec::new());
+    let at = |second| START.parse::<Timestamp>().unwrap() + SignedDuration::from_secs(second);
+    let mut entries =
+        [60, 120, 5_000].map(|second| ActionRecord::new(at(second), "anna", "write", "TIC-1.SV", "verified"));
+    AuditLog::open(&beside(&path)).unwrap().0.append(&mut entries).unwrap();
+    let period = ["--from", START, "--to", "2026-03-02T07:00:00Z", "--out", "-"];
+    let missing = |stored: &[ActionRecord]| {
+        let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
+        let store = Store::open(&path, &def, at(9_000)).unwrap().store;
+        store.append(&stored.iter().cloned().map(Record::Action).collect::<Vec<_>>()).unwrap();
+        store.checkpoint().unwrap();
+        drop(store);
+        let (code, out, err) = run("report", &path, &period);
+        assert_eq!(code, Some(0), "{err}");
+        let row = cells(&out).into_iter().find(|row| row[0].starts_with("records not stored yet"));
+        assert_eq!(row.is_some(), err.contains("only the audit log has"), "{err}");
+        row.map(|row| row[1].clone())
+    };
+    assert_eq!(missing(&[]).as_deref(), Some("2"), "the third is of the next period");
+    assert_eq!(missing(&entries[..1]).as_deref(), Some("1"));
+    assert_eq!(missing(&entries[1..2]), None);
+    std::fs::write(beside(&path), "not a log\n").unwrap();
+    assert_eq!(missing(&[]).as_deref(), Some("?"));
 }
 
 #[test]

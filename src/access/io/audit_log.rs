@@ -80,6 +80,17 @@ pub(super) fn verify_each(
     check.end(scanned.torn).map_err(|bad| VerifyError::Bad { path: path.display().to_string(), bad })
 }
 
+/// Entries of before an instant behind the one of this number; none where there is no log. A station that was killed has them
+/// here, and its history gets them at the next start.
+pub fn count_behind(path: &Path, number: u64, until: Timestamp) -> Result<u64, VerifyError> {
+    let mut count = 0;
+    match verify_each(path, &[], |entry, _| count += u64::from(number < entry.n && entry.utc < until)) {
+        Ok(_) => Ok(count),
+        Err(VerifyError::Io { error, .. }) if error.kind() == io::ErrorKind::NotFound => Ok(0),
+        Err(error) => Err(error),
+    }
+}
+
 fn read_head(audit_log: &Path) -> io::Result<Option<ChainHash>> {
     Ok(super::read_line_of(&head_of(audit_log))?.and_then(|text| audit_log::head(&text)))
 }
