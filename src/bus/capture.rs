@@ -19,6 +19,7 @@ use jiff::Timestamp;
 use super::{
     ascii, dissect,
     frame::{self, Mbap, hex},
+    wide_addresses::WideAddresses,
 };
 use crate::plant::{
     line::Framing,
@@ -72,7 +73,7 @@ impl Capture {
 pub fn text(frames: &[Frame]) -> String {
     let mut lines = String::new();
     for (index, frame) in frames.iter().enumerate() {
-        let dissection = dissect::in_traffic(frame, frames[..index].iter().rev());
+        let dissection = dissect::in_traffic(&WideAddresses::default(), frame, frames[..index].iter().rev());
         let bytes = match frame.framing {
             Framing::Ascii if ascii::open(&frame.bytes).is_ok() => frame.bytes.escape_ascii().to_string(),
             Framing::Ascii | Framing::Rtu | Framing::Mbap => hex(&frame.bytes),

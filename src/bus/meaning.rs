@@ -1,6 +1,6 @@
 //! What a request means in the words of the plant: `writes TIC-1.SV = 5.0 °C, P-DP is 1`.
 
-use super::codec;
+use super::{codec, frame::Request, wide_addresses::WideAddresses};
 use crate::{
     plant::{
         PlantDef, Snapshot,
@@ -67,7 +67,8 @@ fn explain(snapshot: &Snapshot, line: LineId, message: &[u8], answer: Option<&[u
     if let ([_, 0x07, ..], Some([_, _, status])) = (message, answer) {
         return devices(snapshot, line, *unit).filter_map(|device| states(device, *status)).collect();
     }
-    let spans = spans(message, answer).unwrap_or_default();
+    let wide = WideAddresses::of(&snapshot.def, line);
+    let spans = spans(wide.request(message), answer).unwrap_or_default();
     let pairs = devices(snapshot, line, *unit).flat_map(|device| spans.iter().map(move |span| (device, span)));
     pairs.flat_map(|(device, span)| lines(snapshot, device, span)).collect()
 }
@@ -88,17 +89,15 @@ fn devices(snapshot: &Snapshot, line: LineId, unit: u8) -> impl Iterator<Item = 
 }
 
 /// What a message reads and writes, by its function (V1.1b3, 6); `None` where bytes are missing.
-pub(super) fn spans(message: &[u8], answer: Option<&[u8]>) -> Option<Vec<Span>> {
+pub(super) fn spans(request: Request, answer: Option<&[u8]>) -> Option<Vec<Span>> {
+    let Request { message, address_words } = request;
     let word = |at: usize| Some(u16::from_be_bytes([*message.get(at)?, *message.get(at + 1)?]));
     let read = |table: Table, at: usize| -> Option<Span> {
         let (address, count) = (word(at)?, word(at + 2)?);
-        let bytes = answer.and_then(|answer| answer.get(3..));
-        let address_words = bytes.map_or(1, |bytes| address_words(table, bytes, count));
-        let words = bytes.and_then(|bytes| unpacked(table, bytes, count * address_words));
+        let words = answer.and_then(|answer| unpacked(table, answer.get(3..)?, count.checked_mul(address_words)?));
         Some(Span { table, address, count, words, address_words, writes: false })
     };
     let write = |table: Table, at: usize, words: Option<Vec<u16>>, count: u16| -> Option<Span> {
-        let address_words = if words.as_ref().is_some_and(|words| usize::from(count) < words.len()) { 2 } else { 1 };
         Some(Span { table, address: word(at)?, count, words, address_words, writes: true })
     };
     Some(match message.get(1)? {
@@ -110,9 +109,8 @@ pub(super) fn spans(message: &[u8], answer: Option<&[u8]>) -> Option<Vec<Span>> 
         0x06 => vec![write(Table::Holding, 2, Some(vec![word(4)?]), 1)?],
         0x0F => vec![write(Table::Coil, 2, unpacked(Table::Coil, message.get(7..)?, word(4)?), word(4)?)?],
         0x10 => {
-            let (bytes, count) = (message.get(7..)?, word(4)?);
-            let words = unpacked(Table::Holding, bytes, count * address_words(Table::Holding, bytes, count));
-            vec![write(Table::Holding, 2, words, count)?]
+            let words = unpacked(Table::Holding, message.get(7..)?, word(4)?.checked_mul(address_words)?);
+            vec![write(Table::Holding, 2, words, word(4)?)?]
         }
         // What comes of a mask hangs on what the register holds by then.
         0x16 => vec![write(Table::Holding, 2, None, 1)?],
@@ -122,11 +120,6 @@ pub(super) fn spans(message: &[u8], answer: Option<&[u8]>) -> Option<Vec<Span>> 
         }
         _ => Vec::new(),
     })
-}
-
-/// Words that each address holds: two where four bytes came for each.
-fn address_words(table: Table, bytes: &[u8], count: u16) -> u16 {
-    if !table.is_bits() && (1..=62).contains(&count) && bytes.len() == 4 * usize::from(count) { 2 } else { 1 }
 }
 
 /// The words of registers, or the bits of coils; `None` if there are fewer.

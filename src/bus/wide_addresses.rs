@@ -8,44 +8,51 @@ use crate::plant::{
     tag::{Access, Table, TagDef},
 };
 
-/// Those of all units of a line.
+/// Those of all units of a line; by default none.
 #[derive(Debug, Clone, Default)]
-pub struct WideAddresses(Vec<(u8, Table, u16)>);
+pub struct WideAddresses(Vec<WideAddress>);
+
+#[derive(Debug, Clone, Copy)]
+struct WideAddress {
+    unit: u8,
+    table: Table,
+    address: u16,
+    /// A read has to bring it: it is no gap in one of others.
+    is_read: bool,
+}
 
 impl WideAddresses {
     /// Those of the tags of a line.
     pub fn of(def: &PlantDef, line: LineId) -> WideAddresses {
-        let is_wide = |tag: &&TagDef| {
-            tag.calculation.is_none() && tag.access != Access::Write && tag.point.kind.address_words() != 1
-        };
+        let is_wide = |tag: &&TagDef| tag.calculation.is_none() && tag.point.kind.address_words() != 1;
         let devices = def.devices.iter().filter(|device| device.line == line);
         let of_device = |device: &DeviceDef| {
             let unit = device.unit;
-            let tags = def.tags_of(device.id).filter(is_wide);
-            tags.map(move |tag| (unit, tag.point.table, tag.point.address)).collect::<Vec<_>>()
+            let wide = |tag: &TagDef| {
+                let (table, address, is_read) = (tag.point.table, tag.point.address, tag.access != Access::Write);
+                WideAddress { unit, table, address, is_read }
+            };
+            def.tags_of(device.id).filter(is_wide).map(wide).collect::<Vec<_>>()
         };
         WideAddresses(devices.flat_map(of_device).collect())
     }
 
-    /// Words that each address of a range holds: two where one of them is known to.
-    pub fn address_words(&self, unit: u8, table: Table, address: u16, count: u16) -> u16 {
-        let end = u32::from(address) + u32::from(count);
-        let is_inside = |(of, within, at): &(u8, Table, u16)| {
-            (*of, *within) == (unit, table) && address <= *at && u32::from(*at) < end
-        };
-        if self.0.iter().any(is_inside) { 2 } else { 1 }
-    }
-
-    /// A request message with how its answer counts.
+    /// A request message with how it counts: two words for each address where one of them is known to hold 32 bits.
     pub fn request<'a>(&self, message: &'a [u8]) -> Request<'a> {
-        let table = match message.get(1) {
-            Some(3) => Table::Holding,
-            Some(4) => Table::Input,
+        let (table, writes) = match message.get(1) {
+            Some(0x03) => (Table::Holding, false),
+            Some(0x04) => (Table::Input, false),
+            Some(0x10) => (Table::Holding, true),
             Some(_) | None => return message.into(),
         };
-        let &[unit, _, a, b, c, d] = message else { return message.into() };
+        let &[unit, _, a, b, c, d, ..] = message else { return message.into() };
         let (address, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
-        Request { message, address_words: self.address_words(unit, table, address, count) }
+        let end = u32::from(address) + u32::from(count);
+        let is_inside = |wide: &WideAddress| {
+            let is_there = address <= wide.address && u32::from(wide.address) < end;
+            (wide.unit, wide.table) == (unit, table) && is_there && (writes || wide.is_read)
+        };
+        Request { message, address_words: if self.0.iter().any(is_inside) { 2 } else { 1 } }
     }
 }
 
@@ -94,6 +101,8 @@ mod tests {
             ([1, 4, 0x1B, 0x59, 0, 1], 1),
             ([2, 3, 0x1B, 0x59, 0, 1], 1),
             ([1, 6, 0x1B, 0x59, 0, 1], 1),
+            ([1, 16, 0x1B, 0x59, 0, 1], 2),
+            ([1, 16, 0x1B, 0x9F, 0, 1], 1),
         ] {
             assert_eq!(wide.request(&message).address_words, words, "{message:02X?}");
         }

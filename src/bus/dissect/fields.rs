@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     bus::{
-        frame::hex,
+        frame::{Request, hex},
         names::{self, Counted, counted, place},
         pdu::{FILE_REFERENCE, Item, MEI_IDENTIFICATION},
         request_lint::coil_value_words,
@@ -23,7 +23,7 @@ pub(super) struct Values {
     /// Every other number, in order.
     pub numbers: Vec<u16>,
     pub registers: Vec<u16>,
-    /// Words of them that each address holds: two where the bytes are twice as many as the standard has.
+    /// Words of them that each address holds.
     pub address_words: usize,
     pub bits: Vec<bool>,
     /// Data, objects or groups, each as text.
@@ -46,10 +46,17 @@ pub(super) struct Fields<'r, 'a> {
 }
 
 impl<'r, 'a> Fields<'r, 'a> {
-    /// `asked` is the request message of a response, if it is known.
-    pub fn new(reader: &'r mut Reader<'a>, function: u8, direction: Direction, asked: Option<&[u8]>) -> Fields<'r, 'a> {
-        let word = |at: usize| Some(u16::from_be_bytes([*asked?.get(at)?, *asked?.get(at + 1)?]));
-        let values = Values { address_words: 1, ..Values::default() };
+    /// `asked` is the request: the message itself, or that of a response if it is known.
+    pub fn new(
+        reader: &'r mut Reader<'a>,
+        function: u8,
+        direction: Direction,
+        asked: Option<Request>,
+    ) -> Fields<'r, 'a> {
+        let of_response = asked.filter(|_| direction == Direction::Answer).map(|asked| asked.message);
+        let word = |at: usize| Some(u16::from_be_bytes([*of_response?.get(at)?, *of_response?.get(at + 1)?]));
+        let address_words = asked.map_or(1, |asked| usize::from(asked.address_words));
+        let values = Values { address_words, ..Values::default() };
         let (start, count) = (word(2), word(4));
         Fields { reader, function, direction, values, start, count, counts: false, bytes: 0 }
     }
@@ -173,9 +180,6 @@ impl<'r, 'a> Fields<'r, 'a> {
     fn byte_count(&mut self, next: Option<Item>) -> Option<()> {
         self.bytes = usize::from(self.reader.byte(t!("byte count"), follow)?);
         let bytes = self.bytes;
-        let is_wide = |count: u16| count != 0 && bytes == 4 * usize::from(count);
-        let may_be = matches!((next, self.function), (Some(Item::Registers), 0x03 | 0x04 | 0x10));
-        self.values.address_words = if may_be && self.count.is_some_and(is_wide) { 2 } else { 1 };
         let each = self.values.address_words;
         let expected = match (&next, self.count.map(usize::from)) {
             (Some(Item::Bits), Some(count)) => count.div_ceil(8),

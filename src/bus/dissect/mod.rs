@@ -21,6 +21,7 @@ use self::{envelope::Envelope, reader::Reader};
 use super::{
     frame::{self, Request},
     names, pdu, request_lint,
+    wide_addresses::WideAddresses,
 };
 use crate::plant::{fault::Fault, line::Framing, traffic::Frame};
 
@@ -77,19 +78,30 @@ pub fn dissect(
     direction: Option<Direction>,
     asked: Option<&[u8]>,
 ) -> Dissection {
+    dissect_with(&WideAddresses::default(), bytes, framing, direction, asked)
+}
+
+/// The same of a line on which these addresses hold 32 bits each.
+fn dissect_with(
+    wide: &WideAddresses,
+    bytes: &[u8],
+    framing: Option<Framing>,
+    direction: Option<Direction>,
+    asked: Option<&[u8]>,
+) -> Dissection {
+    let asked = asked.map(|asked| wide.request(asked));
     let asked_of =
-        |message: &[u8]| asked.filter(|asked| asked.get(1).copied() == message.get(1).map(|code| code & 0x7F));
+        |message: &[u8]| asked.filter(|asked| asked.message.get(1).copied() == message.get(1).map(|code| code & 0x7F));
     let direction = direction.or(asked.map(|_| Direction::Answer));
     let envelope = match framing {
         Some(framing) => envelope::open(bytes, Some(framing)),
         None => best_envelope(bytes, direction),
     };
-    let read = Readings::new(&envelope, asked_of(&envelope.message));
+    let read = Readings::new(&envelope, wide, asked_of(&envelope.message));
     let (direction, reading, also) = read.choose(direction);
     // Bytes without unit and function have no direction.
     let direction = direction.filter(|_| 2 <= envelope.message.len());
     let wrong = asked.filter(|_| direction != Some(Direction::Request)).and_then(|asked| {
-        let asked = Request::as_answered(asked, &envelope.message);
         let fault = frame::check_answer(envelope.framing.unwrap_or(Framing::Rtu), asked, &envelope.message).err()?;
         (!matches!(fault, Fault::Exception(_))).then(|| fault.to_string())
     });
@@ -117,7 +129,7 @@ pub fn dissect(
 fn best_envelope(bytes: &[u8], direction: Option<Direction>) -> Envelope {
     let fits = |envelope: &Envelope| {
         let known = envelope.message.get(1).is_some_and(|code| pdu::function(code & 0x7F).is_some());
-        known && Readings::new(envelope, None).fit(direction)
+        known && Readings::of(envelope).fit(direction)
     };
     let (recognised, bare) = (envelope::open(bytes, recognise(bytes)), envelope::open(bytes, None));
     match recognised.framing {
@@ -135,14 +147,15 @@ fn best_envelope(bytes: &[u8], direction: Option<Direction>) -> Envelope {
     if fits(&bare) { bare } else { damaged.unwrap_or(bare) }
 }
 
-/// Decodes a frame of a line; `before` are the earlier frames of the line, the latest first: one of them is the
-/// request of an answer.
-pub fn in_traffic<'a>(frame: &Frame, before: impl Iterator<Item = &'a Frame>) -> Dissection {
+/// Decodes a frame of a line, some of whose addresses may hold 32 bits each; `before` are the earlier frames of the line, the
+/// latest first: one of them is the request of an answer.
+pub fn in_traffic<'a>(wide: &WideAddresses, frame: &Frame, before: impl Iterator<Item = &'a Frame>) -> Dissection {
     let framing = Some(frame.framing);
     if frame.sent {
-        return dissect(&frame.bytes, framing, Some(Direction::Request), None);
+        return dissect_with(wide, &frame.bytes, framing, Some(Direction::Request), None);
     }
-    dissect(&frame.bytes, framing, Some(Direction::Answer), request_of(frame, before).as_deref())
+    let asked = request_of(wide, frame, before);
+    dissect_with(wide, &frame.bytes, framing, Some(Direction::Answer), asked.as_deref())
 }
 
 /// Earlier frames among which the request of an answer is looked for.
@@ -150,7 +163,11 @@ const BEFORE: usize = 16;
 
 /// The request message of an answer, among the earlier frames of its line: the latest that it answers, else the latest to
 /// its unit with its function, which it answers wrongly.
-pub fn request_of<'a>(answer: &Frame, before: impl Iterator<Item = &'a Frame>) -> Option<Vec<u8>> {
+pub fn request_of<'a>(
+    wide: &WideAddresses,
+    answer: &Frame,
+    before: impl Iterator<Item = &'a Frame>,
+) -> Option<Vec<u8>> {
     let message = message_of(&answer.bytes, answer.framing)?;
     let mut nearest = None;
     for frame in before.take(BEFORE).filter(|frame| frame.sent && frame.framing == answer.framing) {
@@ -159,7 +176,7 @@ pub fn request_of<'a>(answer: &Frame, before: impl Iterator<Item = &'a Frame>) -
         if !same || !frame::begins_answer(&request, &message) {
             continue;
         }
-        if frame::answers(answer.framing, Request::as_answered(&request, &message), &message) {
+        if frame::answers(answer.framing, wide.request(&request), &message) {
             return Some(request);
         }
         nearest.get_or_insert(request);
@@ -188,8 +205,14 @@ struct Readings {
 }
 
 impl Readings {
-    fn new(envelope: &Envelope, asked: Option<&[u8]>) -> Readings {
+    /// Those of a frame of which nothing else is known.
+    fn of(envelope: &Envelope) -> Readings {
+        Readings::new(envelope, &WideAddresses::default(), None)
+    }
+
+    fn new(envelope: &Envelope, wide: &WideAddresses, asked: Option<Request>) -> Readings {
         let message = &envelope.message;
+        let own = wide.request(message);
         let mbap = envelope.framing == Some(Framing::Mbap);
         let same = match message.get(1) {
             Some(code @ 0..=0x7F) => match pdu::function(*code) {
@@ -202,7 +225,7 @@ impl Readings {
             Some(_) | None => None,
         };
         Readings {
-            request: read(message, mbap, Direction::Request, None),
+            request: read(message, mbap, Direction::Request, Some(own)),
             answer: read(message, mbap, Direction::Answer, asked),
             same,
         }
@@ -239,7 +262,8 @@ impl Readings {
     }
 }
 
-fn read(message: &[u8], mbap: bool, direction: Direction, asked: Option<&[u8]>) -> Reading {
+/// `asked` is the request: the message itself, or that of an answer if it is known.
+fn read(message: &[u8], mbap: bool, direction: Direction, asked: Option<Request>) -> Reading {
     let mut reader = Reader::new(message);
     let read = read_message(&mut reader, mbap, direction, asked);
     let (fits, sense) = (reader.fits(), reader.sense());
@@ -259,7 +283,7 @@ fn read_message(
     reader: &mut Reader,
     mbap: bool,
     direction: Direction,
-    asked: Option<&[u8]>,
+    asked: Option<Request>,
 ) -> Option<(String, Option<u8>)> {
     let unit = reader.byte(t!("unit"), |unit| unit_words(unit, mbap))?;
     let function = reader.byte(t!("function"), |code| match code {

@@ -219,7 +219,7 @@ fn whole(bytes: &[u8], framing: Option<Framing>, direction: Option<Direction>, a
     let part = answered(0..bytes.len(), bytes, framing, direction, asked);
     let framing = part.dissection.as_ref().and_then(|dissection| dissection.framing);
     let envelope = envelope::open(bytes, framing);
-    let fits = is_known(&envelope.message) && Readings::new(&envelope, None).fit(direction);
+    let fits = is_known(&envelope.message) && Readings::of(&envelope).fit(direction);
     let why = match (framing, envelope.fault.is_none()) {
         (None, _) if fits => Why::Message,
         (Some(Framing::Mbap), true) => Why::Header,
@@ -234,12 +234,12 @@ fn whole(bytes: &[u8], framing: Option<Framing>, direction: Option<Direction>, a
 /// Would these bytes be a frame, if its check or header were right?
 fn is_damaged(framing: Framing, bytes: &[u8], direction: Option<Direction>) -> bool {
     let envelope = envelope::open(bytes, Some(framing));
-    is_known(&envelope.message) && Readings::new(&envelope, None).fit(direction)
+    is_known(&envelope.message) && Readings::of(&envelope).fit(direction)
 }
 
 /// What bytes say as a message without check or header, if each of them has its place there and no device would refuse it.
 fn sound_message(bytes: &[u8], direction: Option<Direction>) -> Option<String> {
-    let readings = Readings::new(&envelope::open(bytes, None), None);
+    let readings = Readings::of(&envelope::open(bytes, None));
     let is_sound = is_known(bytes) && readings.fit(direction) && (readings.request.sound || readings.answer.fits);
     is_sound.then(|| readings.choose(direction).1.summary)
 }

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     bus::{
-        frame,
+        frame::{self, Request},
         names::{self, Counted, comm_status, counted, modicon, span},
         pdu,
     },
@@ -17,8 +17,8 @@ use crate::{
 };
 
 /// Reads the fields behind the function code. Gives the summary, without the unit; `None` if the message is cut short.
-/// `asked` is the request message of a response, if it is known to be of the same function.
-pub(super) fn read(reader: &mut Reader, function: u8, direction: Direction, asked: Option<&[u8]>) -> Option<String> {
+/// `asked` is the request: the message itself, or that of a response if it is known to be of the same function.
+pub(super) fn read(reader: &mut Reader, function: u8, direction: Direction, asked: Option<Request>) -> Option<String> {
     match (pdu::function(function), direction) {
         (None, Direction::Answer) if 0x80 <= function => exception(reader),
         (None, Direction::Request) if 0x80 <= function => {
@@ -27,7 +27,7 @@ pub(super) fn read(reader: &mut Reader, function: u8, direction: Direction, aske
         }
         (None, _) => unknown(reader, function),
         (Some(row), Direction::Request) => {
-            Some(of_request(row, &Fields::new(reader, function, direction, None).read(row.request)?))
+            Some(of_request(row, &Fields::new(reader, function, direction, asked).read(row.request)?))
         }
         (Some(row), Direction::Answer) => {
             Some(of_response(row, &Fields::new(reader, function, direction, asked).read(row.response)?))

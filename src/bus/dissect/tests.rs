@@ -3,8 +3,14 @@
 
 use super::*;
 use crate::{
-    bus::{ascii, frame::with_crc, frame::with_mbap},
-    plant::traffic::FrameResult,
+    bus::{
+        ascii,
+        frame::{with_crc, with_mbap},
+    },
+    plant::{
+        tag::{DataType, Table},
+        traffic::FrameResult,
+    },
 };
 
 /// Message in hex; request in hex or nothing; the summary expected.
@@ -93,21 +99,37 @@ fn answers_are_reported_with_the_addresses_of_their_request() {
     assert_eq!((dissection.direction, dissection.fields[3].name.as_str()), (Some(Direction::Answer), "register 1"));
 }
 
-/// Enron and Daniel: four bytes for each address that is counted.
+/// Enron and Daniel: four bytes for each address that is counted, where the plant says so; else it is what it always was, wrong.
 #[test]
 fn addresses_of_32_bits_are_named_by_their_own_count() {
-    let answer = "01 03 08 00 00 00 07 43 66 33 33";
-    let read = check(answer, "01 03 1B 59 00 02", "2 registers of 32 bits: 0000 0007 4366 3333");
-    let names: Vec<&str> = read.fields[3..7].iter().map(|field| &*field.name).collect();
+    let mut def = crate::plant::fixture::plant();
+    let pv = &mut def.tags[crate::plant::fixture::PV.index()].point;
+    (pv.table, pv.address, pv.kind) = (Table::Holding, 7_001, DataType::EnronF32);
+    let (line, unit) = (def.lines[0].id, def.devices[0].unit);
+    let wide = WideAddresses::of(&def, line);
+    let read = [unit, 3, 0x1B, 0x59, 0, 2];
+    let answer = [unit, 3, 8, 0, 0, 0, 7, 0x43, 0x66, 0x33, 0x33];
+    let dissected = |wide, message: &[u8], direction, asked| {
+        dissect_with(wide, &with_crc(message), Some(Framing::Rtu), Some(direction), asked)
+    };
+    let good = dissected(&wide, &answer, Direction::Answer, Some(&read[..]));
+    assert_eq!((&*good.summary, good.wrong), ("2 registers of 32 bits: 0000 0007 4366 3333", None));
+    let names: Vec<&str> = good.fields[3..7].iter().map(|field| &*field.name).collect();
     let [first, second] = ["47002 / 0x1B59", "47003 / 0x1B5A"];
     let expect = [(first, 1), (first, 2), (second, 1), (second, 2)];
     assert_eq!(names, expect.map(|(place, word)| format!("{place} word {word}")));
-    let write = "01 10 1B 59 00 01 04 43 66 33 33";
-    check(write, "", "unit 1 write registers 47002 (0x1B59, 1): 4366 3333");
-    // Neither two bytes for each nor four.
-    let bytes = [1, 3, 6, 0, 0, 0, 7, 0x43, 0x66];
-    let odd = dissect(&bytes, None, Some(Direction::Answer), Some(&[1, 3, 0x1B, 0x59, 0, 2]));
-    assert_eq!(odd.wrong.as_deref(), Some("response with 6 data bytes, expected 4"));
+    let write = [unit, 16, 0x1B, 0x59, 0, 1, 4, 0x43, 0x66, 0x33, 0x33];
+    assert_eq!(dissected(&wide, &write, Direction::Request, None).wrong, None);
+
+    let none = WideAddresses::default();
+    let wrong = dissected(&none, &answer, Direction::Answer, Some(&read[..])).wrong;
+    assert_eq!(wrong.as_deref(), Some("response with 8 data bytes, expected 4"));
+    let wrong = dissected(&none, &write, Direction::Request, None).wrong;
+    assert_eq!(wrong.as_deref(), Some("byte count says 4, 2 fit"));
+    // Of a device that counts so, two bytes for each address are wrong.
+    let short = [unit, 3, 4, 0, 0, 0, 7];
+    let wrong = dissected(&wide, &short, Direction::Answer, Some(&read[..])).wrong;
+    assert_eq!(wrong.as_deref(), Some("response with 4 data bytes, expected 8"));
 }
 
 #[test]
@@ -181,9 +203,9 @@ fn an_answer_on_a_line_finds_its_request_before_it() {
         number: 0,
     };
     let line = [frame(true, &[1, 3, 0, 10, 0, 1], 1), frame(true, &[1, 3, 0, 20, 0, 1], 2)];
-    let dissection = in_traffic(&frame(false, &[1, 3, 2, 0, 5], 1), line.iter().rev());
+    let dissection = in_traffic(&WideAddresses::default(), &frame(false, &[1, 3, 2, 0, 5], 1), line.iter().rev());
     assert_eq!(dissection.fields[6].name, "40011 / 0x000A");
-    let dissection = in_traffic(&frame(false, &[1, 3, 2, 0, 5], 3), line.iter().rev());
+    let dissection = in_traffic(&WideAddresses::default(), &frame(false, &[1, 3, 2, 0, 5], 3), line.iter().rev());
     assert_eq!(dissection.fields[6].name, "register 1");
 }
 

@@ -28,20 +28,6 @@ impl<'a, M: AsRef<[u8]> + ?Sized> From<&'a M> for Request<'a> {
     }
 }
 
-impl<'a> Request<'a> {
-    /// A read as its answer shows it, where nothing else tells: four bytes for each address are 32 bits in one.
-    pub fn as_answered(message: &'a [u8], answer: &[u8]) -> Request<'a> {
-        let is_wide = match (message, answer) {
-            ([_, 3 | 4, _, _, high, low], [_, 3 | 4, bytes, ..]) => {
-                let count = usize::from(u16::from_be_bytes([*high, *low]));
-                count != 0 && usize::from(*bytes) == 4 * count
-            }
-            _ => false,
-        };
-        Request { message, address_words: if is_wide { 2 } else { 1 } }
-    }
-}
-
 /// The normal answer to a request, as far as the request itself tells.
 struct Expected {
     /// Length of the message.

@@ -102,7 +102,7 @@ pub fn events(def: &PlantDef, line: LineId, now: Timestamp, heard: &Heard) -> Ve
         Heard::Ended(ended) => {
             let at = now.checked_sub(SignedDuration::try_from(ended.held).unwrap_or_default()).unwrap_or(now);
             let (exchange, response) = exchange_of(ended);
-            let spans = meaning::spans(&ended.request, response.as_deref()).unwrap_or_default();
+            let spans = meaning::spans((&ended.request).into(), response.as_deref()).unwrap_or_default();
             let devices = devices_of(def, line, &ended.request);
             let pairs = devices.flat_map(|device| spans.iter().map(move |span| (device, span)));
             pairs.flat_map(|(device, span)| events_of(def, at, device, span, &exchange)).collect()
@@ -121,7 +121,7 @@ fn devices_of<'a>(def: &'a PlantDef, line: LineId, request: &[u8]) -> impl Itera
 /// What a request writes, as soon as it is heard.
 fn writes(def: &PlantDef, line: LineId, at: Timestamp, frame: &Frame) -> Vec<Event> {
     let Ok(request) = frame::unwrap(frame.framing, &frame.bytes) else { return Vec::new() };
-    let spans = meaning::spans(&request, None).unwrap_or_default();
+    let spans = meaning::spans((&request).into(), None).unwrap_or_default();
     let written = spans.iter().filter(|span| span.writes);
     let tags: Vec<TagId> = written
         .flat_map(|span| devices_of(def, line, &request).map(move |device| (span, device)))

@@ -1,7 +1,10 @@
 //! The requests that this program makes: one table gives their layout and takes them apart.
 
 use super::{Item::ByteCount, function};
-use crate::plant::{number::to_u8, number::to_u16, tag::Table};
+use crate::plant::{
+    number::{to_u8, to_u16},
+    tag::Table,
+};
 
 /// A request as it is sent: function code and data (V1.1b3, 4.1).
 #[derive(Debug, Clone, PartialEq, Eq)]

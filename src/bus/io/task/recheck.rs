@@ -8,6 +8,7 @@ use super::{LinkExit, Task};
 use crate::{
     bus::{
         io::link::{Link, LinkError},
+        pdu::Pdu,
         plan::Block,
         schedule::Schedule,
         wide_addresses::WideAddresses,
@@ -106,7 +107,7 @@ impl Task<'_> {
 /// A read of which nothing is shown.
 fn request(device: DeviceId, unit: u8, span: AddressSpan, wide: &WideAddresses) -> Block {
     let AddressSpan { table, address, count } = span;
-    let address_words = wide.address_words(unit, table, address, count);
+    let address_words = wide.request(&Pdu::read(table, address, count).to(unit)).address_words;
     let (poll, class) = (Poll::Never, PollClass::Background);
     Block { device, unit, table, address, count, tags: [].into(), poll, class, alignment: 1, address_words }
 }

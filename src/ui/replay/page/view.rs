@@ -237,7 +237,7 @@ fn frames(cx: &ViewContext, present: &ViewContext, canvas: &mut Canvas) {
     };
     heading(cx, canvas, &t!("frames of {line}", line = line.name));
     let (columns, rows) = (canvas.width(), canvas.height().saturating_sub(1));
-    bus::frames_around(cx, frames, cx.now, &mut canvas.part(0, 1, columns, rows));
+    bus::frames_around(cx, (line.id, frames), cx.now, &mut canvas.part(0, 1, columns, rows));
 }
 
 /// The line whose kept frames reach to an instant, that with the latest frame until then.

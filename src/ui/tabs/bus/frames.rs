@@ -8,9 +8,9 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
-    bus::{capture, dissect, filter::Filter, frame::hex},
+    bus::{capture, dissect, filter::Filter, frame::hex, wide_addresses::WideAddresses},
     plant::{
-        def::Framing,
+        def::{Framing, LineId},
         request_refusal::RequestRefusal,
         traffic::{Frame, Frames},
     },
@@ -168,8 +168,9 @@ impl Ring {
         }
         let place = ring.place(&shown);
         let first = list::first(place, shown.len(), room);
+        let wide = WideAddresses::of(cx.def(), at.id);
         for (y, n, frame) in on_screen(&shown, first, room) {
-            ring.row(cx, frame, self.selected.is_some() && n == place, &mut canvas.part(0, y + 1, width, 1));
+            ring.row(cx, &wide, frame, self.selected.is_some() && n == place, &mut canvas.part(0, y + 1, width, 1));
         }
         for (n, (words, good)) in notice.iter().enumerate() {
             let y = height.saturating_sub(to_u16(notice.len() - n));
@@ -224,11 +225,11 @@ impl Ring {
     }
 
     /// `02:31.412 TX   1 01 03 03 E8 00 03 85 BB  read holding 41001–41003 (0x03E8, 3)`.
-    fn row(&self, cx: &ViewContext, frame: &Frame, selected: bool, canvas: &mut Canvas) {
+    fn row(&self, cx: &ViewContext, wide: &WideAddresses, frame: &Frame, selected: bool, canvas: &mut Canvas) {
         let theme = cx.theme;
-        let wide = 100 <= canvas.width();
-        let time = draw::local(cx, frame.at, if wide { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
-        let dissection = dissect::in_traffic(frame, self.before(frame.number));
+        let has_room = 100 <= canvas.width();
+        let time = draw::local(cx, frame.at, if has_room { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
+        let dissection = dissect::in_traffic(wide, frame, self.before(frame.number));
         let good = !frame.result.is_wrong();
         let refused = !frame.sent && dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
         let style = match frame.sent && good && !selected {
@@ -241,11 +242,11 @@ impl Ring {
         let unit = frame.unit.map_or(String::new(), |unit| unit.to_string());
         let x = canvas.text(1, 0, &format!("{time} {direction} {unit:>3} {bytes} "), style);
         let room = canvas.width().saturating_sub(x + 1);
-        let summary = if wide { dissection.summary } else { short(&dissection.what) };
+        let summary = if has_room { dissection.summary } else { short(&dissection.what) };
         let words = match (good, refused) {
             (true, false) => summary,
             (true, true) => format!("! {summary}"),
-            (false, _) if wide => format!("✗ {}   {summary}", frame.result),
+            (false, _) if has_room => format!("✗ {}   {summary}", frame.result),
             (false, _) => format!("✗ {}", frame.result),
         };
         canvas.text(x, 0, &pad(&fit_words(&words, room), room), style);
@@ -259,21 +260,22 @@ pub fn recent(cx: &ViewContext, at: &LineView, canvas: &mut Canvas) {
     let (shown, width) = (ring.shown(), canvas.width());
     canvas.run(0, 0, width, '─', cx.theme.dim());
     canvas.text(1, 0, t!(" recent frames, newest below "), cx.theme.dim());
-    let room = usize::from(canvas.height().saturating_sub(1));
+    let (room, wide) = (usize::from(canvas.height().saturating_sub(1)), WideAddresses::of(cx.def(), at.id));
     for (y, _, frame) in on_screen(&shown, shown.len().saturating_sub(room), room) {
-        ring.row(cx, frame, false, &mut canvas.part(0, y + 1, width, 1));
+        ring.row(cx, &wide, frame, false, &mut canvas.part(0, y + 1, width, 1));
     }
 }
 
 /// The frames around an instant, as many as there is room for.
-pub fn around(cx: &ViewContext, frames: &Frames, at: Timestamp, canvas: &mut Canvas) {
+pub fn around(cx: &ViewContext, (line, frames): (LineId, &Frames), at: Timestamp, canvas: &mut Canvas) {
+    let wide = WideAddresses::of(cx.def(), line);
     let ring = Ring { held: frames.clone(), ..Ring::default() };
     let (shown, room) = (ring.shown(), usize::from(canvas.height()));
     let place = shown.partition_point(|frame| frame.at <= at);
     let first = place.saturating_sub(room.div_ceil(2)).min(shown.len().saturating_sub(room));
     let width = canvas.width();
     for (y, n, frame) in on_screen(&shown, first, room) {
-        ring.row(cx, frame, n + 1 == place, &mut canvas.part(0, y, width, 1));
+        ring.row(cx, &wide, frame, n + 1 == place, &mut canvas.part(0, y, width, 1));
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
-    bus::{dissect, frame::hex, meaning, names},
+    bus::{dissect, frame::hex, meaning, names, wide_addresses::WideAddresses},
     plant::{
         tag::Table,
         traffic::{Exchange, Frame},
@@ -131,7 +131,7 @@ impl TextWindow {
         let room = body.width.saturating_sub(6);
         let (title, rows) = match &self.shown {
             Shown::Frame { line, frame, before } => {
-                let dissection = dissect::in_traffic(frame, before.iter());
+                let dissection = dissect::in_traffic(&wide(cx, line), frame, before.iter());
                 let mut rows = frame_rows(cx, frame, &dissection, room);
                 rows.extend(
                     means(cx, line, frame, before, &dissection.message)
@@ -153,12 +153,18 @@ impl TextWindow {
     }
 }
 
+/// Which addresses of the line of this name hold 32 bits each.
+fn wide(cx: &ViewContext, line: &str) -> WideAddresses {
+    let known = cx.def().lines.iter().find(|known| known.name == line);
+    known.map_or(WideAddresses::default(), |line| WideAddresses::of(cx.def(), line.id))
+}
+
 /// What a frame means for the tags of the plant.
 fn means(cx: &ViewContext, line: &str, frame: &Frame, before: &[Frame], message: &[u8]) -> Vec<String> {
     let Some(line) = cx.def().lines.iter().find(|known| known.name == line) else { return Vec::new() };
     match frame.sent {
         true => meaning::of_request(cx.snapshot, line.id, message),
-        false => dissect::request_of(frame, before.iter())
+        false => dissect::request_of(&WideAddresses::of(cx.def(), line.id), frame, before.iter())
             .map_or(Vec::new(), |request| meaning::of_answer(cx.snapshot, line.id, &request, message)),
     }
 }

@@ -279,8 +279,7 @@ fn a_listening_line_shows_only_what_is_heard() {
 #[test]
 fn a_silent_master_is_said_once() {
     use crate::plant::{
-        alarm::ActiveAlarm,
-        alarm::AlarmState,
+        alarm::{ActiveAlarm, AlarmState},
         def::{AlarmDef, AlarmId, Condition, Subject},
     };
     let mut fixture = Fixture::listening();
