@@ -4,8 +4,7 @@ use std::sync::Arc;
 
 use crate::plant::{
     Snapshot,
-    alarm::ActiveAlarm,
-    alarm::{AlarmCommand, manager::subject_name},
+    alarm::{ActiveAlarm, AlarmCommand, manager::subject_name},
     command::{CommandKind, Outcome},
     def::TagId,
     entry,

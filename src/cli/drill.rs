@@ -1,6 +1,9 @@
 //! `sightglass drill`: a scenario in virtual time, with the operator of the scenario, and its verdict.
 
-use std::{path::Path, path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use jiff::{Timestamp, civil::date};
 use tokio::sync::mpsc;

@@ -8,12 +8,10 @@ use std::sync::Arc;
 use jiff::{SignedDuration, Timestamp};
 
 use super::{
-    alarm::{ActiveAlarm, SuppressedAlarm},
-    alarm::{AlarmCommand, state::OperatorNote},
+    alarm::{ActiveAlarm, AlarmCommand, SuppressedAlarm, state::OperatorNote},
     command::CommandKind,
     control_run::ControlRun,
-    line_state::DeviceState,
-    line_state::LineState,
+    line_state::{DeviceState, LineState},
     record::{AlarmRecord, FirstOut, Record},
     restore::Restore,
     snapshot::{DeviceStatus, LineStatus, Snapshot},

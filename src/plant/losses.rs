@@ -2,8 +2,7 @@
 
 use super::{
     PlantDef, Snapshot,
-    alarm::SuppressedAlarm,
-    alarm::{manager::name_of, state::OperatorNote, succession::successors},
+    alarm::{SuppressedAlarm, manager::name_of, state::OperatorNote, succession::successors},
     def::{AlarmId, ProcedureDef},
     id::ProcedureId,
     number::to_u16,

@@ -6,8 +6,11 @@ use std::{fmt, time::Duration};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    device_time::DeviceTime, fault::ExceptionCode, keyword::keyword_enum, line_state::DeviceState,
-    line_state::LineState, request_stats::RequestStats,
+    device_time::DeviceTime,
+    fault::ExceptionCode,
+    keyword::keyword_enum,
+    line_state::{DeviceState, LineState},
+    request_stats::RequestStats,
 };
 
 keyword_enum! {

@@ -6,8 +6,7 @@ use crate::plant::{
     Snapshot,
     alarm::{AlarmState, manager::subject_name},
     def::AlarmId,
-    line_state::DeviceState,
-    line_state::LineState,
+    line_state::{DeviceState, LineState},
     snapshot::HistoryStatus,
 };
 

@@ -10,8 +10,7 @@ use super::{
 };
 use crate::{
     plant::{
-        alarm::ActiveAlarm,
-        alarm::AlarmState,
+        alarm::{ActiveAlarm, AlarmState},
         def::{Priority, Subject},
         time::elapsed,
     },

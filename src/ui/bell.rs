@@ -5,7 +5,11 @@ use std::{collections::HashSet, sync::Arc};
 
 use jiff::Timestamp;
 
-use crate::plant::{alarm::ActiveAlarm, alarm::AlarmState, def::AlarmId, snapshot::Snapshot};
+use crate::plant::{
+    alarm::{ActiveAlarm, AlarmState},
+    def::AlarmId,
+    snapshot::Snapshot,
+};
 
 /// Does an alarm wait for an acknowledgement that did not before? A silenced plant stays silent until the next one comes.
 pub fn rings(before: &Snapshot, now: &Snapshot) -> bool {

@@ -12,13 +12,11 @@ pub use traffic::more_frames;
 
 use super::{QueryNumbers, ViewContext, preferences::Preferences, theme::Theme};
 use crate::plant::{
-    alarm::{ActiveAlarm, SuppressedAlarm},
-    alarm::{AlarmMetrics, AlarmState},
+    alarm::{ActiveAlarm, AlarmMetrics, AlarmState, SuppressedAlarm},
     control_run::ControlRun,
     def::*,
     fault::Fault,
-    line_state::DeviceState,
-    line_state::{LineCounters, LineState},
+    line_state::{DeviceState, LineCounters, LineState},
     parameter_set::StoredSet,
     procedure::ProcedureRun,
     process_load::ProcessLoad,

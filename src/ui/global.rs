@@ -188,7 +188,7 @@ fn show(model: &mut Model, tab: Tab) -> Vec<UiAction> {
     Vec::new()
 }
 
-/// Shows the tab so many further on.
+/// Shows the tab this many places further on.
 fn step(model: &mut Model, by: isize) -> Vec<UiAction> {
     let offered = Tab::offered(&model.cx());
     let place = offered.iter().position(|tab| *tab == model.tabs.shown).unwrap_or(0);

@@ -18,8 +18,7 @@ use crate::plant::{
     def::{DeviceId, TagId},
     exact::Exact,
     interlock::{self, ActuatorDef, InterlockCondition, InterlockDef, InterlockStatus},
-    line_state::DeviceState,
-    line_state::LineState,
+    line_state::{DeviceState, LineState},
     tag::{DataType, TagDef},
 };
 

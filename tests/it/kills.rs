@@ -35,8 +35,7 @@ use sightglass::{
     },
     plant::{
         Snapshot,
-        alarm::ActiveAlarm,
-        alarm::AlarmCommand,
+        alarm::{ActiveAlarm, AlarmCommand},
         command::{Command, CommandId, CommandKind, Outcome},
         def::AlarmId,
         record::{AlarmEvent, AlarmRecord, SEAL_LOG},

@@ -240,7 +240,7 @@ async fn run(
                 },
                 Some(HistoryInput::Completed) => {
                     writer.completed();
-                    commit_first(writer, clock.utc(), outputs, &mut asked);
+                    commit_and_answer(writer, clock.utc(), outputs, &mut asked);
                 }
                 Some(HistoryInput::Definition(Definition { def, queries, restored })) => {
                     writer.redefine(def, queries, clock.utc());
@@ -253,7 +253,7 @@ async fn run(
             Some(request) = requests.recv() => match request {
                 WriterRequest::Commit(done) => {
                     asked.push(done);
-                    commit_first(writer, clock.utc(), outputs, &mut asked);
+                    commit_and_answer(writer, clock.utc(), outputs, &mut asked);
                 }
                 WriterRequest::Unreadable(what) => {
                     writer.unreadable(what);
@@ -266,7 +266,12 @@ async fn run(
 
 /// Stores what is pending and answers those who wait for it, once it is known what the store lacks: a start compares it with
 /// the audit log.
-fn commit_first(writer: &mut Writer, now: Timestamp, outputs: &mut Outputs, asked: &mut Vec<oneshot::Sender<u64>>) {
+fn commit_and_answer(
+    writer: &mut Writer,
+    now: Timestamp,
+    outputs: &mut Outputs,
+    asked: &mut Vec<oneshot::Sender<u64>>,
+) {
     writer.commit(now);
     outputs.publish(writer);
     // A query may have been cancelled meanwhile, or waits no longer.

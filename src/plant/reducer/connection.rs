@@ -8,8 +8,7 @@ use super::Plant;
 use crate::plant::{
     def::{DeviceId, LineId, TagId},
     fault::{Fault, FaultKind},
-    line_state::DeviceState,
-    line_state::LineState,
+    line_state::{DeviceState, LineState},
     record::ActionRecord,
     sample::Cause,
 };

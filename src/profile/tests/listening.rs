@@ -70,7 +70,7 @@ fn what_makes_no_sense_on_a_listening_line_has_a_place() {
 fn addresses_of_32_bits_cannot_be_heard() {
     let meter = METER.replace("address = 1005\ntype = \"uint16\"", "address = 1005\ntype = \"enron_uint32\"");
     let plant = |mode: &str| load(HEARD.replace("mode = \"listen\"", mode).as_bytes(), &meter, PLC);
-    let errors = plant("mode = \"listen\"").expect_err("nobody knows what each address holds").to_string();
+    let errors = plant("mode = \"listen\"").expect_err("it is not known what each address holds").to_string();
     for piece in ["small.toml:14:8", "M1.MODE is enron_uint32, which cannot be heard on a line that only listens"] {
         assert!(errors.contains(piece), "no `{piece}` in\n{errors}");
     }

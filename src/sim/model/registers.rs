@@ -7,9 +7,9 @@ use std::{
 
 use crate::{
     bus::codec,
-    plant::fault::ExceptionCode,
     plant::{
         def::{DeviceDef, Limits, TagId},
+        fault::ExceptionCode,
         number::to_u32,
         scale,
         tag::{Access, Bound, Table, TagDef},

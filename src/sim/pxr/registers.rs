@@ -5,8 +5,7 @@ use super::display::Display;
 use super::map::{self, Meaning, Row};
 use super::{NARROWEST_K, Pxr, SENSOR_C};
 use crate::{
-    plant::fault::ExceptionCode,
-    plant::{def::Limits, number::to_i16, tag::Table},
+    plant::{def::Limits, fault::ExceptionCode, number::to_i16, tag::Table},
     sim::pdu::Registers,
 };
 

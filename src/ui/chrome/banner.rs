@@ -3,7 +3,11 @@
 use super::{Canvas, Model, SILENCE, ViewContext, fit_words, width};
 use crate::t;
 use crate::{
-    plant::{alarm::ActiveAlarm, alarm::AlarmState, line_state::DeviceState, line_state::LineState, ne107::Reason},
+    plant::{
+        alarm::{ActiveAlarm, AlarmState},
+        line_state::{DeviceState, LineState},
+        ne107::Reason,
+    },
     ui::{
         alarm_text::{counts, history_text, state_text, what_text},
         rights,

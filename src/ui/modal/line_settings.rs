@@ -18,8 +18,7 @@ use crate::{
     plant::{
         command::{CommandKind, Outcome},
         def::{LineDef, LineId},
-        line_state::DeviceState,
-        line_state::LineState,
+        line_state::{DeviceState, LineState},
         number::to_u16,
     },
     ui::{

@@ -6,8 +6,7 @@ use crate::{
     plant::{
         command::CommandKind,
         def::{Framing, LineDef, LineId, Parity, Protocol, Serial, Transport},
-        line_state::DeviceState,
-        line_state::LineState,
+        line_state::{DeviceState, LineState},
     },
     ui::{
         Model,

@@ -8,8 +8,7 @@ use crate::ui::modal::sheet::Fact;
 use crate::{
     plant::{
         def::DeviceDef,
-        line_state::DeviceState,
-        line_state::LineState,
+        line_state::{DeviceState, LineState},
         sample::Cause,
         tag::{Poll, TagDef},
         time::elapsed,

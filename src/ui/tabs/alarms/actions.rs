@@ -3,8 +3,7 @@
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
-        alarm::{ActiveAlarm, SuppressedAlarm},
-        alarm::{AlarmCommand, AlarmState},
+        alarm::{ActiveAlarm, AlarmCommand, AlarmState, SuppressedAlarm},
         def::{AlarmId, Subject},
     },
     ui::{

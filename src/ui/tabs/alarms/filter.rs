@@ -1,8 +1,7 @@
 //! Which alarms the list shows, by priority, state, area and words, and in which order; pure.
 
 use crate::plant::{
-    alarm::ActiveAlarm,
-    alarm::{AlarmState, manager::subject_name},
+    alarm::{ActiveAlarm, AlarmState, manager::subject_name},
     def::{AlarmDef, PlantDef, Priority},
 };
 use crate::ui::tabs::prelude::*;

@@ -5,8 +5,7 @@ use std::collections::HashMap;
 use jiff::Timestamp;
 
 use crate::plant::{
-    alarm::ActiveAlarm,
-    alarm::AlarmState,
+    alarm::{ActiveAlarm, AlarmState},
     def::{PlantDef, Priority},
 };
 

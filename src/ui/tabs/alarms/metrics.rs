@@ -3,12 +3,9 @@
 use super::span;
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{
-        alarm::ActiveAlarm,
-        alarm::{
-            PeriodMetrics,
-            metrics::{METRIC_TARGETS, TargetStatus},
-        },
+    plant::alarm::{
+        ActiveAlarm, PeriodMetrics,
+        metrics::{METRIC_TARGETS, TargetStatus},
     },
     report::{Period, alarm_metrics},
     ui::{modal::reason::subject, theme::Theme},

@@ -5,8 +5,7 @@ use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::{
-        alarm::ActiveAlarm,
-        alarm::{AlarmState, manager::subject_name},
+        alarm::{ActiveAlarm, AlarmState, manager::subject_name},
         def::{AlarmDef, Pen, Subject},
         record::{ActionRecord, AlarmEvent, AlarmRecord, NOT_PROCESS_ACTIONS},
     },

@@ -11,9 +11,8 @@ use jiff::SignedDuration;
 use crate::{
     history::{Answer, Query},
     plant::{
-        alarm::{ActiveAlarm, SuppressedAlarm},
         alarm::{
-            AlarmCommand, AlarmState, PeriodMetrics,
+            ActiveAlarm, AlarmCommand, AlarmState, PeriodMetrics, SuppressedAlarm,
             metrics::{Frequent, Named},
             state::OperatorNote,
         },

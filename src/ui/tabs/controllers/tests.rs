@@ -13,8 +13,7 @@ use jiff::SignedDuration;
 
 use crate::{
     plant::{
-        alarm::ActiveAlarm,
-        alarm::AlarmState,
+        alarm::{ActiveAlarm, AlarmState},
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
         control_run::RunState,
         def::{ActionDef, AlarmId, DeviceId},

@@ -3,8 +3,7 @@
 use crate::ui::tabs::{alarms::suppressed_words, prelude::*};
 use crate::{
     plant::{
-        alarm::ActiveAlarm,
-        alarm::AlarmState,
+        alarm::{ActiveAlarm, AlarmState},
         command::{CommandStatus, Outcome},
         def::Subject,
         line_state::LineState,

@@ -9,8 +9,7 @@ use crate::{
     access::SessionStatus,
     plant::{
         PlantDef,
-        line_state::DeviceState,
-        line_state::LineState,
+        line_state::{DeviceState, LineState},
         sample::Sample,
         snapshot::Snapshot,
         tag::{Bound, Decimals, TagDef},
