@@ -3,7 +3,10 @@
 use super::SessionRequest;
 use crate::{
     history::Query,
-    plant::{PlantDef, alarm::AlarmCommand, command::CommandKind, diagnostics::Diagnostic, interlock, role::Role},
+    plant::{
+        PlantDef, alarm::AlarmCommand, command::CommandKind, def::TagId, diagnostics::Diagnostic, exact::Exact,
+        interlock, role::Role,
+    },
 };
 
 /// What a person may do. A role has the rights of those before it.
@@ -42,6 +45,7 @@ impl Right {
 pub fn of_command(kind: &CommandKind) -> Right {
     match kind {
         CommandKind::Write { .. }
+        | CommandKind::WriteText { .. }
         | CommandKind::Alarm(
             AlarmCommand::Acknowledge { .. }
             | AlarmCommand::AcknowledgeAll { .. }
@@ -89,7 +93,11 @@ fn of_diagnostic(diagnostic: &Diagnostic) -> Right {
 
 /// The least role that may give a command: what it writes may need more than its right.
 pub fn needs(def: &PlantDef, kind: &CommandKind) -> Role {
-    let written = kind.writes(def).map(|(tag, value)| interlock::role_to_write(def, tag, value));
+    let of_write = |(tag, value): (TagId, Option<Exact>)| match value {
+        Some(value) => interlock::role_to_write(def, tag, value),
+        None => def.tag(tag).role,
+    };
+    let written = kind.writes(def).map(of_write);
     of_command(kind).role().max(written.max().unwrap_or(Role::Viewer))
 }
 

@@ -19,6 +19,8 @@ use crate::{
 
 /// Most characters of a name, or of where a set of values comes from.
 const WORDS_MAX: usize = 200;
+/// Longest text of a tag: that of one read, as the hex of its bytes.
+const TEXT_MAX: usize = 750;
 /// Most bytes of the settings of a line.
 const SETTINGS_BYTES_MAX: usize = 4 << 10;
 
@@ -39,6 +41,11 @@ const REPORT_MAX: SignedDuration = SignedDuration::from_hours(5 * 366 * 24);
 pub fn command(def: &PlantDef, kind: &CommandKind) -> Result<(), String> {
     match kind {
         CommandKind::Write { tag: id, value: _ } | CommandKind::CorrectCounter { tag: id, amount: _ } => tag(def, *id),
+        CommandKind::WriteText { tag: id, text, seen } => {
+            short("text", text, TEXT_MAX)?;
+            short("text", seen.as_deref().unwrap_or_default(), TEXT_MAX)?;
+            tag(def, *id)
+        }
         CommandKind::Alarm(alarm_command) => of_alarms(def, alarm_command),
         CommandKind::ReadSets | CommandKind::HandOver | CommandKind::TakeOver => Ok(()),
         CommandKind::Refresh(id) | CommandKind::StopRestore(id) => device(def, *id),

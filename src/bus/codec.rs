@@ -9,16 +9,13 @@
 //!  DCBA    3333    6643      little-endian
 //! ```
 
-mod clock;
-mod digits;
-
 use crate::plant::{
     exact::Exact,
     half,
     number::{to_f32, to_i16, to_u8, to_u16},
     raw_number::from_mod10k,
     tag::{ByteOrder, DataType, Encoding, Point},
-    visible::is_printable,
+    text_value,
 };
 
 /// The number that the words of a point hold; `None` for what is not a number: BCD with a digit above 9, NaN, infinity.
@@ -61,54 +58,14 @@ fn whole(kind: DataType, bits: u64) -> Option<i128> {
     (kind.is_half() || is_filling).then_some(number)
 }
 
-/// What stands for a byte that is no part of a printable character.
-pub const UNPRINTABLE: char = '·';
-
-/// The text that the words of a point hold, two characters a word, in UTF-8 (which plain ASCII is): NULs and blanks at
-/// its end are filling, each byte or character that cannot be printed is shown as [`UNPRINTABLE`], and text of which
-/// nothing can be printed as the hex of its bytes. `None` for a point that holds no text.
+/// The text that the words of a point hold, as [`text_value::decode`] shows it; `None` for a point that holds no text.
 pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
-    if let DataType::Clock(clock) = point.kind {
-        return clock::text(clock, &in_order(point.order, words));
-    } else if let DataType::Version(_) = point.kind {
-        return Some(digits::version(&in_order(point.order, words)));
-    } else if let DataType::NetworkAddress(address) = point.kind {
-        return digits::address(address, &to_bytes(point.order, words));
-    }
-    let count = point.kind.length().filter(|_| point.kind.is_text())?;
-    let bytes = to_bytes(point.order, words);
-    // A character that does not fit one byte is none that can be printed.
-    let single = |pair: &[u8]| if pair[0] == 0 { pair[1] } else { 0xFF };
-    let bytes = match point.kind {
-        DataType::Chars(_) => bytes.chunks_exact(2).map(single).collect(),
-        _ => bytes,
-    };
-    let bytes = bytes.get(..usize::from(count))?;
-    let to_nul = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
-    let bytes = if let DataType::TextToNul(_) = point.kind { to_nul } else { bytes };
-    let end = bytes.iter().rposition(|byte| !matches!(byte, 0 | b' ')).map_or(0, |last| last + 1);
-    let bytes = &bytes[..end];
-    let mut text = String::new();
-    for chunk in bytes.utf8_chunks() {
-        text.extend(chunk.valid().chars().map(|letter| if is_printable(letter) { letter } else { UNPRINTABLE }));
-        text.extend(chunk.invalid().iter().map(|_| UNPRINTABLE));
-    }
-    let nothing = !text.is_empty() && text.chars().all(|letter| letter == UNPRINTABLE || letter == ' ');
-    Some(if nothing { bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ") } else { text })
+    text_value::decode(point.kind, &in_order(point.order, words))
 }
 
-/// The words that hold a text, filled with NULs; `None` if it is too long, ends in what would be taken for filling, or
-/// has characters that cannot be printed.
+/// The words that hold a text, as [`text_value::encode`] takes it.
 pub fn encode_text(point: Point, text: &str) -> Option<Vec<u16>> {
-    let is_words = matches!(point.kind, DataType::Text(_) | DataType::TextToNul(_) | DataType::Chars(_));
-    let count = point.kind.length().filter(|_| is_words)?;
-    let fits = text.len() <= usize::from(count) && !text.ends_with(' ') && text.chars().all(is_printable);
-    let mut bytes = text.as_bytes().to_vec();
-    if let DataType::Chars(_) = point.kind {
-        bytes = bytes.iter().flat_map(|byte| [0, *byte]).collect();
-    }
-    bytes.resize(usize::from(point.kind.words()) * 2, 0);
-    fits.then(|| from_bytes(point.order, &bytes))
+    text_value::encode(point.kind, text).map(|words| in_order(point.order, &words))
 }
 
 /// The words to write for a number; `None` if it does not fit the type, is no whole number where one is needed, or the

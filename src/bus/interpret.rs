@@ -5,6 +5,7 @@ use crate::plant::{
     exact::Exact,
     number::{digits, to_f32},
     tag::{ByteOrder, DataType, Point, Table},
+    text_value,
 };
 
 /// Words as a number of a type; `None` where there are too few of them or they hold none.
@@ -16,7 +17,7 @@ pub fn number(kind: DataType, order: ByteOrder, words: &[u16]) -> Option<Exact> 
 /// Words as text: `·` for what cannot be printed.
 pub fn text(words: &[u16]) -> String {
     let letters = words.iter().flat_map(|word| word.to_be_bytes());
-    letters.map(|byte| if (0x20..0x7F).contains(&byte) { char::from(byte) } else { codec::UNPRINTABLE }).collect()
+    letters.map(|byte| if (0x20..0x7F).contains(&byte) { char::from(byte) } else { text_value::UNPRINTABLE }).collect()
 }
 
 /// A number in at most `most` characters: whole numbers whole, others with what fits.

@@ -9,6 +9,7 @@ use crate::plant::{
     def::TagId,
     entry,
     exact::Exact,
+    text_value,
 };
 
 use super::{CliError, client, in_runtime, prompt, say};
@@ -18,7 +19,7 @@ use super::{CliError, client, in_runtime, prompt, say};
 pub struct WriteArgs {
     /// The tag: TIC-1.SV
     tag: String,
-    /// The new value in the tag's unit, or one of its words; +5 adds 5, -5 subtracts 5, =-5 is -5
+    /// The new value in the tag's unit, one of its words, or a text; +5 adds 5, -5 subtracts 5, =-5 is -5; now sets a clock
     #[arg(allow_negative_numbers = true)]
     value: String,
     /// Do not ask again, not even about a large step, a limit, or a value that the device rounds
@@ -81,6 +82,9 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         let mut actor = args.action.attach().await?;
         let snapshot = actor.session.snapshots.borrow().clone();
         let tag = tag_named(&snapshot, &args.tag)?;
+        if snapshot.def.tag(tag).is_text() {
+            return write_text(&mut actor, &snapshot, tag, (&args.value, args.yes)).await;
+        }
         let value = value(&snapshot, tag, &args.value).map_err(CliError::Usage)?;
         confirm(&snapshot, tag, value, args.yes).await?;
         // The station writes what is asked for, or nothing: what was confirmed is what the device can hold.
@@ -99,6 +103,35 @@ pub fn write(args: WriteArgs) -> Result<(), CliError> {
         say(&line);
         Ok(())
     })
+}
+
+/// Writes a text, a date, a time or an address, and prints the outcome.
+async fn write_text(
+    actor: &mut client::Actor,
+    snapshot: &Snapshot,
+    tag: TagId,
+    (typed, yes): (&str, bool),
+) -> Result<(), CliError> {
+    let def = snapshot.def.tag(tag);
+    let now = snapshot.at.to_zoned(snapshot.def.time_zone.clone());
+    let held = text_value::as_held(def.point.kind, typed, &now);
+    let held =
+        held.map_err(|expected| CliError::Usage(format!("{}: found `{typed}`, expected {expected}", def.name)))?;
+    let seen = snapshot.texts[tag.index()].clone();
+    let old = seen.as_deref().unwrap_or("----").to_owned();
+    let question: Vec<String> = def.confirm.clone().into_iter().collect();
+    ask(&format!("{} {old} → {held}", def.name), &question, yes).await?;
+    let kind = CommandKind::WriteText { tag, text: typed.into(), seen };
+    let status = actor.send_command(1, kind).await?;
+    // What the station says that the device holds, which need not be what was typed.
+    let new = snapshot.written(&status.command.kind).map_or(held, |(_, new)| new);
+    let recorded = client::recorded_words(status.recorded);
+    let line = format!("{} {old} → {new}: {}{recorded}", def.name, status.outcome);
+    if !status.outcome.is_success() {
+        return Err(CliError::Failed(line));
+    }
+    say(&line);
+    Ok(())
 }
 
 /// Acknowledges what waits, as it is seen now.
@@ -151,14 +184,23 @@ pub fn ack(args: AckArgs) -> Result<(), CliError> {
 
 /// Asks what a screen asks in a window of its own: a large step, an alarm limit, a rounded value, what the profile wants asked.
 async fn confirm(snapshot: &Snapshot, tag: TagId, value: Exact, yes: bool) -> Result<(), CliError> {
-    if yes || !entry::needs_confirmation(snapshot, tag, value) {
+    if !entry::needs_confirmation(snapshot, tag, value) {
         return Ok(());
     }
     let def = snapshot.def.tag(tag);
     let words = |value: Option<Exact>| value.map_or_else(|| "----".to_owned(), |value| snapshot.format(tag, value));
     let question = def.confirm.clone().into_iter().chain(entry::rounded_text(snapshot, tag, value));
-    let question = question.chain(entry::warnings(snapshot, tag, value)).collect::<Vec<_>>().join("; ");
+    let question: Vec<String> = question.chain(entry::warnings(snapshot, tag, value)).collect();
     let change = format!("{} {} → {}", def.name, words(snapshot.sample(tag).good_exact()), words(Some(value)));
+    ask(&change, &question, yes).await
+}
+
+/// Asks whether to make a change about which there is something to say.
+async fn ask(change: &str, question: &[String], yes: bool) -> Result<(), CliError> {
+    if yes || question.is_empty() {
+        return Ok(());
+    }
+    let question = question.join("; ");
     if !prompt::is_interactive() {
         return Err(CliError::Usage(format!("{change}: {question}: add --yes to write it")));
     }

@@ -1,5 +1,6 @@
 //! What an operator asks, its way to the bus, and its outcome.
 
+mod bus_request;
 mod refusal;
 
 use crate::{t, text::translate};
@@ -14,11 +15,12 @@ use super::{
     def::{DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::Diagnostic,
     exact::Exact,
-    fault::{ExceptionCode, Fault},
+    fault::Fault,
     procedure::ProcedureDef,
     restore::RestoreRequest,
     snapshot::Snapshot,
 };
+pub use bus_request::{BusRequest, WriteJob, WriteResult};
 pub use refusal::{NotConfirmed, Refusal};
 
 /// What an operator asks. [`CommandStatus`] says what became of it.
@@ -75,6 +77,15 @@ pub enum CommandKind {
         /// The new value.
         value: Exact,
     },
+    /// Write a text, a date, a time or an address, and verify it.
+    WriteText {
+        /// What.
+        tag: TagId,
+        /// As it was typed; once accepted, as the device will show it.
+        text: Arc<str>,
+        /// The text that the operator saw. A write over another one is refused; a clock goes on.
+        seen: Option<Arc<str>>,
+    },
     /// Acknowledge, silence, reset, shelve: what is done with alarms.
     Alarm(AlarmCommand),
     /// Read all tags of a device now.
@@ -122,7 +133,7 @@ pub enum CommandKind {
 }
 
 impl CommandKind {
-    /// The tag and the value of a write.
+    /// The tag and the value of a write of a number.
     pub fn written(&self) -> Option<(TagId, Exact)> {
         match self {
             CommandKind::Write { tag, value } => Some((*tag, *value)),
@@ -130,10 +141,18 @@ impl CommandKind {
         }
     }
 
+    /// The tag of a write, of a number or of a text.
+    pub fn written_tag(&self) -> Option<TagId> {
+        match self {
+            CommandKind::Write { tag, .. } | CommandKind::WriteText { tag, .. } => Some(*tag),
+            _ => None,
+        }
+    }
+
     /// What is said of one that went well, the same on screen and on record: only a value is read back, and so verified.
     pub fn label(&self) -> &'static str {
         match self {
-            CommandKind::Write { .. } | CommandKind::Restore(_) => "verified",
+            CommandKind::Write { .. } | CommandKind::WriteText { .. } | CommandKind::Restore(_) => "verified",
             // The line has taken it; what comes of it stands on the bus tab.
             CommandKind::Test(..) => "started",
             // Whether they are the right ones only the devices can tell.
@@ -159,7 +178,7 @@ impl CommandKind {
     pub fn line(&self, def: &PlantDef) -> Option<LineId> {
         let of_device = |device: DeviceId| Some(def.device(device).line);
         match self {
-            CommandKind::Write { tag, .. } => of_device(def.tag(*tag).device),
+            CommandKind::Write { tag, .. } | CommandKind::WriteText { tag, .. } => of_device(def.tag(*tag).device),
             CommandKind::Refresh(device) | CommandKind::SaveSet { device, .. } | CommandKind::StopRestore(device) => {
                 of_device(*device)
             }
@@ -179,9 +198,9 @@ impl CommandKind {
         }
     }
 
-    /// Each tag with the value that it gets: of a write one, of a restore all its changes, of a procedure those of all steps
-    /// and of its safe state.
-    pub fn writes<'a>(&'a self, def: &'a PlantDef) -> impl Iterator<Item = (TagId, Exact)> + 'a {
+    /// Each tag with the number that it gets, `None` for a text: of a write one, of a restore all its changes, of a procedure
+    /// those of all steps and of its safe state.
+    pub fn writes<'a>(&'a self, def: &'a PlantDef) -> impl Iterator<Item = (TagId, Option<Exact>)> + 'a {
         let changes = match self {
             CommandKind::Restore(request) => &request.changes[..],
             _ => &[],
@@ -190,9 +209,11 @@ impl CommandKind {
             CommandKind::StartProcedure(id) => def.procedures.get(id.index()),
             _ => None,
         };
-        let changes = changes.iter().map(|change| (change.tag, change.new));
-        let of_procedure = procedure.into_iter().flat_map(ProcedureDef::writes).map(|(tag, value)| (tag, value.into()));
-        self.written().into_iter().chain(changes).chain(of_procedure)
+        let own = self.written_tag().map(|tag| (tag, self.written().map(|(_, value)| value)));
+        let changes = changes.iter().map(|change| (change.tag, Some(change.new)));
+        let of_procedure = procedure.into_iter().flat_map(ProcedureDef::writes);
+        let of_procedure = of_procedure.map(|(tag, value)| (tag, Some(value.into())));
+        own.into_iter().chain(changes).chain(of_procedure)
     }
 }
 
@@ -301,75 +322,6 @@ impl fmt::Display for Outcome {
             Outcome::Failed(fault) => write!(f, ": {fault}"),
         }
     }
-}
-
-/// A checked write of one tag, as the bus performs it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct WriteJob {
-    /// Identifies the write in events.
-    pub id: WriteId,
-    /// The tag to write.
-    pub tag: TagId,
-    /// The raw number, already unscaled.
-    pub raw: Exact,
-    /// An unlock register to write first (tag and raw number), if the device needs unlocking.
-    pub unlock: Option<(TagId, Exact)>,
-    /// Read the value back afterwards.
-    pub verify: bool,
-    /// It switches something off and goes before all that waits, see `super::interlock::is_stop`.
-    pub urgent: bool,
-}
-
-/// The result of a write on the wire. The plant compares it and decides the outcome.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum WriteResult {
-    /// The device accepted it; then it was read back: this raw number.
-    ReadBack(Exact),
-    /// No valid answer; read once the unit was in sync again, the device holds this raw number.
-    ReadBackAfterNoResponse(Exact),
-    /// The device accepted it, but the read-back failed.
-    NotRead(Fault),
-    /// The device accepted it; the profile excludes a read-back.
-    Accepted,
-    /// A broadcast has left: no unit answers it.
-    Sent,
-    /// The device refused with an exception.
-    Refused(ExceptionCode),
-    /// No valid answer: it is not known whether the write took effect.
-    NoValidResponse(Fault),
-    /// Nothing was sent.
-    NotSent(Fault),
-    /// Nothing was sent: it still waited when a stop of the same tag came.
-    Superseded,
-}
-
-/// What the plant asks of a link task.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum BusRequest {
-    /// Write one tag once, then read it back. Answered by [`super::event::Event::Wrote`].
-    Write(WriteJob),
-    /// Read every block of a device as soon as possible.
-    Refresh {
-        /// Which.
-        device: DeviceId,
-        /// The command it comes by; `None` for one of the plant itself.
-        command: Option<CommandId>,
-    },
-    /// Open or close the port.
-    Connect(bool),
-    /// Use these settings from now on.
-    Configure(Box<LineDef>),
-    /// Start a diagnostic; the one at work is stopped.
-    Test {
-        /// The command it comes by.
-        id: CommandId,
-        /// Who requested it.
-        by: Arc<str>,
-        /// What.
-        diagnostic: Diagnostic,
-    },
-    /// Stop the running diagnostic.
-    StopTest,
 }
 
 impl ActiveAlarm {

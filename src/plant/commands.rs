@@ -1,11 +1,12 @@
 //! Tracks commands from acceptance to outcome, and makes their audit records.
 
 mod check;
+mod outcome;
 mod record;
 
 use std::{collections::VecDeque, mem::take, sync::Arc, time::Duration};
 
-use jiff::Timestamp;
+use jiff::{Timestamp, Zoned};
 
 use super::{
     command::{
@@ -18,9 +19,10 @@ use super::{
     fault::Fault,
     process_image::ProcessImage,
     record::{ActionRecord, WRITE_REQUESTED},
-    scale,
+    scale, text_value,
 };
 use crate::plant::time::elapsed;
+use outcome::without_read_back;
 use record::record;
 
 pub use record::{HAND_OVER, TAKE_OVER, alarm_action, value_text};
@@ -83,12 +85,42 @@ impl CommandTracker {
         let kind = CommandKind::Write { tag, value: rounded.unwrap_or(value) };
         let command = Command { kind, ..status.command.clone() };
         let status = CommandStatus { command, old: image.sample(tag).exact(), ..status.clone() };
+        self.begin_write(&status, checked, image)
+    }
+
+    /// Accepts a write of a text over the one that was seen. `now` is the time and the zone of the plant.
+    pub fn write_text(
+        &mut self,
+        image: &ProcessImage,
+        status: &CommandStatus,
+        (tag, typed, seen): (TagId, &str, Option<&str>),
+        now: &Zoned,
+    ) -> Result<WriteJob, Box<ActionRecord>> {
+        let kind = self.def.tag(tag).point.kind;
+        let held = text_value::as_held(kind, typed, now);
+        // What is shown and recorded is what the device will show, not what was typed.
+        let text = held.as_deref().unwrap_or(typed).into();
+        let command = Command {
+            kind: CommandKind::WriteText { tag, text, seen: seen.map(Into::into) },
+            ..status.command.clone()
+        };
+        let status = CommandStatus { command, ..status.clone() };
+        let checked = self.check_text(image, (tag, held, seen));
+        self.begin_write(&status, checked, image)
+    }
+
+    fn begin_write(
+        &mut self,
+        status: &CommandStatus,
+        checked: Result<WriteJob, Outcome>,
+        image: &ProcessImage,
+    ) -> Result<WriteJob, Box<ActionRecord>> {
         match checked {
-            Err(outcome) => Err(Box::new(self.complete_at_once(&status, outcome, image))),
+            Err(outcome) => Err(Box::new(self.complete_at_once(status, outcome, image))),
             Ok(job) => {
                 self.last_write = job.id.0;
-                self.writes.push((status.command.id, job));
-                self.accept(&status);
+                self.writes.push((status.command.id, job.clone()));
+                self.accept(status);
                 Ok(job)
             }
         }
@@ -173,18 +205,8 @@ impl CommandTracker {
         at: Timestamp,
     ) -> Option<ActionRecord> {
         let (command, job) = self.take_write(id)?;
-        let def = self.def.tag(job.tag);
-        let value = |back| scale::to_value(def, back, image.scaling_decimals(def).unwrap_or(0));
-        let outcome = match result {
-            WriteResult::ReadBack(back) | WriteResult::ReadBackAfterNoResponse(back)
-                if scale::same_raw(def, job.raw, back) =>
-            {
-                Outcome::Verified
-            }
-            WriteResult::ReadBack(back) => Outcome::NotConfirmed(NotConfirmed::Different(value(back))),
-            WriteResult::ReadBackAfterNoResponse(back) => Outcome::NotConfirmed(NotConfirmed::NotApplied(value(back))),
-            unread => without_read_back(&unread),
-        };
+        let begun = self.commands.iter().find(|status| status.command.id == command).map_or(at, |status| status.at);
+        let outcome = outcome::of_write(self.def.tag(job.tag), &job.raw, result, image, elapsed(begun, at));
         self.complete(command, outcome, image, at)
     }
 
@@ -278,7 +300,7 @@ impl CommandTracker {
                 && !matches!(status.command.kind, CommandKind::Restore(_))
                 && PENDING_MAX.mul_f64(speed) < elapsed(status.at, at)
         };
-        let outcome = |status: &CommandStatus| match status.command.kind.written() {
+        let outcome = |status: &CommandStatus| match status.command.kind.written_tag() {
             Some(_) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
             None => Outcome::Failed(Fault::Timeout),
         };
@@ -341,20 +363,5 @@ impl CommandTracker {
             (BusRequest::StopTest, CommandKind::StopTest(tested)) => *tested == line,
             _ => false,
         })
-    }
-}
-
-/// The outcome of a write whose value was not read back.
-fn without_read_back(result: &WriteResult) -> Outcome {
-    match result {
-        WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(*code)),
-        WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(*fault)),
-        WriteResult::Superseded => Outcome::Refused(Refusal::Superseded),
-        WriteResult::NoValidResponse(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
-        WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(*fault)),
-        WriteResult::Sent => Outcome::Sent,
-        WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::ReadBackAfterNoResponse(_) => {
-            Outcome::NotConfirmed(NotConfirmed::NoReadBack)
-        }
     }
 }

@@ -26,9 +26,10 @@ pub fn refusal(def: &PlantDef, kind: &CommandKind) -> Option<Refusal> {
         CommandKind::SaveSettings(line) | CommandKind::Test(line, _) | CommandKind::StopTest(line) => {
             def.listens_on(*line)
         }
-        CommandKind::Write { .. } | CommandKind::Restore(_) | CommandKind::StartProcedure(_) => {
-            kind.writes(def).any(|(tag, _)| def.listens_to(tag))
-        }
+        CommandKind::Write { .. }
+        | CommandKind::WriteText { .. }
+        | CommandKind::Restore(_)
+        | CommandKind::StartProcedure(_) => kind.writes(def).any(|(tag, _)| def.listens_to(tag)),
         CommandKind::Connect(..)
         | CommandKind::Alarm(_)
         | CommandKind::ReadSets

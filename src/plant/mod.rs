@@ -39,6 +39,8 @@ pub(crate) mod totalizer;
 pub mod north_def;
 pub mod raw_number;
 pub mod visible;
+pub(crate) mod text_value;
+pub mod tag_value;
 pub mod line_trouble;
 pub(crate) mod mimic_def;
 pub(crate) mod energy;

@@ -11,6 +11,7 @@ mod restore;
 mod service;
 mod shown;
 mod station;
+mod writes;
 #[cfg(test)]
 mod tests;
 
@@ -21,12 +22,12 @@ use jiff::Timestamp;
 use super::{
     alarm::{AlarmManager, AlarmMetrics, AlarmMonitor, command::check_note},
     batch::BatchTracker,
-    command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteId, WriteJob},
-    commands::{CommandTracker, Limits},
+    command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteJob},
+    commands::CommandTracker,
     control_run::RunTracker,
     counter::{self, CounterWatch},
     def::{LineDef, LineId, PlantDef, TagId},
-    event::{Event, WriteResult},
+    event::Event,
     fault::Fault,
     heard,
     interlock::ActuatorTracker,
@@ -237,13 +238,8 @@ impl Plant {
             return self.after_command(effects, at);
         }
         let outcome = match status.command.kind.clone() {
-            CommandKind::Write { tag, value } => {
-                let written = self.commands.write(&self.image, &status, (tag, value), Limits::All);
-                effects.write(self.line_of(tag), written);
-                let outcome = self.commands.outcome_of(status.command.id);
-                if matches!(outcome, Some(Outcome::Pending | Outcome::Unchanged)) {
-                    self.leave_safe_state(tag, value, at, &mut effects);
-                }
+            CommandKind::Write { .. } | CommandKind::WriteText { .. } => {
+                self.write_command(&status, at, &mut effects);
                 return self.after_command(effects, at);
             }
             CommandKind::Alarm(alarm_command) => Some(self.alarm_command(&status, alarm_command, &mut effects)),
@@ -352,29 +348,6 @@ impl Plant {
         let source_frames = Arc::make_mut(&mut self.source_frames);
         for tag in tags {
             source_frames[tag.index()] = Some(exchange.clone());
-        }
-    }
-
-    /// A write ended.
-    fn wrote(&mut self, id: WriteId, result: WriteResult, at: Timestamp) -> Option<ActionRecord> {
-        if let Some(tag) = self.commands.tag_of(id) {
-            self.written(tag, &result, at);
-        }
-        self.commands.wrote(id, result, &self.image, at)
-    }
-
-    /// Unless a write was read back or certainly had no effect, the present value becomes uncertain.
-    fn written(&mut self, tag: TagId, result: &WriteResult, at: Timestamp) {
-        match result {
-            WriteResult::Accepted | WriteResult::Sent => self.image.written(tag, None, at),
-            WriteResult::NotRead(fault) | WriteResult::NoValidResponse(fault) => {
-                self.image.written(tag, Some(*fault), at)
-            }
-            WriteResult::ReadBack(_)
-            | WriteResult::ReadBackAfterNoResponse(_)
-            | WriteResult::Refused(_)
-            | WriteResult::NotSent(_)
-            | WriteResult::Superseded => {}
         }
     }
 

@@ -179,6 +179,14 @@ impl Snapshot {
     pub fn expected_value(&self, kind: &CommandKind) -> Option<Exact> {
         self.samples.get(kind.written()?.0.index())?.exact()
     }
+    /// The tag that a command writes, and the new value with its unit, or the new text.
+    pub fn written(&self, kind: &CommandKind) -> Option<(TagId, String)> {
+        if let CommandKind::WriteText { tag, text, .. } = kind {
+            return Some((*tag, text.to_string()));
+        }
+        let (tag, value) = kind.written()?;
+        Some((tag, format!("{} {}", self.format(tag, value), self.unit(tag)).trim_end().to_owned()))
+    }
     /// The unit of a tag, which the device may choose (°C or °F).
     pub fn unit(&self, tag: TagId) -> &str {
         self.def.tag(tag).unit_now(|tag| self.sample(tag))

@@ -116,11 +116,12 @@ impl<'a> Scope<'a> {
     }
 }
 
-/// Reports a tag that is named where one is written, and cannot be.
+/// Reports a tag that is named where a number is written, and cannot take one.
 pub(super) fn check_writable(name: &At<String>, tag: &TagDef, problems: &mut Problems) {
     if !tag.writable() {
         problems.add(name.at, format!("{} cannot be written", tag.name)).label("expected access = \"rw\" or \"w\"");
     }
+    check_number(name.at, tag, problems);
 }
 
 /// Reports a text that is named where a number is needed.

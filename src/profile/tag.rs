@@ -93,7 +93,7 @@ pub(super) fn define(id: TagId, layers: Vec<Raw>, context: &DeviceContext, probl
         (None, None) => Decimals::Fixed(decimals(&row, kind, problems)),
     };
     check_scaling(&row, kind, decimals, problems);
-    let access = access(&row, point, problems);
+    let access = access(&row, point, context.limits, problems);
     let poll = poll(&row, context, problems);
     if let Some(name) = &row.name {
         check_name(name, "tag", problems);

@@ -9,6 +9,7 @@ use super::{
 use crate::plant::{
     address::{in_table, table_named},
     tag::{Access, ByteOrder, DataType, Point, StorePolicy},
+    text_value,
 };
 
 /// Keys that a text does not have.
@@ -71,7 +72,7 @@ pub(super) fn check_calculated(row: &TagTable, expr: Span, problems: &mut Proble
     }
 }
 
-/// Words have no scale, no limits and no names of numbers, and are neither written nor kept in the history.
+/// Words have no scale, no limits and no names of numbers, and are not kept in the history.
 pub(super) fn check_text(row: &TagTable, point: Point, problems: &mut Problems) {
     for (key, at) in FOR_NUMBERS.into_iter().filter_map(|key| Some((key, row.span_of(key)?))) {
         problems.add(at, format!("`{key}` is for numbers, this is a text")).label("leave it out");
@@ -85,7 +86,9 @@ pub(super) fn check_text(row: &TagTable, point: Point, problems: &mut Problems) 
         problems.add(row.at, "a text needs registers").label("expected table = \"holding\" or \"input\"");
     }
     if let Some(access) = row.access.filter(|access| access.value != Access::Read) {
-        problems.add(access.at, "a text can only be read").label("expected access = \"r\"");
+        if !text_value::is_writable(point.kind) {
+            problems.add(access.at, "a version can only be read").label("expected access = \"r\"");
+        }
     }
     if let Some(store) = row.store.filter(|store| store.value != StorePolicy::Never) {
         problems.add(store.at, "the history keeps numbers, this is a text").label("leave it out");

@@ -138,10 +138,8 @@ fn command_changes(before: &Snapshot, after: &Snapshot) -> Vec<String> {
         !status.is_pending() && before.commands.iter().find(same).is_none_or(|old| old.outcome != status.outcome)
     });
     news.filter_map(|status| {
-        let (tag, value) = status.command.kind.written()?;
-        let (name, unit) = (&after.def.tag(tag).name, after.unit(tag));
-        let value = after.format(tag, value);
-        Some(format!("{}: {name} := {value} {unit} {}", status.by, status.outcome))
+        let (tag, value) = after.written(&status.command.kind)?;
+        Some(format!("{}: {} := {value} {}", status.by, after.def.tag(tag).name, status.outcome))
     })
     .collect()
 }

@@ -38,15 +38,11 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
 /// What was requested, in words: `TIC-1.SV 60.0 → 70.0 °C`.
 pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<Exact>) -> String {
     match kind {
-        CommandKind::Write { tag, value } => {
-            let old = old.map_or("?".to_owned(), |old| cx.snapshot.format(*tag, old));
-            let text = format!(
-                "{} {old} → {} {}",
-                cx.def().tag(*tag).name,
-                cx.snapshot.format(*tag, *value),
-                cx.snapshot.unit(*tag)
-            );
-            text.trim_end().to_owned()
+        CommandKind::Write { tag, .. } | CommandKind::WriteText { tag, .. } => {
+            let seen = if let CommandKind::WriteText { seen, .. } = kind { seen.as_deref() } else { None };
+            let old = old.map(|old| cx.snapshot.format(*tag, old)).or(seen.map(str::to_owned));
+            let new = cx.snapshot.written(kind).map_or(String::new(), |(_, new)| new);
+            format!("{} {} → {new}", cx.def().tag(*tag).name, old.unwrap_or("?".to_owned()))
         }
         CommandKind::Alarm(alarm_command) => {
             let (action, target, _) = alarm_action(cx.def(), alarm_command);

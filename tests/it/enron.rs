@@ -2,15 +2,13 @@
 
 use std::{
     collections::BTreeMap,
-    fs,
     io::{Read, Write},
     net::{Ipv4Addr, TcpListener, TcpStream},
-    process::Command,
     sync::{Arc, Mutex},
     thread::spawn,
 };
 
-use crate::support::{Process, folder, sightglass, sockets};
+use crate::one_device::OneDevice;
 
 /// Its map in `[first, behind the last)`; 3xxx are words of 16 bits.
 const WIDE: [(u16, u16); 2] = [(5_001, 6_000), (7_001, 8_000)];
@@ -90,31 +88,8 @@ fn a_flow_computer_of_32_bits_an_address_is_read_and_written() {
     let served = held.clone();
     spawn(move || listener.incoming().flatten().for_each(|stream| serve(stream, &served)));
 
-    let (folder, runtime) = (folder(), sockets());
-    fs::create_dir(folder.path().join("devices")).unwrap();
-    fs::write(folder.path().join("devices/flow.toml"), MAP).unwrap();
-    let user = String::from_utf8(Command::new("id").arg("-un").output().unwrap().stdout).unwrap();
-    let text = format!(
-        "title = \"Flow\"\ntime_zone = \"UTC\"\n\
-         [[line]]\nname = \"L1\"\nmode = \"tcp\"\nhost = \"127.0.0.1\"\ntcp_port = {port}\n\
-         [[device]]\nname = \"FC\"\nprofile = \"flow\"\nline = \"L1\"\nunit = 1\nfast = \"1s\"\n\
-         [[access.trusted]]\nuser = \"{}\"\nrole = \"supervisor\"\n",
-        user.trim()
-    );
-    let (plant, history) = (folder.path().join("flow_plant.toml"), folder.path().join("h.duckdb"));
-    fs::write(&plant, text).unwrap();
-    let command = |args: &[&str]| {
-        let mut command = sightglass();
-        command.env("XDG_RUNTIME_DIR", &runtime).env("XDG_STATE_HOME", folder.path()).args(args);
-        command
-    };
-    let said = |args: &[&str]| {
-        let output = command(args).output().unwrap();
-        (output.status.code(), String::from_utf8([output.stdout, output.stderr].concat()).unwrap())
-    };
-    let mut station =
-        Process::start(&mut command(&["run", plant.to_str().unwrap(), "--history", history.to_str().unwrap()]));
-    station.wait_for("device FC (unit 1): responding");
+    let mut plant = OneDevice::start("FC", MAP, port);
+    let said = |args: &[&str]| plant.said(args);
     let good = |state: &serde_json::Value| {
         let tags = state["tags"].as_array().cloned().unwrap_or_default();
         tags.iter().filter(|tag| tag["quality"] == "good").count() == SHOWN.len()
@@ -134,8 +109,7 @@ fn a_flow_computer_of_32_bits_an_address_is_read_and_written() {
         let (_, answer) = said(&["write", tag, value, "--yes"]);
         assert!(answer.contains(words), "{tag} {value}: {answer}");
     }
-    station.signal("TERM");
-    assert_eq!(station.end(), Some(0));
+    plant.stop();
     let (cells, seen) = &*held.lock().unwrap();
     assert_eq!((f32::from_bits(cells[&7_002]), cells[&5_001]), (998.5, 4_000_000_000));
     let writes: Vec<&[u8]> = seen.iter().filter(|pdu| pdu[0] != 3).map(Vec::as_slice).collect();

@@ -116,9 +116,10 @@ impl AccessControl {
 
 /// The reauthentication that a command requires; none for a stop.
 pub fn required(def: &PlantDef, kind: &CommandKind) -> Option<Reauthentication> {
-    let asks = |tag: TagId, value: Exact| {
+    let asks = |tag: TagId, value: Option<Exact>| {
         let kind = def.tags.get(tag.index())?.reauthenticate?;
-        (!interlock::is_stop(def, tag, value, None)).then_some(kind)
+        let is_stop = value.is_some_and(|value| interlock::is_stop(def, tag, value, None));
+        (!is_stop).then_some(kind)
     };
     // The strictest of all.
     kind.writes(def).filter_map(|(tag, value)| asks(tag, value)).max()

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::plant::tag::Table;
+use crate::plant::{tag::Table, visible::is_printable};
 
 fn point(kind: DataType, order: ByteOrder) -> Point {
     Point { table: Table::Holding, address: 0, kind, order, field: None }

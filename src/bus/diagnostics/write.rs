@@ -58,8 +58,8 @@ pub fn after_read_back(write: &RegisterWrite, answered: Result<(), Fault>, held:
         // What it held before proves nothing of a write that was not answered.
         (Ok(held), Err(fault)) if held == write.words && held == write.expected => NotConfirmed::NotAnswered(fault),
         (Ok(held), _) if held == write.words => return Outcome::Verified,
-        (Ok(held), Ok(())) => NotConfirmed::Different(number(&held)),
-        (Ok(held), Err(_)) => NotConfirmed::NotApplied(number(&held)),
+        (Ok(held), Ok(())) => NotConfirmed::Different(number(&held).into()),
+        (Ok(held), Err(_)) => NotConfirmed::NotApplied(number(&held).into()),
         (Err(_), Err(fault)) => NotConfirmed::NotAnswered(fault),
         (Err(fault), Ok(())) => NotConfirmed::NotRead(fault),
     })

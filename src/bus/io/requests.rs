@@ -250,7 +250,7 @@ impl Requests {
     }
 
     fn mark_started(&mut self, request: BusRequest) -> BusRequest {
-        if let BusRequest::Write(job) = request {
+        if let BusRequest::Write(job) = &request {
             self.started.push(job.id);
         }
         request

@@ -15,6 +15,7 @@ mod stops;
 mod strangers;
 mod together;
 mod unpolled;
+mod texts;
 mod wide;
 mod worst_case;
 mod diagnostics;

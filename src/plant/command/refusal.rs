@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 use crate::{
     plant::{
         alarm::AlarmRefusal,
-        exact::Exact,
         fault::{ExceptionCode, Fault},
         parameter_set::Problem,
         request_refusal::RequestRefusal,
+        tag_value::TagValue,
+        text_value::ExpectedText,
     },
     t,
 };
@@ -48,6 +49,9 @@ pub enum Refusal {
     /// A bound or the decimals are not known, so the write cannot be checked.
     #[error("{}", t!("{what} is unknown", what = .0))]
     Unknown(String),
+    /// No text that the tag can hold; this is expected.
+    #[error("{}", t!("expected {what}", what = .0))]
+    NotAText(ExpectedText),
     /// Not one of the values of the enumeration.
     #[error("{}", t!("not one of the values of this tag"))]
     NotAChoice,
@@ -127,10 +131,10 @@ pub enum NotConfirmed {
     NotAnswered(Fault),
     /// No valid answer, and the device holds another value.
     #[error("{}", t!("no response, not applied: the device has {what}", what = .0))]
-    NotApplied(Exact),
+    NotApplied(TagValue),
     /// Read back, and different.
     #[error("{}", t!("read back {what}", what = .0))]
-    Different(Exact),
+    Different(TagValue),
     /// Could not be read back.
     #[error("{}", t!("not read back: {what}", what = .0))]
     NotRead(Fault),

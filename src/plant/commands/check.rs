@@ -9,8 +9,11 @@ use crate::plant::{
     interlock,
     number::digits,
     process_image::ProcessImage,
+    sample::Quality,
     scale,
-    tag::{Access, Bound},
+    tag::{Access, Bound, DataType},
+    tag_value::TagValue,
+    text_value::ExpectedText,
 };
 
 impl CommandTracker {
@@ -52,13 +55,16 @@ impl CommandTracker {
         if !def.writable() {
             return refuse(Refusal::ReadOnly);
         }
+        if def.is_text() {
+            return refuse(Refusal::NotAText(ExpectedText(def.point.kind)));
+        }
         let decimals = image.scaling_decimals(def);
         let sent = decimals.and_then(|decimals| scale::to_raw(def, value, decimals));
         let urgent = interlock::is_stop(&self.def, tag, value, decimals);
-        let mut under_way = self.writes.iter().filter(|(_, job)| job.tag == tag).map(|(_, job)| job.raw).peekable();
+        let mut under_way = self.writes.iter().filter(|(_, job)| job.tag == tag).map(|(_, job)| &job.raw).peekable();
         let is_busy = under_way.peek().is_some();
         // A stop need not wait for the start under way; the same stop twice would only take the line's time.
-        let same = |raw| sent.is_some_and(|sent| scale::same_raw(def, raw, sent));
+        let same = |raw: &TagValue| raw.number().zip(sent).is_some_and(|(raw, sent)| scale::same_raw(def, raw, sent));
         if is_busy && (!urgent || under_way.any(same)) {
             return refuse(Refusal::UnderWay);
         }
@@ -97,6 +103,36 @@ impl CommandTracker {
         if !is_busy && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
             return Err(Outcome::Unchanged);
         }
+        Ok(self.job(image, tag, raw.into(), urgent))
+    }
+
+    /// Checks a write of a text against access, what is under way, and the text that the operator saw.
+    pub(super) fn check_text(
+        &self,
+        image: &ProcessImage,
+        (tag, held, seen): (TagId, Result<String, ExpectedText>, Option<&str>),
+    ) -> Result<WriteJob, Outcome> {
+        let refuse = |refusal| Err(Outcome::Refused(refusal));
+        let def = self.def.tag(tag);
+        if !def.writable() {
+            return refuse(Refusal::ReadOnly);
+        }
+        let held = held.map_err(|expected| Outcome::Refused(Refusal::NotAText(expected)))?;
+        if self.writes.iter().any(|(_, job)| job.tag == tag) {
+            return refuse(Refusal::UnderWay);
+        }
+        let good = image.sample(tag).quality == Quality::Good;
+        let now = image.texts[tag.index()].as_deref().filter(|_| good && !matches!(def.point.kind, DataType::Clock(_)));
+        match now {
+            Some(now) if seen.is_none() => refuse(Refusal::NotSeen(now.to_owned())),
+            Some(now) if seen != Some(now) => refuse(Refusal::ChangedTo(now.to_owned())),
+            Some(now) if now == held => Err(Outcome::Unchanged),
+            _ => Ok(self.job(image, tag, TagValue::Text(held.into()), false)),
+        }
+    }
+
+    fn job(&self, image: &ProcessImage, tag: TagId, raw: TagValue, urgent: bool) -> WriteJob {
+        let def = self.def.tag(tag);
         let raw_of = |unlock_tag, value: f64| scale::to_raw(self.def.tag(unlock_tag), value, 0).unwrap_or(value.into());
         let unlock = def.write_unlock.map(|(unlock_tag, value)| (unlock_tag, raw_of(unlock_tag, value)));
         // An unlock register that has its value keeps it, unless a write is just changing it.
@@ -106,6 +142,6 @@ impl CommandTracker {
             now.is_none_or(|now| !scale::same_raw(self.def.tag(*unlock_tag), now, *unlock_value))
         });
         let verify = def.access != Access::Write;
-        Ok(WriteJob { id: WriteId(self.last_write + 1), tag, raw, unlock, verify, urgent })
+        WriteJob { id: WriteId(self.last_write + 1), tag, raw, unlock, verify, urgent }
     }
 }

@@ -24,6 +24,7 @@ pub(super) fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImag
             let tag = def.tag(*tag);
             ("write", tag.name.clone(), Some(value_text(image, tag, *value)))
         }
+        CommandKind::WriteText { tag, text, .. } => ("write", def.tag(*tag).name.clone(), Some(text.to_string())),
         CommandKind::Alarm(alarm_command) => alarm_action(def, alarm_command),
         CommandKind::Refresh(device) => ("refresh", def.device(*device).name.clone(), None),
         CommandKind::Connect(line, true) => ("connect", def.line(*line).name.clone(), None),
@@ -50,15 +51,17 @@ pub(super) fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImag
         CommandKind::HandOver => (HAND_OVER, def.name.clone(), None),
         CommandKind::TakeOver => (TAKE_OVER, def.name.clone(), None),
     };
-    let old = status.old.zip(status.command.kind.written());
-    let old = old.map(|(old, (tag, _))| value_text(image, def.tag(tag), old));
+    let kind = &status.command.kind;
+    let old = status.old.zip(kind.written()).map(|(old, (tag, _))| value_text(image, def.tag(tag), old));
+    let seen =
+        if let CommandKind::WriteText { seen, .. } = kind { seen.as_ref().map(ToString::to_string) } else { None };
     ActionRecord {
         at: status.at,
         by: status.by.clone(),
         from: status.from.clone(),
         action: action.into(),
         target: target.into(),
-        old: old.map(Into::into),
+        old: old.or(seen).map(Into::into),
         new: new.map(Into::into),
         outcome: status.outcome_text().into(),
         note: status.command.note.clone(),

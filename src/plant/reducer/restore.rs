@@ -68,6 +68,7 @@ impl Plant {
                 Some(Outcome::Verified)
             }
             CommandKind::Write { .. }
+            | CommandKind::WriteText { .. }
             | CommandKind::Alarm(_)
             | CommandKind::Refresh(_)
             | CommandKind::Connect(..)

@@ -45,6 +45,7 @@ impl Plant {
                 effects.save = Some((status.command.id, self.settings(*line).clone()));
             }
             CommandKind::Write { .. }
+            | CommandKind::WriteText { .. }
             | CommandKind::Alarm(_)
             | CommandKind::Refresh(_)
             | CommandKind::Connect(..)

@@ -2,6 +2,7 @@
 
 mod alarms;
 mod exact;
+mod texts;
 mod writes;
 
 use std::time::Duration;
@@ -9,7 +10,7 @@ use std::time::Duration;
 use super::*;
 use crate::plant::{
     alarm::AlarmState,
-    command::{Command, CommandId, NotConfirmed, Refusal, WriteJob},
+    command::{Command, CommandId, NotConfirmed, Refusal, WriteJob, WriteResult},
     def::{ActionDef, AlarmDef, AlarmId, Condition, Subject},
     fault::{ExceptionCode, Fault},
     fixture::{self, DP, FAULT, PLC, PV, RUN, SILENT, SV, TIC},
@@ -79,7 +80,7 @@ fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> CommandStatus {
 fn write(plant: &mut Plant, value: f64, result: WriteResult) -> (Outcome, Option<f64>) {
     let effects = plant.on_command(shown(plant, 1, SV, value), at(1));
     let sent = effects.bus.first().map(|(_, request)| match request {
-        BusRequest::Write(job) => (job.id, job.raw),
+        BusRequest::Write(job) => (job.id, job.raw.number().unwrap()),
         other => panic!("not a write: {other:?}"),
     });
     if let Some((id, _)) = sent {

@@ -1,7 +1,10 @@
 //! What may be done with a tag, against where it lies and how its device writes.
 
 use crate::{
-    plant::tag::{Access, Point, Table},
+    plant::{
+        def::Limits,
+        tag::{Access, Point, Table},
+    },
     profile::{
         address::locate,
         diagnostic::Problems,
@@ -10,7 +13,7 @@ use crate::{
     },
 };
 
-pub(super) fn access(row: &TagTable, point: Option<Point>, problems: &mut Problems) -> Access {
+pub(super) fn access(row: &TagTable, point: Option<Point>, limits: Limits, problems: &mut Problems) -> Access {
     let access = row.access.value_or(Access::Read);
     let Some(point) = point.filter(|_| access != Access::Read) else { return access };
     let at = row.access.map_or(row.at, |access| access.at);
@@ -20,6 +23,11 @@ pub(super) fn access(row: &TagTable, point: Option<Point>, problems: &mut Proble
         problems
             .add(at, format!("a {} can only be read", point.table.word()))
             .label("expected access = \"r\", or `write_address`");
+    }
+    let (words, most) = (point.words(), limits.write_registers_max);
+    if !point.table.is_bits() && most < words {
+        let problem = problems.add(at, format!("the value takes {words} registers, the device writes at most {most}"));
+        problem.label("expected access = \"r\"");
     }
     if let Some(write) = row.write.filter(|_| point.part().is_none()) {
         let problem = problems.add(write.at, "only a part of a register is written back with the rest of it");

@@ -27,7 +27,6 @@ fn a_text_takes_no_key_that_is_for_numbers() {
         ("bad_if = [0]", "`bad_if` is for numbers"),
         ("field = 3", "type string(8) has no field of bits"),
         ("order = \"CDAB\"", "the words of a text cannot be reversed"),
-        ("access = \"rw\"", "a text can only be read"),
         ("store = \"always\"", "the history keeps numbers, this is a text"),
     ] {
         let text = with_text(&format!("type = \"string(8)\"\n{key}")).expect_err(key).to_string();
@@ -35,6 +34,34 @@ fn a_text_takes_no_key_that_is_for_numbers() {
     }
     let long = with_text("type = \"string(250)\"").expect_err("60 registers are read at most").to_string();
     assert!(long.contains("the value takes 125 registers, the device reads at most 60"), "{long}");
+}
+
+#[test]
+fn a_text_is_written_where_one_request_can() {
+    for kind in ["string(8)", "cstring(8)", "chars(8)", "clock_bcd", "time_words", "epoch32", "ipv4"] {
+        let plant = with_text(&format!("type = \"{kind}\"\naccess = \"rw\"")).unwrap();
+        assert!(plant.tag(plant.tag_named("D1.MODEL").unwrap()).writable(), "{kind}");
+    }
+    let check = |kind: &str, expect: &str| {
+        let text = with_text(&format!("type = \"{kind}\"\naccess = \"rw\"")).expect_err(kind).to_string();
+        assert!(text.contains(expect), "{kind}: {text}");
+    };
+    check("version(1)", "a version can only be read");
+    let limited = METER.replace("[limits]", "[limits]\nwrite_registers_max = 3");
+    assert_ne!(limited, METER);
+    let text =
+        "\n[[tag]]\nname = \"MODEL\"\ntable = \"holding\"\naddress = 2000\ntype = \"string(8)\"\naccess = \"rw\"\n";
+    let long = load(PLANT.as_bytes(), &format!("{limited}{text}"), PLC).expect_err("three registers").to_string();
+    assert!(long.contains("the value takes 4 registers, the device writes at most 3"), "{long}");
+}
+
+#[test]
+fn a_number_is_never_written_into_a_text() {
+    let text =
+        "\n[[tag]]\nname = \"MODEL\"\ntable = \"holding\"\naddress = 2000\ntype = \"string(8)\"\naccess = \"rw\"\n";
+    let action = "\n[[action]]\nname = \"save\"\ntag = \"MODEL\"\nvalue = 1\n";
+    let why = load(PLANT.as_bytes(), &format!("{METER}{text}{action}"), PLC).expect_err("a text").to_string();
+    assert!(why.contains("D1.MODEL is a text"), "{why}");
 }
 
 #[test]

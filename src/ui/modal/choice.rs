@@ -4,7 +4,7 @@ use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
-use super::{Confirm, Modal, Next, confirm::wire_text, window};
+use super::{Confirm, Modal, Next, window, write_words::wire_text};
 use crate::{
     plant::{
         def::{DeviceId, TagId},

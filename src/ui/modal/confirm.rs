@@ -1,5 +1,7 @@
 //! "Do it or not": the window that carries an action to confirm.
 
+use std::sync::Arc;
+
 use crate::t;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect, style::Style};
@@ -9,6 +11,7 @@ use super::{
     confirmed_value::ConfirmedValue,
     form::{Field, Form, KeyOutcome},
     plant_command, window,
+    write_words::{old_and_new, wire_text, write_notes},
 };
 use crate::{
     access::{Credentials, control::reauthentication},
@@ -21,14 +24,10 @@ use crate::{
         exact::Exact,
         number::to_u16,
         role::Reauthentication,
-        tag::{Access, Confidence, TagDef},
     },
     ui::{
         Effect, Leaving, UiAction, ViewContext, interlock, keys, rights,
-        widgets::{
-            text::{Canvas, width, wrap},
-            value,
-        },
+        widgets::text::{Canvas, width, wrap},
     },
 };
 
@@ -100,6 +99,13 @@ impl Confirm {
         Confirm { expected: Some(ConfirmedValue::new(cx, tag)), ..confirm }.with_reauthentication(cx)
     }
 
+    /// Write this text?
+    pub(super) fn text(cx: &ViewContext, tag: TagId, text: &str, seen: Option<Arc<str>>) -> Confirm {
+        let def = cx.def().tag(tag);
+        let action = ConfirmAction::Command(CommandKind::WriteText { tag, text: text.into(), seen });
+        Confirm::new(action, t!("write {name}", name = def.name), write_notes(def)).with_reauthentication(cx)
+    }
+
     /// The same, asked from a faceplate, with words of its own above all others.
     pub fn from_faceplate(cx: &ViewContext, tag: TagId, value: f64, words: Option<String>, back: Faceplate) -> Confirm {
         let confirm = Confirm::write(cx, tag, value);
@@ -142,7 +148,7 @@ impl Confirm {
     pub fn verb(&self) -> &'static str {
         match &self.action {
             ConfirmAction::Quit => t!("quit"),
-            ConfirmAction::Command(CommandKind::Write { .. }) => t!("write and verify"),
+            ConfirmAction::Command(CommandKind::Write { .. } | CommandKind::WriteText { .. }) => t!("write and verify"),
             ConfirmAction::Command(CommandKind::Alarm(alarm_command)) => match alarm_command {
                 AlarmCommand::Acknowledge { .. } | AlarmCommand::AcknowledgeAll { .. } => t!("acknowledge"),
                 AlarmCommand::Silence => t!("silence"),
@@ -190,6 +196,13 @@ impl Confirm {
         if self.is_quit() { t!("stay") } else { t!("cancel") }
     }
 
+    fn written_tag(&self) -> Option<TagId> {
+        match &self.action {
+            ConfirmAction::Command(kind) => kind.written_tag(),
+            ConfirmAction::Quit => None,
+        }
+    }
+
     /// Is it certainly without effect now?
     pub(super) fn is_refused(&self, cx: &ViewContext) -> bool {
         match &self.action {
@@ -220,7 +233,7 @@ impl Confirm {
                 None => Next::Close,
             }
         } else {
-            let write = matches!(self.action, ConfirmAction::Command(CommandKind::Write { .. }));
+            let write = self.written_tag().is_some();
             let other = plant_command::command_of(cx, event).filter(|_| write);
             Next::Stay(other.unwrap_or(Modal::Confirm(self)))
         }
@@ -302,11 +315,13 @@ impl Confirm {
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let room = body.width.saturating_sub(8).min(68);
         let mut rows: Vec<(String, Style)> = Vec::new();
-        if let ConfirmAction::Command(CommandKind::Write { tag, value }) = &self.action {
-            let change = old_and_new(cx, *tag, *value);
+        if let ConfirmAction::Command(kind) = &self.action
+            && let Some((tag, new)) = cx.snapshot.written(kind)
+        {
+            let change = old_and_new(cx, tag, &new);
             let lines = if width(&change) <= room { vec![change] } else { wrap(&change, room) };
             rows.extend(lines.into_iter().map(|line| (line, cx.theme.strong())));
-            rows.push((wire_text(cx.def().tag(*tag)), cx.theme.dim()));
+            rows.push((wire_text(cx.def().tag(tag)), cx.theme.dim()));
         }
         rows.extend(self.notes.iter().flat_map(|note| wrap(note, room)).map(|line| (line, cx.theme.normal())));
         if let ConfirmAction::Command(CommandKind::Write { tag, value }) = &self.action {
@@ -352,39 +367,4 @@ fn credentials(form: &Form) -> Credentials {
         1 => Credentials { user: None, password: form.secret(0) },
         _ => Credentials { user: Some(form.text(0)), password: form.secret(1) },
     }
-}
-
-/// `old 60.0 °C → new 70.0 °C`; an unknown old value is said to be unknown.
-pub(super) fn old_and_new(cx: &ViewContext, tag: TagId, new: Exact) -> String {
-    let new = format!("{} {}", cx.snapshot.format(tag, new), cx.snapshot.unit(tag));
-    match cx.def().tag(tag).access {
-        Access::Write => t!("writes {trim_end}", trim_end = new.trim_end()),
-        Access::Read | Access::ReadWrite => {
-            t!("old {whole}  →  new {trim_end}", whole = value::show(cx, tag).whole(), trim_end = new.trim_end())
-        }
-    }
-}
-
-/// Where a write goes (a read, for a tag that is read-only), in both forms that manuals use: `41007 / 0x03EE, FC 06 / 0x06`.
-pub fn wire_text(def: &TagDef) -> String {
-    let fc = def.write_function().unwrap_or(def.point.table.read_fc());
-    let address = def.point.address;
-    t!(
-        "{modicon} / 0x{address}, FC {fc} / 0x{fc2}",
-        modicon = def.point.table.modicon(address),
-        address = format!("{address:04X}"),
-        fc = format!("{fc:02}"),
-        fc2 = format!("{fc:02X}")
-    )
-}
-
-/// What the profile wants said before a write.
-pub(super) fn write_notes(def: &TagDef) -> Vec<String> {
-    let mut notes: Vec<String> = def.confirm.iter().cloned().collect();
-    match def.confidence {
-        Confidence::Proven | Confidence::High => {}
-        Confidence::Medium => notes.push(t!("! not verified: this row of the register map has one source").to_owned()),
-        Confidence::Low => notes.push(t!("! not verified: this row of the register map is inferred").to_owned()),
-    }
-    notes
 }

@@ -1,15 +1,17 @@
-//! A number for a tag: old value, new value, range, address, and what the profile wants said.
+//! A number or a text for a tag: old value, new value, range, address, and what the profile wants said.
+
+use std::sync::Arc;
 
 use crate::t;
 use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
-use ratatui::{Frame, layout::Rect, style::Style};
+use ratatui::{Frame, layout::Rect};
 
 use super::{
     Confirm, Modal, Next,
-    confirm::{wire_text, write_notes},
     confirmed_value::ConfirmedValue,
     line::Line,
     window,
+    write_words::{wire_text, write_notes},
 };
 use crate::{
     access::control::reauthentication,
@@ -19,6 +21,8 @@ use crate::{
         entry::{self, is_numeric, range_text},
         exact::Exact,
         number::to_u16,
+        tag::DataType,
+        text_value::{self, ExpectedText},
     },
     ui::{
         UiAction, ViewContext, interlock, keys, rights,
@@ -31,6 +35,11 @@ use crate::{
 
 #[cfg(test)]
 mod numbers;
+#[cfg(test)]
+mod texts;
+
+/// Most characters of a text.
+const TEXT_MAX: usize = DataType::TEXT_MAX as usize;
 
 /// Is a number for this tag asked again in a window of its own? A tag with reauthentication is.
 fn needs_confirmation(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
@@ -38,7 +47,7 @@ fn needs_confirmation(cx: &ViewContext, tag: TagId, value: Exact) -> bool {
         || reauthentication::required(cx.def(), &CommandKind::Write { tag, value }).is_some()
 }
 
-/// A number on its way into a tag.
+/// A number or a text on its way into a tag.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
     pub tag: TagId,
@@ -47,17 +56,28 @@ pub struct Entry {
     pub problem: Option<String>,
     /// What its author saw.
     expected: ConfirmedValue,
+    /// The same of a text.
+    seen: Option<Arc<str>>,
 }
 
 impl Entry {
     pub fn new(cx: &ViewContext, tag: TagId) -> Entry {
-        Entry { tag, line: Line::default(), problem: None, expected: ConfirmedValue::new(cx, tag) }
+        let seen = cx.snapshot.texts[tag.index()].clone();
+        let line = match is_text(cx, tag) {
+            true => Line::long(seen.as_deref().filter(|_| is_kept(cx, tag)).unwrap_or_default(), TEXT_MAX).as_offered(),
+            false => Line::default(),
+        };
+        Entry { tag, line, problem: None, expected: ConfirmedValue::new(cx, tag), seen }
     }
 
     pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
             let checked = match self.line.missed() {
                 true => Err(t!("the text was cut; Ctrl-U clears the line").to_owned()),
+                false if is_text(cx, self.tag) => match self.held(cx) {
+                    Ok(held) => return self.send_text(cx, &held),
+                    Err(expected) => Err(t!("expected {what}", what = expected)),
+                },
                 false => entry::check(cx.snapshot, self.tag, &self.line.text()),
             };
             match checked {
@@ -76,7 +96,7 @@ impl Entry {
                 }
                 Err(problem) => self.problem = Some(problem),
             }
-        } else if let Some(c) = strange(event) {
+        } else if let Some(c) = strange(event).filter(|_| !is_text(cx, self.tag)) {
             self.reject(c);
         } else if self.line.on_key(event) {
             // What was left out stays noted until the line is empty again.
@@ -85,8 +105,30 @@ impl Entry {
         Next::Stay(Modal::Entry(self))
     }
 
-    /// Pasted text, if it is a number.
-    pub(super) fn paste(&mut self, text: &str) {
+    /// The typed text as the device will show it.
+    fn held(&self, cx: &ViewContext) -> Result<String, ExpectedText> {
+        let now = cx.now.to_zoned(cx.def().time_zone.clone());
+        text_value::as_held(cx.def().tag(self.tag).point.kind, &self.line.text(), &now)
+    }
+
+    /// Asks again where the tag wants that. What is meant is said then; only "now" is as late as its write.
+    fn send_text(self, cx: &ViewContext, held: &str) -> Next {
+        let Entry { tag, line, seen, .. } = self;
+        let kind = CommandKind::WriteText { tag, text: line.text().into(), seen: seen.clone() };
+        let asks = cx.def().tag(tag).confirm.is_some() || reauthentication::required(cx.def(), &kind).is_some();
+        if !asks {
+            return Next::Do(vec![UiAction::SendCommand(kind.into(), None)]);
+        }
+        let is_now = line.text().eq_ignore_ascii_case(text_value::NOW);
+        let said = if is_now { text_value::NOW } else { held };
+        Next::Stay(Modal::Confirm(Confirm::text(cx, tag, said, seen)))
+    }
+
+    /// Pasted text; into a number only if it is one.
+    pub(super) fn paste(&mut self, cx: &ViewContext, text: &str) {
+        if is_text(cx, self.tag) {
+            return self.line.paste(text);
+        }
         match text.trim().chars().find(|c| !is_numeric(*c)) {
             Some(c) => self.reject(c),
             None => self.line.paste(text),
@@ -104,9 +146,13 @@ impl Entry {
         let theme = cx.theme;
         let def = cx.def().tag(self.tag);
         let room = body.width.saturating_sub(8).min(64);
-        let mut rows: Vec<(String, Style)> =
-            vec![(range_text(cx.snapshot, self.tag), theme.normal()), (wire_text(def), theme.dim())];
-        rows.push((entry::help(cx.snapshot, self.tag), theme.dim()));
+        let mut rows = vec![(wire_text(def), theme.dim())];
+        if def.is_text() {
+            rows.insert(0, (ExpectedText(def.point.kind).to_string(), theme.normal()));
+        } else {
+            rows.insert(0, (range_text(cx.snapshot, self.tag), theme.normal()));
+            rows.push((entry::help(cx.snapshot, self.tag), theme.dim()));
+        }
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
         let notes = notes.chain(interlock::unlock_text(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
@@ -129,7 +175,11 @@ impl Entry {
         let x = canvas.text(x, 0, t!("  →  new "), theme.dim());
         let x = self.line.view(theme, &mut canvas, x, 0);
         let x = canvas.text(x + 1, 0, cx.snapshot.unit(self.tag), theme.normal());
-        if let Some(words) = entry::relative_text(cx.snapshot, self.tag, &self.line.text()) {
+        let meant = match def.is_text() {
+            true => self.held(cx).ok().filter(|held| *held != self.line.text()).map(|held| format!("→ {held}")),
+            false => entry::relative_text(cx.snapshot, self.tag, &self.line.text()),
+        };
+        if let Some(words) = meant {
             canvas.text(x + 2, 0, &words, theme.strong());
         }
         canvas.rows(0, 1, &rows);
@@ -139,6 +189,15 @@ impl Entry {
         }
         canvas.text(0, last, &theme.enter(t!("⏎ write and verify   Esc cancel")), theme.strong());
     }
+}
+
+fn is_text(cx: &ViewContext, tag: TagId) -> bool {
+    cx.def().tag(tag).is_text()
+}
+
+/// Is its text offered, to be changed? The time that a clock shows is not typed again.
+fn is_kept(cx: &ViewContext, tag: TagId) -> bool {
+    !matches!(cx.def().tag(tag).point.kind, DataType::Clock(_))
 }
 
 /// The character that was typed and can be in no number.

@@ -6,11 +6,10 @@ use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
 use super::{
-    Confirm, Modal, Next, Notice, Why,
-    confirm::wire_text,
-    plant_command,
+    Confirm, Modal, Next, Notice, Why, plant_command,
     sheet::{Fact, Sheet},
     window,
+    write_words::wire_text,
 };
 use crate::{
     access::right,

@@ -41,7 +41,11 @@ impl Line {
     }
     /// A text that is offered: typed text replaces it.
     pub fn offered(text: &str) -> Line {
-        Line { is_offered: !text.is_empty(), ..Line::new(text) }
+        Line::long(text, CHARS_MAX).as_offered()
+    }
+    /// The same text, offered.
+    pub fn as_offered(self) -> Line {
+        Line { is_offered: !self.text.is_empty(), ..self }
     }
     pub fn text(&self) -> String {
         self.text.iter().collect()

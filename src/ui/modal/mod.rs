@@ -1,5 +1,6 @@
 //! Windows on top of a tab: they get every key until they close, and carry the action to confirm.
 
+mod write_words;
 pub(crate) mod choice;
 pub(crate) mod confirm;
 pub(crate) mod correction;
@@ -217,7 +218,7 @@ impl Modal {
     /// Pasted text goes into a text line, or nowhere.
     pub fn on_paste(&mut self, cx: &ViewContext, text: &str) {
         match self {
-            Modal::Entry(entry) => entry.paste(text),
+            Modal::Entry(entry) => entry.paste(cx, text),
             Modal::Prompt(prompt) => prompt.line.paste(text),
             Modal::Palette(palette) => palette.paste(cx, text),
             Modal::Reason(reason) => reason.paste(text),

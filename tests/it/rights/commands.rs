@@ -27,6 +27,8 @@ pub fn of_command(def: &PlantDef, kind: &CommandKind) -> Row {
     match kind {
         CommandKind::Write { tag, .. } if OPERATED.contains(&&*def.tag(*tag).name) => row("write", "--TS--"),
         CommandKind::Write { .. } => row("write", "---S--"),
+        CommandKind::WriteText { tag, .. } if OPERATED.contains(&&*def.tag(*tag).name) => row("write", "--TS--"),
+        CommandKind::WriteText { .. } => row("write", "---S--"),
         CommandKind::Alarm(AlarmCommand::Acknowledge { .. }) => row("acknowledge", "--TS--"),
         CommandKind::Alarm(AlarmCommand::AcknowledgeAll { .. }) => row("acknowledge", "--TS--"),
         CommandKind::Alarm(AlarmCommand::Silence) => row("silence", "--TS--"),
@@ -88,6 +90,8 @@ pub fn commands(def: &PlantDef, person: usize) -> Vec<CommandKind> {
     let operated = OPERATED[1..].iter().map(|name| CommandKind::Write { tag: tag(name), value: 0.0.into() });
     let mut commands = vec![CommandKind::Write { tag: tag(OPERATED[0]), value: (60.0 + person as f64).into() }];
     commands.extend(operated.chain(settings));
+    let text = |name: &str| CommandKind::WriteText { tag: tag(name), text: "none".into(), seen: None };
+    commands.extend([text(OPERATED[0]), text("TIC-1.P")]);
     commands.extend([
         CommandKind::Alarm(AlarmCommand::Acknowledge { alarm, annunciated_at: at }),
         CommandKind::Alarm(AlarmCommand::AcknowledgeAll { alarms: Some([alarm].into()), seen: u64::MAX }),

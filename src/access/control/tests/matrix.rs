@@ -92,6 +92,7 @@ fn restore(tag: TagId, new: f64) -> CommandKind {
 
 every!(commands: CommandKind {
     CommandKind::Write { .. } => [RUN, SV, CommandKind::Write { tag: fixture::RUN, value: 0.0.into() }],
+    CommandKind::WriteText { .. } => [CommandKind::WriteText { tag: fixture::SV, text: "A".into(), seen: None }],
     CommandKind::Alarm(_) => alarm_commands().into_iter().map(CommandKind::Alarm),
     CommandKind::Refresh(_) => [CommandKind::Refresh(DeviceId(0))],
     CommandKind::Connect(..) => [CommandKind::Connect(L1, true), CommandKind::Connect(L1, false)],
@@ -374,7 +375,8 @@ fn rules_hold_for_what_is_sent_not_for_what_is_typed() {
                 let kind = CommandKind::Write { tag: tag.id, value: value.into() };
                 let Some(job) = sent(&def, register, role, kind.clone()) else { continue };
                 written += 1;
-                let is = |rule| raw(rule).is_some_and(|rule| scale::same_raw(tag, rule, job.raw));
+                let raw_sent = job.raw.number().expect("a number");
+                let is = |rule| raw(rule).is_some_and(|rule| scale::same_raw(tag, rule, raw_sent));
                 let needed = match () {
                     () if is(STOP) || is(TECHNICIAN) => Role::Technician,
                     () if is(SUPERVISOR) => Role::Supervisor,
@@ -385,9 +387,8 @@ fn rules_hold_for_what_is_sent_not_for_what_is_typed() {
                 assert!(!is(BLOCKED), "the interlock: {case}");
                 assert_eq!(job.urgent, is(STOP), "{case}");
                 assert!(!signed || is(STOP), "no password was given: {case}");
-                assert!(job.raw.near() != 0.0 || job.raw.near().is_sign_positive(), "a zero with a sign: {case}");
-                let mut planned = def.clone();
-                planned.procedures = vec![procedure(value)];
+                assert!(raw_sent != 0.0 || raw_sent.near().is_sign_positive(), "a zero with a sign: {case}");
+                let planned = PlantDef { procedures: vec![procedure(value)], ..def.clone() };
                 for other in [restore(tag.id, value), CommandKind::StartProcedure(ProcedureId(0))] {
                     assert_eq!(needs(&planned, &other), needs(&def, &kind), "{case}");
                 }

@@ -4,7 +4,10 @@ use std::time::Duration;
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{LinkExit, Task, read::value_of};
+use super::{
+    LinkExit, Task,
+    read::{as_read, held_by},
+};
 use crate::{
     bus::{
         backoff::Backoff,
@@ -72,13 +75,13 @@ impl Task<'_> {
         let block = plan::single(def.device(tag.device), tag);
         let back = self.read_unless_stopped(link, &block, None).await;
         let at = self.clock.now();
-        let raw = match back {
-            Some(Ok(values)) => value_of(tag, &block, &values),
+        let held = match back {
+            Some(Ok(words)) => held_by(tag, &block, &words),
             Some(Err(LinkError::Fault(_))) => None,
             Some(Err(LinkError::Gone(why))) => return Err(LinkExit::Gone(why)),
             None => return Ok(()),
         };
-        let Some(raw) = raw else {
+        let Some(held) = held else {
             let write = &mut self.unconfirmed[index];
             let wait = SignedDuration::try_from(write.backoff.fail()).unwrap_or(DEFER_MAX);
             write.next = at.checked_add(wait).unwrap_or(Timestamp::MAX);
@@ -92,12 +95,12 @@ impl Task<'_> {
         let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time).unwrap_or_default();
         let known = Some(response_time).filter(|response_time| *response_time > Duration::ZERO);
         schedule.answered(None, tag.device, known, at);
-        let (device, values) = (tag.device, vec![(tag.id, raw)]);
-        self.publish(Event::Read { at, device, values, texts: Vec::new(), response_time, exchange }).await?;
+        let (device, (values, texts)) = (tag.device, as_read(tag.id, held.clone()));
+        self.publish(Event::Read { at, device, values, texts, response_time, exchange }).await?;
         let write = self.unconfirmed.remove(index);
         let result = match write.result {
-            WriteResult::NotRead(_) => WriteResult::ReadBack(raw),
-            _ => WriteResult::ReadBackAfterNoResponse(raw),
+            WriteResult::NotRead(_) => WriteResult::ReadBack(held),
+            _ => WriteResult::ReadBackAfterNoResponse(held),
         };
         self.publish_write_result(write.id, result).await
     }

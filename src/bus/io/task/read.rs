@@ -10,7 +10,7 @@ use crate::{
         pdu,
         plan::Block,
     },
-    plant::{exact::Exact, fault::Fault, number::to_u16, tag::TagDef},
+    plant::{def::TagId, exact::Exact, fault::Fault, number::to_u16, tag::TagDef, tag_value::TagValue},
 };
 
 /// What came in between may have shown that the unit sends what it was not asked for.
@@ -117,6 +117,22 @@ fn own<'a>(tag: &TagDef, block: &Block, words: &'a [u16]) -> Option<&'a [u16]> {
 pub(super) fn text_of(tag: &TagDef, block: &Block, words: &[u16]) -> Option<Arc<str>> {
     tag.is_text().then_some(())?;
     codec::decode_text(tag.point, own(tag, block, words)?).map(Into::into)
+}
+
+/// What a tag holds, a number or a text.
+pub(super) fn held_by(tag: &TagDef, block: &Block, words: &[u16]) -> Option<TagValue> {
+    match tag.is_text() {
+        true => text_of(tag, block, words).map(TagValue::Text),
+        false => value_of(tag, block, words).map(TagValue::Number),
+    }
+}
+
+/// The same as the values and the texts of one answer.
+pub(super) fn as_read(tag: TagId, held: TagValue) -> (Vec<(TagId, Exact)>, Vec<(TagId, Arc<str>)>) {
+    match held {
+        TagValue::Number(raw) => (vec![(tag, raw)], Vec::new()),
+        TagValue::Text(text) => (Vec::new(), vec![(tag, text)]),
+    }
 }
 
 pub(super) fn value_of(tag: &TagDef, block: &Block, words: &[u16]) -> Option<Exact> {

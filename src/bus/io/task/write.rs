@@ -1,6 +1,9 @@
 //! Writing: once, read back, never repeated.
 
-use super::{LinkExit, Task, read::value_of};
+use super::{
+    LinkExit, Task,
+    read::{as_read, held_by},
+};
 use crate::{
     bus::{
         codec,
@@ -18,6 +21,7 @@ use crate::{
         line_trouble::LineTrouble,
         scale,
         tag::{Table, TagDef},
+        tag_value::TagValue,
     },
 };
 
@@ -61,7 +65,7 @@ impl Task<'_> {
         let result = match written {
             // It waits again, unless the stop is one of its tag.
             WriteEnd::Ended(WriteResult::Superseded) => {
-                self.requests.defer(BusRequest::Write(*job));
+                self.requests.defer(BusRequest::Write(job.clone()));
                 return Ok(());
             }
             WriteEnd::Ended(result) => result,
@@ -98,20 +102,13 @@ impl Task<'_> {
         tag: &TagDef,
         result: &WriteResult,
     ) -> Result<(), LinkExit> {
-        match *result {
-            WriteResult::ReadBack(raw) => {
-                let (device, values) = (tag.device, vec![(tag.id, raw)]);
+        match result {
+            WriteResult::ReadBack(held) => {
+                let (device, (values, texts)) = (tag.device, as_read(tag.id, held.clone()));
                 let exchange = link.last.clone();
                 let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time).unwrap_or_default();
-                self.publish(Event::Read {
-                    at: self.clock.now(),
-                    device,
-                    values,
-                    texts: Vec::new(),
-                    response_time,
-                    exchange,
-                })
-                .await?;
+                self.publish(Event::Read { at: self.clock.now(), device, values, texts, response_time, exchange })
+                    .await?;
             }
             // The value is unknown until it is read again.
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Sent | WriteResult::NoValidResponse(_) => {
@@ -140,7 +137,7 @@ impl Task<'_> {
         if unlock_tag.device != self.def.tag(job.tag).device {
             return Ok(Unlocked::No(WriteEnd::Ended(WriteResult::NotSent(Fault::NotANumber))));
         }
-        let sent = self.send_number(link, schedule, unlock_tag, raw, job.urgent).await;
+        let sent = self.send_value(link, schedule, unlock_tag, &raw.into(), job.urgent).await;
         if let Ok(ended @ (WriteResult::NotSent(_) | WriteResult::Superseded)) = sent {
             return Ok(Unlocked::No(WriteEnd::Ended(ended)));
         }
@@ -161,13 +158,13 @@ impl Task<'_> {
         })
     }
 
-    /// Sends one number: accepted, sent to all, refused, without a valid response, not sent, or overtaken by a stop of any tag. `Err`: the port closed.
-    async fn send_number(
+    /// Sends one value: accepted, sent to all, refused, without a valid response, not sent, or overtaken by a stop of any tag. `Err`: the port closed.
+    async fn send_value(
         &mut self,
         link: &mut Link,
         schedule: &mut Schedule,
         tag: &TagDef,
-        raw: Exact,
+        raw: &TagValue,
         urgent: bool,
     ) -> Result<WriteResult, LineTrouble> {
         let def = self.def.clone();
@@ -202,30 +199,27 @@ impl Task<'_> {
         }
     }
 
-    /// The request that writes a number, or the result where there is none. `Err`: the port closed.
+    /// The request that writes a value, or the result where there is none. `Err`: the port closed.
     async fn request_for(
         &mut self,
         link: &mut Link,
         tag: &TagDef,
-        raw: Exact,
+        raw: &TagValue,
     ) -> Result<Result<Pdu, WriteResult>, LineTrouble> {
-        if tag.read_modify_write {
-            return self.modified(link, tag, raw).await;
-        }
+        let request = match raw {
+            TagValue::Number(raw) if tag.read_modify_write => return self.modified(link, tag, *raw).await,
+            TagValue::Number(raw) => write_request(tag, *raw),
+            TagValue::Text(text) => text_request(tag, text),
+        };
         // A value that the codec cannot hold was refused by the plant before; nothing is sent in any case.
-        Ok(write_request(tag, raw).ok_or(WriteResult::NotSent(Fault::NotANumber)))
+        Ok(request.ok_or(WriteResult::NotSent(Fault::NotANumber)))
     }
 
     /// Writes once and reads back.
-    async fn write_once(
-        &mut self,
-        link: &mut Link,
-        schedule: &mut Schedule,
-        &WriteJob { tag, raw, verify, urgent, .. }: &WriteJob,
-    ) -> WriteEnd {
+    async fn write_once(&mut self, link: &mut Link, schedule: &mut Schedule, job: &WriteJob) -> WriteEnd {
         let def = self.def.clone();
-        let tag = def.tag(tag);
-        let accepted = match self.send_number(link, schedule, tag, raw, urgent).await {
+        let tag = def.tag(job.tag);
+        let accepted = match self.send_value(link, schedule, tag, &job.raw, job.urgent).await {
             Ok(accepted @ (WriteResult::Accepted | WriteResult::Sent)) => accepted,
             Ok(ended) => return WriteEnd::Ended(ended),
             // It may or may not have arrived.
@@ -233,16 +227,18 @@ impl Task<'_> {
         };
         let device = def.device(tag.device);
         // An action such as saving to non-volatile memory wants the device left alone, not the line.
-        let is_this = |action: &&ActionDef| action.tag == tag.id && scale::to_raw(tag, action.value, 0) == Some(raw);
+        let is_sent =
+            |action: &ActionDef| scale::to_raw(tag, action.value, 0).map(TagValue::Number).as_ref() == Some(&job.raw);
+        let is_this = |action: &&ActionDef| action.tag == tag.id && is_sent(action);
         if let Some(action) = device.actions.iter().find(is_this) {
             schedule.hold_off(tag.device, self.clock.now() + action.settle);
         }
-        if !verify || accepted == WriteResult::Sent {
+        if !job.verify || accepted == WriteResult::Sent {
             return WriteEnd::Ended(accepted);
         }
         let block = plan::single(device, tag);
         WriteEnd::Ended(match self.read_unless_stopped(link, &block, None).await {
-            Some(Ok(values)) => match value_of(tag, &block, &values) {
+            Some(Ok(words)) => match held_by(tag, &block, &words) {
                 Some(back) => WriteResult::ReadBack(back),
                 None => WriteResult::NotRead(Fault::NotANumber),
             },
@@ -317,6 +313,12 @@ fn is_clear(link: &Link, device: &DeviceDef) -> bool {
     device.unit == 0 || link.outstanding(device.unit).is_clear()
 }
 
+/// The request that writes a text: function 16, or 6 for one register.
+fn text_request(tag: &TagDef, text: &str) -> Option<Pdu> {
+    let words = codec::encode_text(tag.write_point(), text)?;
+    (tag.write_point().table == Table::Holding).then(|| write_words(tag, &words))
+}
+
 /// The request that writes a raw number: function 5 or 6 for one, 15 or 16 for more or where the profile says so, 22 for
 /// a field of bits, 23 where the profile wants the new value in the response.
 fn write_request(tag: &TagDef, raw: Exact) -> Option<Pdu> {
@@ -333,15 +335,17 @@ fn write_request(tag: &TagDef, raw: Exact) -> Option<Pdu> {
             let (and, or) = codec::field_masks(point, raw)?;
             Some(Pdu::mask_write(address, and, or))
         }
-        Table::Holding => {
-            let words = codec::encode(point, raw)?;
-            Some(match (words.as_slice(), tag.write_fc) {
-                ([word], None | Some(6)) => Pdu::write_register(address, *word),
-                (words, Some(23)) => Pdu::write_and_read(address, words),
-                (words, _) => Pdu::write_addresses(address, point.kind.address_words(), words),
-            })
-        }
+        Table::Holding => Some(write_words(tag, &codec::encode(point, raw)?)),
         Table::Input => None,
+    }
+}
+
+fn write_words(tag: &TagDef, words: &[u16]) -> Pdu {
+    let point = tag.write_point();
+    match (words, tag.write_fc) {
+        ([word], None | Some(6)) => Pdu::write_register(point.address, *word),
+        (words, Some(23)) => Pdu::write_and_read(point.address, words),
+        (words, _) => Pdu::write_addresses(point.address, point.kind.address_words(), words),
     }
 }
 

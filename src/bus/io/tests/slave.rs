@@ -31,6 +31,7 @@ use crate::{
         fixture,
         line_finding::DeviceFinding,
         tag::{DataType, Point, Poll, Table, TagDef},
+        tag_value::TagValue,
     },
 };
 
@@ -331,8 +332,8 @@ impl Line {
         }
     }
 
-    /// Writes a raw number to the first tag, and gives the result.
-    pub async fn write(&mut self, def: &PlantDef, raw: f64, verify: bool) -> WriteResult {
+    /// Writes a raw number or a text to the first tag, and gives the result.
+    pub async fn write(&mut self, def: &PlantDef, raw: impl Into<TagValue>, verify: bool) -> WriteResult {
         let (id, tag) = (WriteId(7), TagId(0));
         let job = WriteJob { id, tag, raw: raw.into(), unlock: None, verify, urgent: false };
         self.requests.send(BusRequest::Write(job)).await.expect("the line runs");

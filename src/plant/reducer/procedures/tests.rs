@@ -16,6 +16,7 @@ use crate::plant::{
     fixture::{self, DP, FAULT, PLC, PV, RUN, SV, TIC},
     interlock::{ActuatorDef, InterlockCondition, InterlockDef},
     procedure::{ProcedureState, StepFailure},
+    tag_value::TagValue,
 };
 
 const HEAT: ProcedureId = ProcedureId(0);
@@ -97,24 +98,24 @@ fn run(plant: &Plant) -> ProcedureRun {
 /// The tags and raw numbers that go to the bus.
 fn written(effects: &Effects) -> Vec<(TagId, f64)> {
     let write = |(_, request): &(_, BusRequest)| match request {
-        BusRequest::Write(job) => Some((job.tag, job.raw.near())),
+        BusRequest::Write(job) => Some((job.tag, job.raw.number().unwrap().near())),
         _ => None,
     };
     effects.bus.iter().filter_map(write).collect()
 }
 
 /// The bus ends the first write of `effects`; as there, the value read back comes before the result.
-fn end(plant: &mut Plant, effects: &Effects, second: i64, result: fn(Exact) -> WriteResult) -> Effects {
+fn end(plant: &mut Plant, effects: &Effects, second: i64, result: fn(TagValue) -> WriteResult) -> Effects {
     let job = effects.bus.iter().find_map(|(_, request)| match request {
-        BusRequest::Write(job) => Some(*job),
+        BusRequest::Write(job) => Some(job.clone()),
         _ => None,
     });
     let job = job.expect("a write is under way");
     let mut effects = Effects::default();
-    if let WriteResult::ReadBack(back) = result(job.raw) {
-        effects = read(plant, second, &[(job.tag, back.near())]);
+    if let WriteResult::ReadBack(back) = result(job.raw.clone()) {
+        effects = read(plant, second, &[(job.tag, back.number().unwrap().near())]);
     }
-    let more = plant.on_event(Event::Wrote { at: at(second), id: job.id, result: result(job.raw) });
+    let more = plant.on_event(Event::Wrote { at: at(second), id: job.id, result: result(job.raw.clone()) });
     effects.bus.extend(more.bus);
     effects.records.extend(more.records);
     effects
@@ -161,7 +162,7 @@ fn step_follows_step_and_the_run_is_measured() {
 #[test]
 fn a_write_that_is_not_verified_ends_in_the_safe_state() {
     for (result, why) in [
-        ((|_| WriteResult::ReadBack(300.0.into())) as fn(Exact) -> WriteResult, "not confirmed: read back 30"),
+        ((|_| WriteResult::ReadBack(300.0.into())) as fn(TagValue) -> WriteResult, "not confirmed: read back 30"),
         (|_| WriteResult::NoValidResponse(Fault::Timeout), "not confirmed: no response"),
     ] {
         let mut plant = plant();

@@ -9,6 +9,7 @@ use crate::plant::{
     fixture::{self, DP, FAULT, SV, TIC},
     parameter_set::{ParameterSet, SetValue, plan},
     tag::{Access, Bound, ByteOrder, DataType, Point, Table, TagDef},
+    tag_value::TagValue,
 };
 
 const HIGH: TagId = TagId(5);
@@ -92,34 +93,34 @@ fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {
 /// The tags and raw numbers that went to the bus.
 fn written(effects: &Effects) -> Vec<(TagId, f64)> {
     let write = |(_, request): &(_, BusRequest)| match request {
-        BusRequest::Write(job) => Some((job.tag, job.raw.near())),
+        BusRequest::Write(job) => Some((job.tag, job.raw.number().unwrap().near())),
         _ => None,
     };
     effects.bus.iter().filter_map(write).collect()
 }
 
 /// Ends the write under way and returns the effects. As on the bus, the value read back comes before the result.
-fn end(plant: &mut Plant, effects: &Effects, result: fn(Exact) -> WriteResult) -> Effects {
+fn end(plant: &mut Plant, effects: &Effects, result: fn(TagValue) -> WriteResult) -> Effects {
     let (id, tag, raw) = effects
         .bus
         .iter()
         .find_map(|(_, request)| match request {
-            BusRequest::Write(job) => Some((job.id, job.tag, job.raw)),
+            BusRequest::Write(job) => Some((job.id, job.tag, job.raw.clone())),
             _ => None,
         })
         .expect("a write is under way");
-    if let WriteResult::ReadBack(back) = result(raw) {
+    if let WriteResult::ReadBack(back) = result(raw.clone()) {
         let response_time = std::time::Duration::from_millis(12);
         plant.on_event(Event::Read {
             at: at(2),
             device: TIC,
-            values: vec![(tag, back)],
+            values: vec![(tag, back.number().unwrap())],
             texts: Vec::new(),
             response_time,
             exchange: None,
         });
     }
-    plant.on_event(Event::Wrote { at: at(2), id, result: result(raw) })
+    plant.on_event(Event::Wrote { at: at(2), id, result: result(raw.clone()) })
 }
 
 #[test]

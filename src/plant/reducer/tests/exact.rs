@@ -75,11 +75,11 @@ fn a_write_of_64_bits_is_checked_and_compared_to_its_last_digit() {
         let command = Command::on(&plant.snapshot(), CommandId { terminal: 1, number: 1 }, kind);
         let effects = plant.on_command(CommandStatus::new(command, "anna", at(1)), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => (job.id, job.raw),
+            BusRequest::Write(job) => (job.id, job.raw.number().unwrap()),
             other => panic!("not a write: {other:?}"),
         });
         let on_record = sent.map(|(id, _)| {
-            let result = WriteResult::ReadBack(Exact::whole(read_back));
+            let result = WriteResult::ReadBack(Exact::whole(read_back).into());
             let effects = plant.on_event(Event::Wrote { at: at(2), id, result });
             recorded(&effects).next().map(|action| (action.old.clone(), action.new.clone()))
         });
@@ -90,7 +90,7 @@ fn a_write_of_64_bits_is_checked_and_compared_to_its_last_digit() {
     assert_eq!((outcome, raw), (Outcome::Verified, sent), "one more than the device has is no `unchanged`");
     let text = |number: &str| Some(format!("{number} °C").into());
     assert_eq!(on_record, Some((text("9007199254740992"), text("9007199254740993"))));
-    let different = NotConfirmed::Different(Exact::whole(LEAST));
+    let different = NotConfirmed::Different(Exact::whole(LEAST).into());
     assert_eq!(write(LEAST + 1, LEAST).0, Outcome::NotConfirmed(different));
     let (min, max) = ("0".into(), "9007199254740993".into());
     let beyond = Outcome::Refused(Refusal::OutOfRange { min, max });

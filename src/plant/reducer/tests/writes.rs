@@ -20,7 +20,7 @@ fn a_stop_is_sent_though_a_start_is_under_way() {
     let mut check = |number, value, expect: Option<(f64, bool)>| {
         let effects = plant.on_command(shown(&plant, number, RUN, value), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => (job.raw.near(), job.urgent),
+            BusRequest::Write(job) => (job.raw.number().unwrap().near(), job.urgent),
             other => panic!("not a write: {other:?}"),
         });
         assert_eq!(sent, expect, "command {number}: {:?}", plant.snapshot().commands[0].outcome);
@@ -116,8 +116,8 @@ fn a_write_is_recorded_with_the_value_that_the_device_holds() {
     let effects = plant.on_command(shown(&plant, 1, SV, 72.3), at(1));
     assert_eq!((&*action_of(&effects).outcome, effects.bus.len()), ("refused: the device would store 72.5 °C", 0));
     let effects = plant.on_command(shown(&plant, 1, SV, 72.500_000_1), at(1));
-    let BusRequest::Write(WriteJob { id, raw, .. }) = effects.bus[0].1 else { panic!("a write was requested") };
-    assert_eq!(raw, 145.0, "72.5 °C goes out");
+    let BusRequest::Write(WriteJob { id, raw, .. }) = effects.bus[0].1.clone() else { panic!("a write was requested") };
+    assert_eq!(raw, 145.0.into(), "72.5 °C goes out");
     assert_eq!(
         plant.snapshot().commands[0].command.kind,
         CommandKind::Write { tag: SV, value: 72.5.into() },
@@ -140,7 +140,7 @@ fn rounding_never_leads_beyond_a_limit() {
         let mut plant = in_steps(99.8);
         let effects = plant.on_command(shown(&plant, 1, SV, value), at(1));
         let raw = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => job.raw.near(),
+            BusRequest::Write(job) => job.raw.number().unwrap().near(),
             other => panic!("not a write: {other:?}"),
         });
         assert_eq!((raw, plant.snapshot().commands[0].outcome.clone()), (sent, outcome), "{value}");

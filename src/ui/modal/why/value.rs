@@ -16,6 +16,7 @@ use crate::{
         sample::{Cause, Quality},
         scale,
         tag::{Access, Decimals, Poll, TagDef},
+        text_value,
         traffic::Exchange,
     },
     ui::{
@@ -182,7 +183,7 @@ fn text(cx: &ViewContext, def: &TagDef, found: Option<&TagBytes>) -> String {
     match (in_answer, found, cx.snapshot.text(def.id)) {
         (Some(text), Some(found), _) => {
             let hex: Vec<String> = found.words.iter().map(|word| format!("{word:04X}")).collect();
-            let odd = text.contains(codec::UNPRINTABLE);
+            let odd = text.contains(text_value::UNPRINTABLE);
             let note = if odd { t!(", · = unprintable byte") } else { "" };
             t!("\"{text}\"{note}, from {join}", text, note, join = hex.join(" "))
         }

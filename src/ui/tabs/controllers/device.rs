@@ -128,11 +128,7 @@ pub fn signal_mark(signal: Signal) -> String {
 /// The latest write to this device and its outcome, and whether that is a worry.
 fn last_write(cx: &ViewContext, device: DeviceId) -> Option<(String, bool)> {
     let to_device = |tag| cx.def().tag(tag).device == device;
-    let status = cx
-        .snapshot
-        .commands
-        .iter()
-        .find(|status| status.command.kind.written().is_some_and(|(tag, _)| to_device(tag)))?;
+    let status = cx.snapshot.commands.iter().find(|status| status.command.kind.written_tag().is_some_and(to_device))?;
     let (words, trouble) = outcome_words(&status.outcome);
     let what = command_label(cx, &status.command.kind, status.old);
     Some((

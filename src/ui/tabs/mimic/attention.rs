@@ -68,16 +68,16 @@ fn failed_commands(cx: &ViewContext) -> impl Iterator<Item = AttentionRow> {
         Outcome::Pending | Outcome::Verified | Outcome::Unchanged | Outcome::Sent => false,
     };
     let is_latest = move |n: usize, tag| {
-        let mut later = commands[..n].iter().filter_map(|status| status.command.kind.written());
-        !later.any(|(other, _)| other == tag)
+        let mut later = commands[..n].iter().filter_map(|status| status.command.kind.written_tag());
+        !later.any(|other| other == tag)
     };
     commands.iter().enumerate().filter_map(move |(n, status)| {
-        let (tag, value) = status.command.kind.written()?;
+        let (tag, value) = cx.snapshot.written(&status.command.kind)?;
         let is_recent = cx.now.duration_since(status.outcome_at) <= FAILED_FOR;
         if !has_failed(status) || !is_recent || !is_latest(n, tag) {
             return None;
         }
-        let (name, value) = (&cx.def().tag(tag).name, cx.snapshot.format(tag, value));
+        let name = &cx.def().tag(tag).name;
         let mark = cx.theme.pick("✗", "x");
         Some((
             t!("{mark} {name} := {value} {outcome}", mark, name, value, outcome = status.outcome),

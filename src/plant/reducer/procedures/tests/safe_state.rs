@@ -9,7 +9,7 @@ use crate::{
     text::{Language, recorded_action},
 };
 
-const NOT_SENT: fn(Exact) -> WriteResult = |_| WriteResult::NotSent(Fault::NotConnected);
+const NOT_SENT: fn(TagValue) -> WriteResult = |_| WriteResult::NotSent(Fault::NotConnected);
 
 /// `heat` has failed at its first step while SV could not be written: it is 50 and should be 0.
 fn failed_of(def: PlantDef) -> Plant {

@@ -1,5 +1,8 @@
 //! What devices keep as digits and persons read in groups: versions, and addresses of networks.
 
+// As data: nothing is opened.
+use core::net::{Ipv4Addr, Ipv6Addr};
+
 use crate::plant::data_type::NetworkAddress;
 
 /// `1.0.A.2`, of several registers `1.0.A.2-0.0.0.7`.
@@ -26,6 +29,29 @@ pub(super) fn address(kind: NetworkAddress, bytes: &[u8]) -> Option<String> {
         }
     };
     (!is_none).then_some(shown)
+}
+
+/// The words of an address as it is shown.
+pub(super) fn words(kind: NetworkAddress, text: &str) -> Option<Vec<u16>> {
+    let bytes = match kind {
+        NetworkAddress::Eui48 => [&[0, 0][..], &port(text)?].concat(),
+        NetworkAddress::Ipv4 => text.parse::<Ipv4Addr>().ok()?.octets().to_vec(),
+        NetworkAddress::Ipv6 => text.parse::<Ipv6Addr>().ok()?.octets().to_vec(),
+    };
+    Some(bytes.chunks_exact(2).map(|pair| u16::from_be_bytes([pair[0], pair[1]])).collect())
+}
+
+/// A typed address as it is shown.
+pub(super) fn typed(kind: NetworkAddress, typed: &str) -> Option<String> {
+    let words = words(kind, typed)?;
+    address(kind, &words.into_iter().flat_map(u16::to_be_bytes).collect::<Vec<_>>())
+}
+
+/// The six bytes of the address of a port.
+fn port(text: &str) -> Option<[u8; 6]> {
+    let byte = |pair: &str| u8::from_str_radix(pair, 16).ok().filter(|_| pair.len() == 2);
+    let bytes = text.split([':', '-']).map(byte).collect::<Option<Vec<u8>>>()?;
+    bytes.try_into().ok()
 }
 
 #[cfg(test)]

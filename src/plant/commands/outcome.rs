@@ -1,0 +1,52 @@
+//! What the result of a write on the wire means.
+
+use std::time::Duration;
+
+use crate::plant::{
+    command::{NotConfirmed, Outcome, Refusal, WriteResult},
+    process_image::ProcessImage,
+    scale,
+    tag::TagDef,
+    tag_value::TagValue,
+    text_value,
+};
+
+/// The outcome of a write of `raw`, accepted this long ago.
+pub(super) fn of_write(
+    def: &TagDef,
+    raw: &TagValue,
+    result: WriteResult,
+    image: &ProcessImage,
+    ago: Duration,
+) -> Outcome {
+    let value = |back| match back {
+        TagValue::Number(raw) => scale::to_value(def, raw, image.scaling_decimals(def).unwrap_or(0)).into(),
+        TagValue::Text(_) => back,
+    };
+    let is_held = |back: &TagValue| match (raw, back) {
+        (TagValue::Number(raw), TagValue::Number(back)) => scale::same_raw(def, *raw, *back),
+        (TagValue::Text(text), TagValue::Text(back)) => text_value::is_held(def.point.kind, text, back, ago),
+        (TagValue::Number(_), TagValue::Text(_)) | (TagValue::Text(_), TagValue::Number(_)) => false,
+    };
+    match result {
+        WriteResult::ReadBack(back) | WriteResult::ReadBackAfterNoResponse(back) if is_held(&back) => Outcome::Verified,
+        WriteResult::ReadBack(back) => Outcome::NotConfirmed(NotConfirmed::Different(value(back))),
+        WriteResult::ReadBackAfterNoResponse(back) => Outcome::NotConfirmed(NotConfirmed::NotApplied(value(back))),
+        unread => without_read_back(&unread),
+    }
+}
+
+/// The outcome of a write whose value was not read back.
+pub(super) fn without_read_back(result: &WriteResult) -> Outcome {
+    match result {
+        WriteResult::Refused(code) => Outcome::Refused(Refusal::Exception(*code)),
+        WriteResult::NotSent(fault) => Outcome::Refused(Refusal::NotSent(*fault)),
+        WriteResult::Superseded => Outcome::Refused(Refusal::Superseded),
+        WriteResult::NoValidResponse(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
+        WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(*fault)),
+        WriteResult::Sent => Outcome::Sent,
+        WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::ReadBackAfterNoResponse(_) => {
+            Outcome::NotConfirmed(NotConfirmed::NoReadBack)
+        }
+    }
+}
