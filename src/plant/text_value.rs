@@ -69,9 +69,12 @@ pub fn encode(kind: DataType, text: &str) -> Option<Vec<u16>> {
     (decode(kind, &words).as_deref() == Some(text)).then_some(words)
 }
 
+/// Registers that one request writes at most (V1.1b3, 6.12).
+pub const WRITE_MAX: u16 = 123;
+
 /// Can a text of this type be written?
 pub fn is_writable(kind: DataType) -> bool {
-    kind.is_text() && !matches!(kind, DataType::Version(_))
+    kind.is_text() && !matches!(kind, DataType::Version(_)) && kind.words() <= WRITE_MAX
 }
 
 /// A typed text as a device will show it once it is written. `now` is the time and the zone of the plant.

@@ -9,7 +9,6 @@ use super::{
 use crate::plant::{
     address::{in_table, table_named},
     tag::{Access, ByteOrder, DataType, Point, StorePolicy},
-    text_value,
 };
 
 /// Keys that a text does not have.
@@ -86,7 +85,7 @@ pub(super) fn check_text(row: &TagTable, point: Point, problems: &mut Problems) 
         problems.add(row.at, "a text needs registers").label("expected table = \"holding\" or \"input\"");
     }
     if let Some(access) = row.access.filter(|access| access.value != Access::Read) {
-        if !text_value::is_writable(point.kind) {
+        if let DataType::Version(_) = point.kind {
             problems.add(access.at, "a version can only be read").label("expected access = \"r\"");
         }
     }

@@ -12,6 +12,7 @@ use crate::{
         raw_number::BadSpan,
         scale,
         tag::{Access, Bound, ByteOrder, DataType, Decimals, Encoding, Point, Poll, Table, TagDef},
+        text_value,
     },
     t,
 };
@@ -130,6 +131,12 @@ impl Named {
         // As a person would write the product.
         let scale = format!("{}e{power}", tag.scale).parse().unwrap_or(tag.scale);
         Named { scale, offset: tag.offset, decimals: Decimals::shown(decimals), unit, ..plain }
+    }
+
+    /// The same of a type that holds a text: not every one can be written.
+    pub fn as_text(self) -> Named {
+        let access = if text_value::is_writable(self.kind) { self.access } else { Access::Read };
+        Named { access, ..self }
     }
 
     /// The same as a tag that is called so.

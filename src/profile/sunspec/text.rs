@@ -10,7 +10,7 @@ use super::{
     poll::{NEVER, poll_of},
 };
 use crate::{
-    plant::{def::READ_REGISTERS_MAX, tag::Decimals},
+    plant::{def::READ_REGISTERS_MAX, tag::Decimals, text_value},
     profile::tag_text::quoted,
 };
 
@@ -156,7 +156,8 @@ impl Rows {
         keys.extend(self.symbols(point, &name));
         let poll = poll_of(point, address, place);
         self.missing += usize::from(poll == Some(NEVER));
-        if point.is_writable && !point.kind.is_text() && poll != Some(NEVER) {
+        let fits = point.registers <= text_value::WRITE_MAX;
+        if point.is_writable && fits && poll != Some(NEVER) {
             keys.push("access = \"rw\"".to_owned());
             if self.writable.last().map(String::as_str) != Some(place.model) {
                 self.writable.push(place.model.to_owned());

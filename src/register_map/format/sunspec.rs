@@ -163,10 +163,10 @@ fn point_of(point: &Node, prefix: &str, at: u32, factors: &Factors) -> Result<Na
     let size = point.opt_whole("size")?.ok_or_else(|| missing("size"))?;
     let (kind, bad) = kind_of(word, size)?;
     let name = format!("{prefix}{name}");
-    let access = if point.word("access") == Some("RW") && !kind.is_text() { Access::ReadWrite } else { Access::Read };
+    let access = if point.word("access") == Some("RW") { Access::ReadWrite } else { Access::Read };
     let named = Named { access, ..Named::new(Table::Holding, address, kind, ByteOrder::Abcd, &name) };
     if kind.is_text() {
-        return Ok(named);
+        return Ok(named.as_text());
     }
     let bad = bad.and_then(|pattern| named.point().raw_number(pattern, true).number());
     let mut named = Named { bad_if: bad.into_iter().map(Into::into).collect(), ..named };

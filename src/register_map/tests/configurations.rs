@@ -180,6 +180,7 @@ parameters:
       - { name: Faults, rule: 1, registers: [0x18], lookup: [{ key: 0, value: OK }, { bit: 3, value: Fan }] }
       - { name: Serial, rule: 5, registers: [0x20, 0x21] }
       - { name: Clock, rule: 8, registers: [0x22, 0x23, 0x24] }
+      - { name: Set, rule: 8, registers: [0x25, 0x26, 0x27], platform: datetime, code: { read: 3, write: 16 } }
       - { name: Limit, rule: 1, registers: [0x30], platform: number, code: { read: 3, write: 16 }, configurable: { max: 9 } }
       - { name: Version, rule: 7, registers: [0x31] }
       - { name: Parts, rule: 7, registers: [0x35, 0x34], hex: }
@@ -203,6 +204,7 @@ parameters:
         "30025 Faults uint16 ABCD x1 #3=Fan",
         "30033 Serial string(4) ABCD x1",
         "30035 Clock clock_bytes ABCD x1",
+        "40038 Set clock_bytes ABCD x1 rw",
         "40049 Limit uint16 ABCD x1 rw max9",
         "30050 Version version(1) ABCD x1",
         "30053 Parts version(2) CDAB x1",
