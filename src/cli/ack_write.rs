@@ -118,9 +118,9 @@ async fn write_text(
     let held =
         held.map_err(|expected| CliError::Usage(format!("{}: found `{typed}`, expected {expected}", def.name)))?;
     let seen = snapshot.texts[tag.index()].clone();
-    let old = seen.as_deref().unwrap_or("----").to_owned();
+    let old = seen.as_deref().map_or("----".to_owned(), text_value::quoted);
     let question: Vec<String> = def.confirm.clone().into_iter().collect();
-    ask(&format!("{} {old} → {held}", def.name), &question, yes).await?;
+    ask(&format!("{} {old} → {}", def.name, text_value::quoted(&held)), &question, yes).await?;
     let kind = CommandKind::WriteText { tag, text: typed.into(), seen };
     let status = actor.send_command(1, kind).await?;
     // What the station says that the device holds, which need not be what was typed.

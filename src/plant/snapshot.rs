@@ -31,6 +31,7 @@ use super::{
     scale,
     station_fault::StationFault,
     tag::Decimals,
+    text_value,
     time::elapsed,
     traffic::Exchange,
     tuning::Tuning,
@@ -182,7 +183,7 @@ impl Snapshot {
     /// The tag that a command writes, and the new value with its unit, or the new text.
     pub fn written(&self, kind: &CommandKind) -> Option<(TagId, String)> {
         if let CommandKind::WriteText { tag, text, .. } = kind {
-            return Some((*tag, text.to_string()));
+            return Some((*tag, text_value::quoted(text)));
         }
         let (tag, value) = kind.written()?;
         Some((tag, format!("{} {}", self.format(tag, value), self.unit(tag)).trim_end().to_owned()))

@@ -69,6 +69,11 @@ pub fn encode(kind: DataType, text: &str) -> Option<Vec<u16>> {
     (decode(kind, &words).as_deref() == Some(text)).then_some(words)
 }
 
+/// A text in a line of words, where an empty one must be seen.
+pub fn quoted(text: &str) -> String {
+    if text.is_empty() { "\"\"".to_owned() } else { text.to_owned() }
+}
+
 /// Registers that one request writes at most (V1.1b3, 6.12).
 pub const WRITE_MAX: u16 = 123;
 

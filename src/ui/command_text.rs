@@ -6,6 +6,7 @@ use crate::{
         command::{CommandKind, NotConfirmed, Outcome},
         commands::alarm_action,
         exact::Exact,
+        text_value,
     },
     t,
 };
@@ -40,7 +41,7 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<Exact>) -
     match kind {
         CommandKind::Write { tag, .. } | CommandKind::WriteText { tag, .. } => {
             let seen = if let CommandKind::WriteText { seen, .. } = kind { seen.as_deref() } else { None };
-            let old = old.map(|old| cx.snapshot.format(*tag, old)).or(seen.map(str::to_owned));
+            let old = old.map(|old| cx.snapshot.format(*tag, old)).or(seen.map(text_value::quoted));
             let new = cx.snapshot.written(kind).map_or(String::new(), |(_, new)| new);
             format!("{} {} → {new}", cx.def().tag(*tag).name, old.unwrap_or("?".to_owned()))
         }

@@ -146,11 +146,15 @@ impl Entry {
         let theme = cx.theme;
         let def = cx.def().tag(self.tag);
         let room = body.width.saturating_sub(8).min(64);
-        let mut rows = vec![(wire_text(def), theme.dim())];
+        let mut rows = Vec::new();
         if def.is_text() {
-            rows.insert(0, (ExpectedText(def.point.kind).to_string(), theme.normal()));
+            let held = self.held(cx).ok().filter(|held| *held != self.line.text());
+            let expected = (ExpectedText(def.point.kind).to_string(), theme.normal());
+            rows.push(held.map_or(expected, |held| (t!("as {held}", held), theme.strong())));
+            rows.push((wire_text(def), theme.dim()));
         } else {
-            rows.insert(0, (range_text(cx.snapshot, self.tag), theme.normal()));
+            rows.push((range_text(cx.snapshot, self.tag), theme.normal()));
+            rows.push((wire_text(def), theme.dim()));
             rows.push((entry::help(cx.snapshot, self.tag), theme.dim()));
         }
         let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
@@ -175,11 +179,8 @@ impl Entry {
         let x = canvas.text(x, 0, t!("  →  new "), theme.dim());
         let x = self.line.view(theme, &mut canvas, x, 0);
         let x = canvas.text(x + 1, 0, cx.snapshot.unit(self.tag), theme.normal());
-        let meant = match def.is_text() {
-            true => self.held(cx).ok().filter(|held| *held != self.line.text()).map(|held| format!("→ {held}")),
-            false => entry::relative_text(cx.snapshot, self.tag, &self.line.text()),
-        };
-        if let Some(words) = meant {
+        let change = entry::relative_text(cx.snapshot, self.tag, &self.line.text()).filter(|_| !def.is_text());
+        if let Some(words) = change {
             canvas.text(x + 2, 0, &words, theme.strong());
         }
         canvas.rows(0, 1, &rows);

@@ -51,7 +51,10 @@ fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Para
         let needs =
             Some(rights::to_write(cx, [tag.id])).filter(|role| tag.writable() && rights::lacks(cx, *role).is_some());
         let needs = needs.map_or(String::new(), |role| t!("needs {title}; ", title = rights::title(role)));
-        let text = format!("{needs}{default}{meaning}");
+        // Of a text the list shows no more than of a number.
+        let whole = cx.snapshot.text(tag.id).filter(|text| tag.is_text() && !text.is_empty());
+        let whole = whole.map_or(String::new(), |text| format!("{text}; "));
+        let text = format!("{needs}{default}{whole}{meaning}");
         let lines = wrap(&text, end.saturating_sub(x));
         for (n, line) in lines.iter().enumerate().take(usize::from(words)) {
             let cut = n + 1 == usize::from(words) && lines.len() > n + 1;

@@ -108,7 +108,8 @@ impl ParameterTable {
         let range = entry::range_text(cx.snapshot, tag.id);
         // What is only read needs no range; what can be written says that its range is not known.
         let writable = tag.writable() && !cx.def().listens_on(cx.def().device(tag.device).line);
-        let none = !writable && tag.enum_labels.is_empty() && cx.snapshot.range(tag.id).is_none();
+        let is_number = writable && !tag.is_text();
+        let none = !is_number && tag.enum_labels.is_empty() && cx.snapshot.range(tag.id).is_none();
         let range = if none { "–".to_owned() } else { range };
         let range = range.trim_start_matches(t!("range ")).trim_end_matches(&shown.unit).trim_end().to_owned();
         let may = writable && rights::lacks(cx, rights::to_write(cx, [tag.id])).is_none();
