@@ -266,7 +266,7 @@ impl TabView for Registers {
             }
             Asking::Name => self.name_typed(text)?,
             Asking::Enable => return self.enable_writing(text),
-            Asking::Write => return self.write_typed(text),
+            Asking::Write => return self.write_typed(cx, text),
             Asking::Value => return self.find(cx, text),
         }
         Ok(self.read_now(cx))

@@ -3,6 +3,8 @@
 #[cfg(test)]
 mod tests;
 
+use jiff::Zoned;
+
 use super::{AddressSpan, Registers};
 use crate::ui::{command_text::outcome_words, tabs::prelude::*};
 use crate::{
@@ -14,6 +16,7 @@ use crate::{
         live::number,
         scale,
         tag::{ByteOrder, DataType, Encoding, Point, Table},
+        text_value::{self, ExpectedText},
     },
     register_map::named::{Named, Names},
 };
@@ -117,8 +120,8 @@ impl Registers {
         if let Some((named, held)) = self.named_and_held() {
             let title =
                 t!("write {name}, now {value}", name = named.name, value = named.text(&held).unwrap_or_default());
-            let hint = if let Some(most) = named.kind.length().filter(|_| named.kind.is_text()) {
-                t!("at most {most} characters", most)
+            let hint = if named.kind.is_text() {
+                ExpectedText(named.kind).to_string()
             } else if named.enum_labels.is_empty() {
                 t!("a value as it is shown, or +1; 0x2BC: words as they are").to_owned()
             } else {
@@ -148,11 +151,13 @@ impl Registers {
     }
 
     /// Asks whether to write what was typed.
-    pub(super) fn write_typed(&self, text: &str) -> Result<Vec<UiAction>, String> {
+    pub(super) fn write_typed(&self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let held = self.cells.words(self.table, self.selected, 1);
         let first = held.first().copied().ok_or_else(|| t!("it is not known what it holds now").to_owned())?;
         let words = match self.named_and_held() {
-            Some((named, held)) if !text.starts_with("0x") && !text.starts_with("0X") => typed_as(text, named, &held)?,
+            Some((named, held)) if !text.starts_with("0x") && !text.starts_with("0X") => {
+                typed_as(text, named, &held, &cx.now.to_zoned(cx.def().time_zone.clone()))?
+            }
             Some(_) | None => typed(text, self.table, self.order, first)?,
         };
         self.confirm(words)
@@ -243,14 +248,15 @@ fn unknown() -> UiAction {
     UiAction::Open(Modal::Notice(Notice::new(t!("write"), vec![why])))
 }
 
-/// The words of a named value: a number as it is shown, `+1` to add, one of its words, or a text.
-fn typed_as(text: &str, named: &Named, held: &[u16]) -> Result<Vec<u16>, String> {
+/// The words of a named value: a number as it is shown, `+1` to add, one of its words, or a text. `now` sets a clock.
+fn typed_as(text: &str, named: &Named, held: &[u16], now: &Zoned) -> Result<Vec<u16>, String> {
     if named.kind.is_half() {
         return Err(t!("{name} is one byte of a register: write the register", name = named.name));
     }
-    if let Some(most) = named.kind.length().filter(|_| named.kind.is_text()) {
-        let words = codec::encode_text(named.point(), text);
-        return words.ok_or_else(|| t!("found `{text}`, expected at most {most} printable characters", text, most));
+    if named.kind.is_text() {
+        let shown = text_value::as_held(named.kind, text, now);
+        let words = shown.and_then(|shown| codec::encode_text(named.point(), &shown).ok_or(ExpectedText(named.kind)));
+        return words.map_err(|expected| t!("found `{text}`, expected {what}", text, what = expected));
     }
     if let Some((raw, _)) = named.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text)) {
         return encode(named, Exact::whole(*raw)).ok_or_else(|| does_not_fit(text, named));

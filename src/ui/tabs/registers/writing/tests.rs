@@ -1,29 +1,43 @@
 //! What is typed, taken back and sent with which function.
 
 use super::*;
+use crate::plant::data_type::{Clock, NetworkAddress};
 
 fn sv() -> Named {
     let plain = Named::new(Table::Holding, 1_002, DataType::I16, ByteOrder::Abcd, "SV");
     Named { scale: 0.1, decimals: 1, unit: "°C".into(), ..plain }
 }
 
+/// On 2026-11-30 at 14:05:07.
+fn words_of(text: &str, named: &Named, held: &[u16]) -> Result<Vec<u16>, String> {
+    let now = "2026-11-30T14:05:07Z".parse::<Timestamp>().expect("a time").to_zoned(jiff::tz::TimeZone::UTC);
+    typed_as(text, named, held, &now)
+}
+
 #[test]
 fn a_named_value_is_typed_as_it_is_shown() {
-    assert_eq!(typed_as("70.2", &sv(), &[700]), Ok(vec![702]));
-    assert_eq!(typed_as("+0.5", &sv(), &[700]), Ok(vec![705]));
-    assert_eq!(typed_as("-5", &sv(), &[700]), Ok(vec![0xFFCE]));
+    assert_eq!(words_of("70.2", &sv(), &[700]), Ok(vec![702]));
+    assert_eq!(words_of("+0.5", &sv(), &[700]), Ok(vec![705]));
+    assert_eq!(words_of("-5", &sv(), &[700]), Ok(vec![0xFFCE]));
     for wrong in ["70.25", "3276.8", "x", "1 2", "", "inf"] {
-        assert!(typed_as(wrong, &sv(), &[700]).is_err(), "{wrong}");
+        assert!(words_of(wrong, &sv(), &[700]).is_err(), "{wrong}");
     }
     let state = Named { enum_labels: vec![(0, "RUN".into()), (1, "STOP".into())], scale: 1.0, ..sv() };
-    assert_eq!(typed_as("stop", &state, &[0]), Ok(vec![1]));
+    assert_eq!(words_of("stop", &state, &[0]), Ok(vec![1]));
     let bcd = Named { kind: DataType::Bcd16, scale: 1.0, ..sv() };
-    assert_eq!((typed_as("1234", &bcd, &[0]), next_step(&bcd, &[0x0999], 1)), (Ok(vec![0x1234]), Some(vec![0x1000])));
-    assert!(typed_as("12345", &bcd, &[0]).is_err());
+    assert_eq!((words_of("1234", &bcd, &[0]), next_step(&bcd, &[0x0999], 1)), (Ok(vec![0x1234]), Some(vec![0x1000])));
+    assert!(words_of("12345", &bcd, &[0]).is_err());
     let long = Named { kind: DataType::U64, scale: 1.0, ..sv() };
-    assert_eq!(typed_as("4294967296", &long, &[0; 4]), Ok(vec![0, 1, 0, 0]));
+    assert_eq!(words_of("4294967296", &long, &[0; 4]), Ok(vec![0, 1, 0, 0]));
     let text = Named { kind: DataType::Text(4), ..sv() };
-    assert_eq!(typed_as("AB", &text, &[0; 2]), Ok(vec![0x4142, 0]));
+    assert_eq!(words_of("AB", &text, &[0; 2]), Ok(vec![0x4142, 0]));
+    let why = "found `ABCDE`, expected at most 4 printable characters".to_owned();
+    assert_eq!(words_of("ABCDE", &text, &[0; 2]), Err(why));
+    let clock = Named { kind: DataType::Clock(Clock::Bcd), ..sv() };
+    assert_eq!(words_of("now", &clock, &[0; 3]), Ok(vec![0x2611, 0x3014, 0x0507]));
+    assert_eq!(words_of("2027-01-02 03:04", &clock, &[0; 3]), Ok(vec![0x2701, 0x0203, 0x0400]));
+    let address = Named { kind: DataType::NetworkAddress(NetworkAddress::Ipv4), ..sv() };
+    assert_eq!(words_of("192.168.0.7", &address, &[0; 2]), Ok(vec![0xC0A8, 7]));
     assert_eq!((next_step(&sv(), &[700], 1), next_step(&sv(), &[0x7FFF], 1)), (Some(vec![701]), None));
 }
 
