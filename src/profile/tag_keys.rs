@@ -84,10 +84,9 @@ pub(super) fn check_text(row: &TagTable, point: Point, problems: &mut Problems) 
     if point.table.is_bits() {
         problems.add(row.at, "a text needs registers").label("expected table = \"holding\" or \"input\"");
     }
-    if let Some(access) = row.access.filter(|access| access.value != Access::Read) {
-        if let DataType::Version(_) = point.kind {
-            problems.add(access.at, "a version can only be read").label("expected access = \"r\"");
-        }
+    let is_version = matches!(point.kind, DataType::Version(_));
+    if let Some(access) = row.access.filter(|access| is_version && access.value != Access::Read) {
+        problems.add(access.at, "a version can only be read").label("expected access = \"r\"");
     }
     if let Some(store) = row.store.filter(|store| store.value != StorePolicy::Never) {
         problems.add(store.at, "the history keeps numbers, this is a text").label("leave it out");

@@ -80,7 +80,7 @@ fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> CommandStatus {
 fn write(plant: &mut Plant, value: f64, result: WriteResult) -> (Outcome, Option<f64>) {
     let effects = plant.on_command(shown(plant, 1, SV, value), at(1));
     let sent = effects.bus.first().map(|(_, request)| match request {
-        BusRequest::Write(job) => (job.id, job.raw.number().unwrap()),
+        BusRequest::Write(job) => (job.id, job.raw.number().expect("a number")),
         other => panic!("not a write: {other:?}"),
     });
     if let Some((id, _)) = sent {

@@ -94,7 +94,7 @@ pub(super) fn words(clock: Clock, text: &str) -> Option<Vec<u16>> {
 
 /// Two decimal digits.
 fn bcd(byte: u8) -> u8 {
-    byte / 10 << 4 | byte % 10
+    ((byte / 10) << 4) | (byte % 10)
 }
 
 /// A typed date or time as it is shown. Where a device counts in UTC, one without an offset is of the zone of the plant.

@@ -64,7 +64,9 @@ impl Entry {
     pub fn new(cx: &ViewContext, tag: TagId) -> Entry {
         let seen = cx.snapshot.texts[tag.index()].clone();
         let line = match is_text(cx, tag) {
-            true => Line::long(seen.as_deref().filter(|_| is_kept(cx, tag)).unwrap_or_default(), TEXT_MAX).as_offered(),
+            true => {
+                Line::long(seen.as_deref().filter(|_| is_kept(cx, tag)).unwrap_or_default(), TEXT_MAX).into_offered()
+            }
             false => Line::default(),
         };
         Entry { tag, line, problem: None, expected: ConfirmedValue::new(cx, tag), seen }

@@ -41,10 +41,10 @@ impl Line {
     }
     /// A text that is offered: typed text replaces it.
     pub fn offered(text: &str) -> Line {
-        Line::long(text, CHARS_MAX).as_offered()
+        Line::long(text, CHARS_MAX).into_offered()
     }
     /// The same text, offered.
-    pub fn as_offered(self) -> Line {
+    pub fn into_offered(self) -> Line {
         Line { is_offered: !self.text.is_empty(), ..self }
     }
     pub fn text(&self) -> String {

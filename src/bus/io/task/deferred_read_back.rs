@@ -6,7 +6,7 @@ use jiff::{SignedDuration, Timestamp};
 
 use super::{
     LinkExit, Task,
-    read::{as_read, held_by},
+    read::{held_by, read_alone},
 };
 use crate::{
     bus::{
@@ -15,12 +15,7 @@ use crate::{
         plan,
         schedule::Schedule,
     },
-    plant::{
-        command::WriteId,
-        def::TagId,
-        event::{Event, WriteResult},
-        fault::Fault,
-    },
+    plant::{command::WriteId, def::TagId, event::WriteResult, fault::Fault},
 };
 
 /// What cannot be read for so long (plant time) stays unconfirmed.
@@ -91,12 +86,10 @@ impl Task<'_> {
             }
             return Ok(());
         };
-        let exchange = link.last.clone();
-        let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time).unwrap_or_default();
-        let known = Some(response_time).filter(|response_time| *response_time > Duration::ZERO);
+        let response_time = link.last.as_ref().and_then(|exchange| exchange.response_time);
+        let known = response_time.filter(|response_time| *response_time > Duration::ZERO);
         schedule.answered(None, tag.device, known, at);
-        let (device, (values, texts)) = (tag.device, as_read(tag.id, held.clone()));
-        self.publish(Event::Read { at, device, values, texts, response_time, exchange }).await?;
+        self.publish(read_alone(link, tag, &held, at)).await?;
         let write = self.unconfirmed.remove(index);
         let result = match write.result {
             WriteResult::NotRead(_) => WriteResult::ReadBack(held),

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use jiff::Timestamp;
+
 use crate::{
     bus::{
         codec,
@@ -10,7 +12,7 @@ use crate::{
         pdu,
         plan::Block,
     },
-    plant::{def::TagId, exact::Exact, fault::Fault, number::to_u16, tag::TagDef, tag_value::TagValue},
+    plant::{event::Event, exact::Exact, fault::Fault, number::to_u16, tag::TagDef, tag_value::TagValue},
 };
 
 /// What came in between may have shown that the unit sends what it was not asked for.
@@ -127,12 +129,15 @@ pub(super) fn held_by(tag: &TagDef, block: &Block, words: &[u16]) -> Option<TagV
     }
 }
 
-/// The same as the values and the texts of one answer.
-pub(super) fn as_read(tag: TagId, held: TagValue) -> (Vec<(TagId, Exact)>, Vec<(TagId, Arc<str>)>) {
-    match held {
-        TagValue::Number(raw) => (vec![(tag, raw)], Vec::new()),
-        TagValue::Text(text) => (Vec::new(), vec![(tag, text)]),
-    }
+/// The same as the last answer of the link, which brought nothing else.
+pub(super) fn read_alone(link: &Link, tag: &TagDef, held: &TagValue, at: Timestamp) -> Event {
+    let exchange = link.last.clone();
+    let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time).unwrap_or_default();
+    let (values, texts) = match held {
+        TagValue::Number(raw) => (vec![(tag.id, *raw)], Vec::new()),
+        TagValue::Text(text) => (Vec::new(), vec![(tag.id, text.clone())]),
+    };
+    Event::Read { at, device: tag.device, values, texts, response_time, exchange }
 }
 
 pub(super) fn value_of(tag: &TagDef, block: &Block, words: &[u16]) -> Option<Exact> {

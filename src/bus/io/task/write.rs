@@ -2,7 +2,7 @@
 
 use super::{
     LinkExit, Task,
-    read::{as_read, held_by},
+    read::{held_by, read_alone},
 };
 use crate::{
     bus::{
@@ -104,11 +104,7 @@ impl Task<'_> {
     ) -> Result<(), LinkExit> {
         match result {
             WriteResult::ReadBack(held) => {
-                let (device, (values, texts)) = (tag.device, as_read(tag.id, held.clone()));
-                let exchange = link.last.clone();
-                let response_time = exchange.as_ref().and_then(|exchange| exchange.response_time).unwrap_or_default();
-                self.publish(Event::Read { at: self.clock.now(), device, values, texts, response_time, exchange })
-                    .await?;
+                self.publish(read_alone(link, tag, held, self.clock.now())).await?;
             }
             // The value is unknown until it is read again.
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Sent | WriteResult::NoValidResponse(_) => {

@@ -98,7 +98,7 @@ fn run(plant: &Plant) -> ProcedureRun {
 /// The tags and raw numbers that go to the bus.
 fn written(effects: &Effects) -> Vec<(TagId, f64)> {
     let write = |(_, request): &(_, BusRequest)| match request {
-        BusRequest::Write(job) => Some((job.tag, job.raw.number().unwrap().near())),
+        BusRequest::Write(job) => Some((job.tag, job.raw.number().expect("a number").near())),
         _ => None,
     };
     effects.bus.iter().filter_map(write).collect()
@@ -113,7 +113,7 @@ fn end(plant: &mut Plant, effects: &Effects, second: i64, result: fn(TagValue) -
     let job = job.expect("a write is under way");
     let mut effects = Effects::default();
     if let WriteResult::ReadBack(back) = result(job.raw.clone()) {
-        effects = read(plant, second, &[(job.tag, back.number().unwrap().near())]);
+        effects = read(plant, second, &[(job.tag, back.number().expect("a number").near())]);
     }
     let more = plant.on_event(Event::Wrote { at: at(second), id: job.id, result: result(job.raw.clone()) });
     effects.bus.extend(more.bus);

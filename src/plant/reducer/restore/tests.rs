@@ -93,7 +93,7 @@ fn outcome(plant: &Plant, number: u32) -> Option<Outcome> {
 /// The tags and raw numbers that went to the bus.
 fn written(effects: &Effects) -> Vec<(TagId, f64)> {
     let write = |(_, request): &(_, BusRequest)| match request {
-        BusRequest::Write(job) => Some((job.tag, job.raw.number().unwrap().near())),
+        BusRequest::Write(job) => Some((job.tag, job.raw.number().expect("a number").near())),
         _ => None,
     };
     effects.bus.iter().filter_map(write).collect()
@@ -114,7 +114,7 @@ fn end(plant: &mut Plant, effects: &Effects, result: fn(TagValue) -> WriteResult
         plant.on_event(Event::Read {
             at: at(2),
             device: TIC,
-            values: vec![(tag, back.number().unwrap())],
+            values: vec![(tag, back.number().expect("a number"))],
             texts: Vec::new(),
             response_time,
             exchange: None,

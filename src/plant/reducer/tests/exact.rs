@@ -75,7 +75,7 @@ fn a_write_of_64_bits_is_checked_and_compared_to_its_last_digit() {
         let command = Command::on(&plant.snapshot(), CommandId { terminal: 1, number: 1 }, kind);
         let effects = plant.on_command(CommandStatus::new(command, "anna", at(1)), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => (job.id, job.raw.number().unwrap()),
+            BusRequest::Write(job) => (job.id, job.raw.number().expect("a number")),
             other => panic!("not a write: {other:?}"),
         });
         let on_record = sent.map(|(id, _)| {

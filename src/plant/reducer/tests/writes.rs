@@ -20,7 +20,7 @@ fn a_stop_is_sent_though_a_start_is_under_way() {
     let mut check = |number, value, expect: Option<(f64, bool)>| {
         let effects = plant.on_command(shown(&plant, number, RUN, value), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => (job.raw.number().unwrap().near(), job.urgent),
+            BusRequest::Write(job) => (job.raw.number().expect("a number").near(), job.urgent),
             other => panic!("not a write: {other:?}"),
         });
         assert_eq!(sent, expect, "command {number}: {:?}", plant.snapshot().commands[0].outcome);
@@ -140,7 +140,7 @@ fn rounding_never_leads_beyond_a_limit() {
         let mut plant = in_steps(99.8);
         let effects = plant.on_command(shown(&plant, 1, SV, value), at(1));
         let raw = effects.bus.first().map(|(_, request)| match request {
-            BusRequest::Write(job) => job.raw.number().unwrap().near(),
+            BusRequest::Write(job) => job.raw.number().expect("a number").near(),
             other => panic!("not a write: {other:?}"),
         });
         assert_eq!((raw, plant.snapshot().commands[0].outcome.clone()), (sent, outcome), "{value}");
