@@ -157,6 +157,18 @@ mod tests {
     }
 
     #[test]
+    fn a_lockout_shorter_than_a_delay_is_over_as_configured() {
+        let rules = AccessDef { login_attempts_max: 2, lockout: Duration::from_secs(5), ..AccessDef::default() };
+        let (anna, mut attempts) = (key("panel", "anna"), LoginAttempts::default());
+        for (now, account, wait) in [(0, false, 1), (1, true, 5), (6, false, 1), (7, true, 5)] {
+            assert_eq!(attempts.wait(&anna, &rules, at(now)), None, "at {now} s");
+            let out = attempts.on_failure(&anna, &rules, at(now));
+            assert_eq!(out, LockedOut { account, origin: false }, "at {now} s");
+            assert_eq!(attempts.wait(&anna, &rules, at(now)), Some(Duration::from_secs(wait)), "at {now} s");
+        }
+    }
+
+    #[test]
     fn a_right_password_forgives_wrong_ones_for_the_same_name_only() {
         let rules = AccessDef::default();
         let mut attempts = LoginAttempts::default();

@@ -256,6 +256,8 @@ mod tests {
             }
         }
         assert_eq!(check("anna password tank password", NAMES, 15), Err(RequestRefusal::PasswordCommon));
+        assert_eq!(check("anna wet horses 1", NAMES, 15), Ok(()), "ten letters and digits beside the name");
+        assert_eq!(check("anna wet horse 1", NAMES, 15), Err(RequestRefusal::PasswordIsName), "nine");
         for good in [
             "anna is on a wet horse",
             "the wet horse and the dry horse",
@@ -277,10 +279,26 @@ mod tests {
     }
 
     #[test]
+    fn the_longest_password_counts_up_to_its_last_letter() {
+        let longest = "x".repeat(CHARS_MAX);
+        let hash = hash(&longest, [7; SALT_BYTES]).unwrap();
+        assert!(is(&longest, &hash));
+        assert!(!is(&format!("{longest}x"), &hash), "a longer one is another one");
+    }
+
+    #[test]
     fn a_hash_that_would_stall_the_station_is_not_taken() {
         assert_eq!(check_hash(DUMMY), Ok(()), "an unknown name costs the same work");
         assert!(check_hash(&DUMMY.replace("m=19456", "m=4000000")).is_err());
         assert!(check_hash(&DUMMY.replace("argon2id", "argon2i")).is_err());
         assert!(check_hash("secret").is_err() && check_hash("").is_err());
+        for (cost, taken) in [
+            ("m=65536,t=10,p=4", true),
+            ("m=65537,t=10,p=4", false),
+            ("m=65536,t=11,p=4", false),
+            ("m=65536,t=10,p=5", false),
+        ] {
+            assert_eq!(check_hash(&DUMMY.replace("m=19456,t=2,p=1", cost)).is_ok(), taken, "{cost}");
+        }
     }
 }

@@ -77,6 +77,13 @@ fn a_rewritten_log_is_found_by_the_note_and_by_the_history() {
         "cut, and the note as well"
     );
     assert_eq!(verify(&lines, None, &[]).unwrap_err().line, 6, "without the note a cut cannot be ruled out");
+    for (kept, last) in [(4, chain_hashes[3]), (0, START)] {
+        let cut = verify(&lines[..kept], Some(last), &chain_hashes).unwrap_err();
+        let why = format!("the audit log was cut here: the history holds entry {}", kept + 1);
+        assert_eq!(cut, FirstBad { line: kept as u64 + 1, why });
+    }
+    let changed = [lines[0].replace("anna", "otto")];
+    assert_eq!(verify(&changed, Some(START), &[]).unwrap_err().line, 1, "the first line needs its hash too");
 }
 
 #[test]
@@ -94,7 +101,21 @@ fn entries_missing_or_different_in_the_history_are_found() {
     assert_eq!(compare(&tail, chain_hashes[5], &chain_hashes, 100), Comparison::default());
     let found = compare(&tail, chain_hashes[5], &[chain_hashes[5], chain_hashes[3]], 2);
     assert_eq!(found.missing.len(), 1, "rows before those that were read are unknown");
+    let found = compare(&tail, chain_hashes[5], &[chain_hashes[5], forged], 2);
+    assert_eq!((found.missing, found.differing), (vec![], vec![5]), "the first row that was read is compared");
     assert_eq!(compare(&tail, chain_hashes[5], &[], 100).missing.len(), 6, "a new history is completed from the log");
+}
+
+#[test]
+fn a_hash_is_64_small_hexadecimal_digits_and_nothing_else() {
+    let text = "0f".repeat(32);
+    assert_eq!(unhex(&text), Some([0x0f; 32]));
+    let wrong = [text.to_uppercase(), text[2..].into(), format!("{text}0f"), text.replacen('0', "+", 1), String::new()];
+    for wrong in wrong {
+        assert_eq!(unhex(&wrong), None, "{wrong}");
+    }
+    // FIPS 180-2, appendix B.1.
+    assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
 proptest! {

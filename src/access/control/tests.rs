@@ -363,6 +363,8 @@ mod place;
 mod room;
 mod delegate;
 mod matrix;
+mod refusals;
+mod idle;
 
 proptest! {
     #[test]

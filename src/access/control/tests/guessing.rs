@@ -143,3 +143,32 @@ fn a_terminal_that_hangs_up_early_has_used_its_attempt() {
     bench.open(3, "other");
     assert!(bench.login(3, "tech", TECH).is_err());
 }
+
+#[test]
+fn the_last_places_for_logins_are_kept_for_the_host() {
+    let mut bench = Bench::new(AccessDef::default());
+    let mut busy = |terminal, user, count: u64| {
+        bench.open_as(terminal, user);
+        let refused = (0..count).filter(|ticket| {
+            let login = SessionRequest::Login { user: "tech".into(), password: "guess".into() };
+            let effects = bench.access.on_request(terminal, *ticket, login, bench.now);
+            answer_in(&effects, *ticket) == Some(Err(RequestRefusal::BusyWithLogins))
+        });
+        refused.count()
+    };
+    assert_eq!((busy(1, "eve", 24), busy(2, "mallory", 24)), (0, 0));
+    assert_eq!(busy(3, "panel", 10), 2, "56 are for everyone");
+    assert_eq!(busy(4, "root", 10), 2, "8 more for who runs the station");
+    assert_eq!(bench.access.jobs.len() + bench.access.waiting.len(), JOBS_MAX);
+}
+
+#[test]
+fn a_wait_is_said_in_seconds_after_which_it_is_over() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open_as(1, "eve");
+    assert!(bench.login(1, "tech", "guess").unwrap_err().ends_with("wait 1 s"));
+    bench.now += jiff::SignedDuration::from_nanos(999_999_999);
+    assert_eq!(bench.login(1, "tech", TECH), Err(RequestRefusal::NotChecked { wait: 1 }.to_string()));
+    bench.now += jiff::SignedDuration::from_nanos(1);
+    assert_eq!(bench.login(1, "tech", TECH), Ok(()));
+}

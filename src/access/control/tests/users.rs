@@ -110,3 +110,38 @@ fn a_change_waits_while_last_logins_are_saved() {
     let kept = bench.kept.unwrap();
     assert!(kept.get("view").is_none() && kept.get("tech").is_some());
 }
+
+#[test]
+fn a_name_known_to_the_operating_system_is_not_added() {
+    let trusted = vec![("kiosk".to_owned(), Role::Technician)];
+    let mut bench = Bench::new(AccessDef { trusted, ..AccessDef::default() });
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "boss", BOSS).unwrap();
+    let password = "given by the boss";
+    let add = |user: &str| SessionRequest::AddUser { user: user.into(), role: Role::Viewer, password: password.into() };
+    assert_eq!(bench.request(1, add("Kiosk")), Err(RequestRefusal::TrustedUser("Kiosk".to_owned()).to_string()));
+    assert_eq!(bench.request(1, add("dora")), Ok(()));
+}
+
+/// The terminals whose status is published.
+fn published(effects: &[Effect]) -> Vec<u32> {
+    let terminals = effects.iter().filter_map(|effect| match effect {
+        Effect::SessionStatus(terminal) => Some(*terminal),
+        _ => None,
+    });
+    terminals.collect()
+}
+
+#[test]
+fn a_session_is_shown_at_its_terminal_and_to_supervisors() {
+    let mut bench = Bench::new(AccessDef::default());
+    assert_eq!(published(&bench.open(1, "10.0.0.1")), [1]);
+    bench.login(1, "boss", BOSS).unwrap();
+    bench.open(2, "10.0.0.2");
+    bench.login(2, "tech", TECH).unwrap();
+    assert_eq!(published(&bench.open(3, "10.0.0.3")), [3, 1], "a technician has no list of sessions");
+    assert_eq!(published(&bench.access.close(3, bench.now)), [1]);
+    assert_eq!(published(&bench.access.on_request(2, 70, SessionRequest::Lock, bench.now)), [2, 1]);
+    assert_eq!(published(&bench.access.on_request(1, 71, SessionRequest::Lock, bench.now)), [1], "once");
+    assert_eq!(published(&bench.open(3, "10.0.0.3")), [3], "a locked terminal has no list");
+}

@@ -153,6 +153,43 @@ fn a_log_removed_while_open_is_noticed() {
 }
 
 #[test]
+fn the_latest_plant_file_and_users_file_are_found_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tank.audit.jsonl");
+    let (mut audit_log, _) = AuditLog::open(&path).unwrap();
+    let file = |what, new: &str| ActionRecord { new: Some(new.into()), ..record(what) };
+    let mut records = [file("plant file", "old"), file("users file", "u"), file("plant file", "p"), record("stop")];
+    audit_log.append(&mut records).unwrap();
+    drop(audit_log);
+    let (_, opened) = AuditLog::open(&path).unwrap();
+    assert_eq!((opened.plant_file.as_deref(), opened.users_file.as_deref()), (Some("p"), Some("u")));
+}
+
+#[test]
+fn a_false_note_of_an_empty_log_begins_no_other_chain() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tank.audit.jsonl");
+    let note = crate::access::audit_log::head_text(ChainHash { number: 0, hash: [1; 32] });
+    fs::write(path.with_extension("head"), note).unwrap();
+    let (mut audit_log, _) = AuditLog::open(&path).unwrap();
+    audit_log.append(&mut [record("start")]).unwrap();
+    assert_eq!(verify(&path, &[]).unwrap().entries, 1);
+}
+
+#[test]
+fn actions_that_the_history_does_not_take_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let (history, _rows) = mpsc::channel(1);
+    let (mut recorder, _) = Recorder::new(&folder.path().join("tank.duckdb"), clock(), history);
+    recorder.open();
+    for (count, lost) in [(1, 0), (2, 2), (1, 3)] {
+        recorder.on_group(group(&vec!["write"; count], &[]));
+        recorder.write();
+        assert_eq!(recorder.status().lost, lost);
+    }
+}
+
+#[test]
 fn refused_writes_are_unrecorded_until_the_disk_is_back() {
     let folder = tempfile::tempdir().unwrap();
     let history_file = folder.path().join("later").join("tank.duckdb");
