@@ -318,7 +318,16 @@ mod tests {
             assert_eq!(verdict(&urgent, Metric::Share(priority)), TargetStatus::Beyond, "{}", priority.word());
         }
         assert_eq!(verdict(&figures([0, 19, 0, 0]), Metric::Share(Priority::High)), TargetStatus::InsufficientData);
+        assert_eq!(verdict(&figures([0, 20, 0, 0]), Metric::Share(Priority::High)), TargetStatus::Beyond);
         assert_eq!(verdict(&figures([0; 4]), Metric::Share(Priority::Low)), TargetStatus::InsufficientData);
+    }
+
+    #[test]
+    fn the_most_frequent_have_their_share_of_all_alarms() {
+        let alarm = Named { subject: "TIC-1.PV".into(), message: "high".into() };
+        let frequent = |raised| Frequent { alarm: alarm.clone(), raised };
+        let figures = PeriodMetrics { top: vec![frequent(3), frequent(2)], ..figures([0, 0, 0, 10]) };
+        assert_eq!(figures.value(Metric::Top), Some(50.0));
     }
 
     #[test]

@@ -86,6 +86,23 @@ fn time_in_which_no_station_ran_thins_no_figure_out() {
 }
 
 #[test]
+fn the_figures_of_the_day_are_kept_for_ten_seconds() {
+    let mut monitor = AlarmMonitor::running(at(0.0));
+    // At the very beginning of a window no time has been watched: there is nothing to keep.
+    for (now, until) in [(0.0, 0.0), (1.0, 1.0), (2.0, 1.0), (10.0, 1.0), (11.0, 11.0), (20.0, 11.0), (21.0, 21.0)] {
+        monitor.advance(at(now));
+        assert_eq!(monitor.metrics().day.until, at(until), "at {now} s");
+    }
+}
+
+#[test]
+fn a_suppressed_activation_is_counted_and_not_annunciated() {
+    let (raised, returned) = (AlarmEvent::RaisedSuppressed, AlarmEvent::ReturnedSuppressed);
+    let got = figures(600.0, &[(1.0, "a", raised), (2.0, "a", returned), (3.0, "b", raised), (600.0, "a", raised)]);
+    assert_eq!((got.suppressed, got.annunciated()), (2, 0));
+}
+
+#[test]
 fn eleven_in_a_window_are_too_many_and_ten_are_not() {
     let raise = |count: usize| (0..count).map(|i| (i as f64, "x", Raised)).collect::<Vec<_>>();
     for (count, over) in [(10, 0), (11, 1), (25, 1)] {

@@ -175,3 +175,45 @@ fn a_value_that_stood_still_before_the_heating_is_not_stuck() {
         assert_eq!(events(&manager.evaluate(at(second), when(enabled))), expect, "at {second} s");
     }
 }
+
+#[test]
+fn what_is_disabled_returns_without_its_off_delay() {
+    let def = enabled_by_design(|alarm| alarm.off_delay = Duration::from_secs(30));
+    let mut manager = AlarmManager::new(def.clone());
+    assert_eq!(events(&manager.evaluate(at(0), enabled_with(80.0, true))), [AlarmEvent::Raised]);
+    assert_eq!(events(&manager.evaluate(at(1), enabled_with(80.0, false))), [AlarmEvent::ReturnedToNormal]);
+    let mut shelved = AlarmManager::new(def);
+    shelved.evaluate(at(0), enabled_with(80.0, true));
+    shelved.shelve(HIGH, Duration::from_secs(60), &note(at(1), Some(&why()))).expect("a minute, with a reason");
+    let by_design = shelved.evaluate(at(2), enabled_with(80.0, false));
+    assert_eq!(events(&by_design), [AlarmEvent::SuppressedByDesign], "on the shelf nothing returns");
+}
+
+#[test]
+fn a_value_is_stuck_from_when_nothing_disabled_it() {
+    use AlarmEvent::{Raised, ReturnedToNormal, SuppressedByDesign, Unsuppressed};
+    let stuck = Condition::NoChange { lasts: Duration::from_secs(60), deadband: 0.1 };
+    let when = |enabled| move |_: &AlarmDef| Facts { value: Some(20.0.into()), enabled, ..Facts::default() };
+    let suppressed_then_unknown = [
+        (0, Some(false), vec![SuppressedByDesign]),
+        (10, None, vec![]),
+        (69, None, vec![]),
+        (70, Some(true), vec![Unsuppressed]),
+        (129, Some(true), vec![]),
+        (130, Some(true), vec![Raised]),
+    ];
+    let unknown_then_disabled_unacknowledged = [
+        (0, None, vec![]),
+        (60, None, vec![Raised]),
+        (61, Some(false), vec![ReturnedToNormal]),
+        (62, Some(true), vec![]),
+        (121, Some(true), vec![]),
+        (122, Some(true), vec![Raised]),
+    ];
+    for steps in [suppressed_then_unknown, unknown_then_disabled_unacknowledged] {
+        let mut manager = AlarmManager::new(enabled_by_design(|alarm| alarm.condition = stuck));
+        for (second, enabled, expect) in steps {
+            assert_eq!(events(&manager.evaluate(at(second), when(enabled))), expect, "at {second} s");
+        }
+    }
+}
