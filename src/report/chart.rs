@@ -224,6 +224,16 @@ mod tests {
     }
 
     #[test]
+    fn times_up_to_36_hours_and_dates_beyond_are_written() {
+        let from = at("2026-11-21T06:00+07");
+        for (hours, form) in [(1, "%H:%M"), (36, "%H:%M"), (37, "%m-%d")] {
+            let to = from + jiff::SignedDuration::from_hours(hours);
+            let chart = Chart { title: "TIC-1".into(), from, to, curves: Vec::new() };
+            assert_eq!(chart.tick_form(), form, "{hours} h");
+        }
+    }
+
+    #[test]
     fn curves_of_one_unit_share_a_panel_and_a_gap_stays_open() {
         let (from, to) = (at("2026-11-21T06:00+07"), at("2026-11-21T14:00+07"));
         let values = [Some(20.0), Some(21.0), None, Some(25.0)];

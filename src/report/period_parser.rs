@@ -228,6 +228,8 @@ mod tests {
         let def = plant("Asia/Bangkok", &THREE);
         for (text, expect) in [
             ("03:12", Ok("2026-11-21T03:12+07")),
+            ("09:00", Ok(NOW)),
+            ("2026-11-21T09:00", Ok(NOW)),
             ("09:00:01", Ok("2026-11-20T09:00:01+07")),
             ("2026-11-20 22:15", Ok("2026-11-20T22:15+07")),
             ("2026-11-20T22:15Z", Ok("2026-11-20T22:15Z")),
@@ -314,6 +316,7 @@ mod tests {
             ((Some("night@2026-11-21"), None, None), "night 2026-11-21 has not started yet"),
             ((None, Some("six"), None), "`six` is not a time: expected local 2026-11-21T06:00"),
             ((None, Some("2026-11-20T06:00+banana"), None), "is not a time"),
+            ((None, Some("2026-11-20T06:00[Europe/Berlin]"), None), "is not a time"),
             ((None, Some("2026-11-21T08:00"), Some("2026-11-21T07:00")), "the period is empty"),
             ((None, Some("2026-11-22"), Some("2026-11-23")), "period has not started yet"),
             ((None, None, Some("2026-11-22")), "--to needs --from"),

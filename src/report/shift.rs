@@ -140,6 +140,15 @@ mod tests {
     }
 
     #[test]
+    fn the_starts_of_dates_are_those_of_first_and_last_too() {
+        let def = plant("Asia/Bangkok", &THREE);
+        let starts = starts_between(&def, civil::date(2026, 11, 20), civil::date(2026, 11, 21));
+        let starts: Vec<_> = starts.iter().map(|start| (start.date.day(), start.name)).collect();
+        let expect = [20, 21].map(|day| THREE.map(|(name, ..)| (day, name))).concat();
+        assert_eq!(starts, expect);
+    }
+
+    #[test]
     fn the_list_of_shifts_is_unbroken_and_newest_first() {
         let def = plant("Asia/Bangkok", &THREE);
         let list = recent(&def, at("2026-11-21T09:00+07"), 4);

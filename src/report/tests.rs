@@ -1,7 +1,7 @@
 //! Every format of the same report: the same file each time, in every language, with nothing that runs.
 
 use super::{
-    FORMATS, ReportFormat, Style, TagFigures,
+    FORMATS, ReportFormat, ShiftReport, Style, TagFigures,
     content::document,
     document::{Cell, Content, Document},
     testing::{THREE, plant, shift_report},
@@ -150,7 +150,7 @@ fn a_page_of_text_is_never_wider_than_80_columns() {
 fn records_that_wait_for_the_disk_are_said_to_be_missing() {
     let rows = |unstored| {
         let def = plant("Asia/Bangkok", &THREE);
-        let report = crate::report::ShiftReport { unstored, ..shift_report() };
+        let report = ShiftReport { unstored, ..shift_report() };
         let document = document(&report, &def, Language::ENGLISH.locale());
         let format = super::format("text").expect("a format");
         let text =
@@ -160,6 +160,46 @@ fn records_that_wait_for_the_disk_are_said_to_be_missing() {
     assert!(rows(Some(0)).is_empty());
     for (unstored, ends) in [(Some(7), " 7"), (None, " ?")] {
         assert!(rows(unstored).iter().any(|row| row.ends_with(ends)), "{:?}", rows(unstored));
+    }
+}
+
+/// The value of a fact of the summary.
+fn fact(report: &ShiftReport, id: &str) -> Option<Cell> {
+    let made = document(report, &plant("Asia/Bangkok", &THREE), Locale::ENGLISH);
+    let facts = made.sections.into_iter().filter_map(|section| match section.content {
+        Content::Facts(facts) => Some(facts),
+        Content::Table(_) | Content::Charts(_) | Content::Signatures(_) => None,
+    });
+    facts.flatten().find(|fact| fact.id == id).map(|fact| fact.cell)
+}
+
+#[test]
+fn only_the_summary_of_a_running_period_says_until_when() {
+    let running = shift_report();
+    let over = ShiftReport { until: running.period.to, ..shift_report() };
+    let until = |report| fact(report, "still running, figures until");
+    assert_eq!((until(&running), until(&over)), (Some(Cell::Time(running.until)), None));
+}
+
+#[test]
+fn the_share_of_good_values_is_the_mean_of_all_tags() {
+    let tags = shift_report().tags;
+    for (count, share) in [(0, None), (1, Some(99.9)), (2, Some(49.9))] {
+        let report = ShiftReport { tags: tags[..count].to_vec(), ..shift_report() };
+        assert_eq!(fact(&report, "good values %"), Some(Cell::number(share, 1)), "{count} tags");
+    }
+}
+
+#[test]
+fn only_the_same_tag_in_the_same_unit_is_compared() {
+    for (tag, unit, expect) in [("TIC-1.PV", "°C", Some(50.0)), ("TIC-1.PV", "°F", None), ("TIC-1.SV", "°C", None)] {
+        let mut report = shift_report();
+        let before = &mut report.compared[0].tags[0];
+        (before.tag, before.unit) = (tag.into(), unit.into());
+        let made = document(&report, &plant("Asia/Bangkok", &THREE), Locale::ENGLISH);
+        let comparison = made.sections.iter().find(|section| section.kind == Section::Comparison);
+        let Some(Content::Table(table)) = comparison.map(|section| &section.content) else { panic!("no comparison") };
+        assert_eq!(table.rows[0][4], Cell::number(expect, 2), "{tag} {unit}");
     }
 }
 
@@ -259,6 +299,27 @@ fn what_lies_outside_of_the_period_has_its_date_and_offset() {
     assert_eq!(berlin.fact(&Cell::Time(at("2026-07-01T00:00Z"))), "2026-07-01 02:00:00 UTC+02:00");
 }
 
+/// A part of a workbook.
+fn part_of(book: &[u8], name: &str) -> String {
+    let mut book = zip::ZipArchive::new(std::io::Cursor::new(book)).expect("a workbook");
+    let mut text = String::new();
+    std::io::Read::read_to_string(&mut book.by_name(name).expect("a part"), &mut text).expect("text");
+    text
+}
+
+#[test]
+fn a_chart_of_a_workbook_has_dates_beyond_36_hours() {
+    let def = plant("Asia/Bangkok", &THREE);
+    for (hours, form) in [(36, "hh:mm"), (37, "mm-dd")] {
+        let mut report = shift_report();
+        report.charts[0].to = report.charts[0].from + jiff::SignedDuration::from_hours(hours);
+        let made = document(&report, &def, Locale::ENGLISH);
+        let bytes = super::format("xlsx").expect("a format").render(&made, &Style::of(&def)).expect("it can be made");
+        let chart = part_of(&bytes, "xl/charts/chart1.xml");
+        assert!(chart.contains(&format!("formatCode=\"{form}\"")), "{hours} h: {chart}");
+    }
+}
+
 /// The numbers of a column of a sheet, from the second row on.
 fn column(sheet: &str, letter: char) -> Vec<f64> {
     let cells = (2..).map_while(|row| sheet.split_once(&format!("<c r=\"{letter}{row}\"")));
@@ -270,8 +331,6 @@ fn column(sheet: &str, letter: char) -> Vec<f64> {
 
 #[test]
 fn a_chart_over_a_change_of_the_clocks_runs_forward() {
-    use std::io::Read;
-
     use super::{
         chart::{Chart, ChartCurve},
         curve::Bucket,
@@ -291,12 +350,7 @@ fn a_chart_over_a_change_of_the_clocks_runs_forward() {
     let night = Document { from, until: to, times, zone: berlin, sections: vec![section], ..made };
     let def = plant("Europe/Berlin", &THREE);
     let bytes = super::format("xlsx").expect("a format").render(&night, &Style::of(&def)).expect("it can be made");
-    let mut book = zip::ZipArchive::new(std::io::Cursor::new(bytes)).expect("a workbook");
-    let mut part = |name: &str| {
-        let mut text = String::new();
-        book.by_name(name).expect("a part").read_to_string(&mut text).expect("text");
-        text
-    };
+    let part = |name| part_of(&bytes, name);
     let sheet = part("xl/worksheets/sheet2.xml");
     let instants = column(&sheet, 'A');
     assert!(instants.len() == 12 && instants.is_sorted_by(|one, other| one < other), "{instants:?}");

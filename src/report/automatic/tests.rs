@@ -238,6 +238,27 @@ fn a_file_is_deleted_when_its_time_is_over() {
 }
 
 #[test]
+fn a_report_belongs_to_the_rule_of_its_period_and_format() {
+    use PeriodKind::{Day, Shift, Week};
+    let def = def(vec![rule(Day, &["csv", "text"]), rule(Shift, &["text"]), rule(Shift, &["csv"])]);
+    let now = at("2026-11-20T12:00+07");
+    let period = calendar::period_at(&def, Day, now).expect("a day");
+    for (kind, format, expect) in [
+        (Day, "csv", Some(0)),
+        (Day, "text", Some(0)),
+        (Shift, "text", Some(1)),
+        (Shift, "csv", Some(2)),
+        (Day, "pdf", None),
+        (Week, "csv", None),
+    ] {
+        let due = Due { rule: &def.report.automatic[0], period: period.clone(), format };
+        let report = ReportRecord { period: kind, ..made(&due, now) };
+        let expect = expect.map(|place: usize| &def.report.automatic[place]);
+        assert_eq!(rule_of(&def, &report), expect, "{kind:?} {format}");
+    }
+}
+
+#[test]
 fn placeholders_are_filled_once() {
     let def = def(vec![rule(PeriodKind::Day, &["csv"])]);
     let since = at("2026-11-20T00:00+07");

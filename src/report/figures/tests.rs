@@ -101,6 +101,9 @@ fn an_alarm_active_while_suppressed_is_listed_with_its_time() {
         // Shelved while it was active, and active again after that.
         (None, None, vec![(10, Raised), (20, Shelved), (25, Acknowledged), (70, ReturnedToNormal)], Some((0, 50))),
         (None, None, vec![(10, RaisedSuppressed), (20, Unsuppressed), (20, Raised)], Some((1, 10))),
+        // Off the shelf it counts no more. Gone in the instant in which it came, it came all the same.
+        (None, None, vec![(10, Raised), (20, Shelved), (50, Unshelved), (70, ReturnedToNormal)], Some((0, 30))),
+        (None, None, vec![(10, RaisedSuppressed), (10, ReturnedSuppressed)], Some((1, 0))),
         // Active before the period: annunciated, or not.
         (Some(Raised), None, vec![(40, ReturnedToNormal)], None),
         (Some(Raised), Some(Shelved), vec![(40, ReturnedToNormal)], Some((0, 40))),
@@ -192,6 +195,7 @@ fn grid(zone_name: &str, interval: u64, from: &str, until: &str) -> Vec<String> 
 
 #[test]
 fn the_grid_follows_the_local_clock_over_its_changes() {
+    assert_eq!(grid("UTC", 0, "2026-01-01T00:00Z", "2026-01-01T01:00Z"), [""; 0], "no interval, no grid");
     // A half-hour zone: the grid is local, not UTC.
     assert_eq!(
         grid("Asia/Kolkata", 3600, "2026-01-01T00:10+05:30", "2026-01-01T02:10+05:30"),

@@ -298,11 +298,30 @@ mod tests {
     }
 
     #[test]
+    fn a_hundred_problems_are_kept_in_words_and_all_are_counted() {
+        for damage in ["2026-11-23T14:00:00.000Z,7x,good\n", "2026-11-23T14:00:00.000Z,7\n"] {
+            let text = format!("time_utc,SV,SV quality\n{}", damage.repeat(150));
+            let log = parse(text.as_bytes()).expect("a log");
+            assert_eq!((log.problems.len(), log.damaged), (100, 150), "{damage}");
+        }
+    }
+
+    #[test]
+    fn a_float_has_no_more_decimals_than_a_screen_shows() {
+        for (value, decimals) in [("0.123456", 5), ("1234.56789", 2), ("-1234.56789", 2), ("1234567.89", 0)] {
+            let text = format!("time_utc,SV,SV quality\n2026-11-23T14:00:00.000Z,{value},good\n");
+            assert_eq!(parse(text.as_bytes()).expect("a log").columns[0].decimals, decimals, "{value}");
+        }
+    }
+
+    #[test]
     fn what_is_no_log_is_said() {
         for (text, expect) in [
             ("", "line 1: found ``"),
             ("a,b\n1,2\n", "found `a,b`, expected time_utc"),
             ("time,SV\n", "found `time,SV`"),
+            ("time_utc\n", "found `time_utc`"),
+            ("a,SV,SV quality\n1,2,good\n", "found `a,SV,SV quality`"),
         ] {
             assert!(parse(text.as_bytes()).is_err_and(|why| why.contains(expect)), "{text}");
         }
