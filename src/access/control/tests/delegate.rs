@@ -76,3 +76,47 @@ fn requests_are_never_locked_and_take_no_place_of_a_terminal() {
     }
     assert_eq!(bench.who(MES).as_deref(), Some("tech"));
 }
+
+/// The terminals that are sent away.
+fn sent_away(effects: &[Effect]) -> Vec<(u32, SessionEnd)> {
+    let gone = effects.iter().filter_map(|effect| match effect {
+        Effect::HangUp(terminal, why) => Some((*terminal, why.clone())),
+        _ => None,
+    });
+    gone.collect()
+}
+
+#[test]
+fn another_plant_sends_away_terminals_and_requests_unless_kept() {
+    for (keep, gone) in [(true, &[1][..]), (false, &[1, MES])] {
+        let mut bench = bench("tech", AccessDef::default());
+        bench.open(1, "here");
+        let effects = bench.access.redefine(bench.access.def.clone(), 2, keep, bench.now);
+        let expect: Vec<_> = gone.iter().map(|terminal| (*terminal, SessionEnd::PlantReloaded)).collect();
+        assert_eq!(sent_away(&effects), expect, "kept: {keep}");
+    }
+}
+
+#[test]
+fn users_changed_by_hand_are_taken_if_nothing_changed_here() {
+    let mut bench = bench("tech", AccessDef::default());
+    bench.open(1, "here");
+    bench.login(1, "boss", BOSS).unwrap();
+    let own = bench.access.users.clone().unwrap();
+    let before = own.digest();
+    let users = own.with(&UserChange::Disable("tech".into(), true)).unwrap();
+    assert_eq!(bench.access.take_users(Some("another"), users.clone(), bench.now), None, "changed here");
+    assert_eq!(bench.access.take_users(Some(&before), own, bench.now), None, "the same users");
+    let saving = bench.access.tick(bench.now);
+    assert!(matches!(&saving[..], [Effect::Save(_)]));
+    assert_eq!(bench.access.take_users(Some(&before), users.clone(), bench.now), None, "a change is being saved");
+    bench.access.on_saved(Ok(()), bench.now);
+    let effects = bench.access.take_users(Some(&before), users, bench.now).unwrap();
+    assert_eq!(sent_away(&effects), [(1, SessionEnd::UsersReloaded)]);
+    assert!(
+        refused(&mut bench, RUN).is_some_and(|why| why.contains("is disabled")),
+        "requests stay, with the rights of now"
+    );
+    let mut without = Bench::of(AccessControl::new(bench.access.def.clone(), None));
+    assert_eq!(without.access.take_users(None, Users::default(), without.now), None, "in a demonstration");
+}

@@ -40,3 +40,24 @@ fn a_long_idle_anonymous_session_makes_room() {
     assert_eq!(bench.comes(5, "panel"), [5]);
     assert_eq!(bench.who(1).as_deref(), Some("tech"));
 }
+
+#[test]
+fn the_stations_own_terminal_comes_and_goes_without_an_entry() {
+    let mut bench = Bench::new(AccessDef::default());
+    let entries = |effects: Vec<Effect>| effects.iter().filter(|effect| matches!(effect, Effect::Record(_))).count();
+    for (in_process, expect) in [(true, 0), (false, 1)] {
+        let peer = Peer { from: "pts/1".into(), unix_user: Some("panel".into()), in_process };
+        let comes = entries(bench.access.open(1, peer, bench.now));
+        assert_eq!((comes, entries(bench.access.close(1, bench.now))), (expect, expect));
+    }
+}
+
+#[test]
+fn who_finds_no_seat_learns_whose_terminals_have_them() {
+    for (user, words) in [
+        (Some("script"), "4 terminals of script are attached, no more may be"),
+        (None, "4 terminals are attached, no more may be"),
+    ] {
+        assert_eq!(SessionEnd::TooMany { count: 4, user: user.map(str::to_owned) }.to_string(), words);
+    }
+}

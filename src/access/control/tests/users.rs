@@ -145,3 +145,12 @@ fn a_session_is_shown_at_its_terminal_and_to_supervisors() {
     assert_eq!(published(&bench.access.on_request(1, 71, SessionRequest::Lock, bench.now)), [1], "once");
     assert_eq!(published(&bench.open(3, "10.0.0.3")), [3], "a locked terminal has no list");
 }
+
+#[test]
+fn a_damaged_users_file_closes_the_login_and_says_why() {
+    let damaged = "line 3: no such role";
+    let mut bench = Bench::of(AccessControl::closed(Arc::new(fixture::plant()), damaged, Some("sight".into())));
+    bench.open(1, "10.0.0.1");
+    let why = RequestRefusal::LoginDisabled(damaged.to_owned()).to_string();
+    assert_eq!((bench.login(1, "boss", BOSS), bench.access.users_digest()), (Err(why), None));
+}
