@@ -275,3 +275,66 @@ impl Health {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quick_answers_do_not_shorten_the_wait_for_the_slowest() {
+        let millis = Duration::from_millis;
+        let mut health = Health::new(DeviceId(0), Timestamp::UNIX_EPOCH);
+        assert_eq!(health.slowest(), None);
+        for time in [40, 300, 40, 120] {
+            health.answered(Some(millis(time)));
+        }
+        health.answered(None);
+        assert_eq!(health.slowest(), Some(millis(300)));
+    }
+
+    fn at(millis: i64) -> Timestamp {
+        Timestamp::UNIX_EPOCH + jiff::SignedDuration::from_millis(millis)
+    }
+
+    /// A request that was sent so long before it failed.
+    fn fails(health: &mut Health, failure: Failure, millis: i64) {
+        let times = Failed { sent: at(millis - 10), spent: Duration::from_millis(10), now: at(millis) };
+        health.failed(failure, times, 1, true);
+    }
+
+    #[test]
+    fn a_quick_device_that_fails_has_the_whole_timeout_now_and_then() {
+        let mut health = Health::new(DeviceId(0), at(0));
+        (0..ANSWERS_MIN).for_each(|_| drop(health.answered(Some(Duration::from_millis(10)))));
+        let waits = (1..=8).map(|number| {
+            let waits = health.response_timeout(Patience::default(), || None).as_millis();
+            fails(&mut health, Failure::Silence, 1_000 * number);
+            waits
+        });
+        assert_eq!(waits.collect::<Vec<_>>(), [100, 100, 100, 1_000, 100, 100, 100, 1_000]);
+    }
+
+    #[test]
+    fn one_that_has_answered_late_is_not_taken_for_its_neighbour() {
+        let mut health = Health::new(DeviceId(0), at(0));
+        let waits = |health: &Health| {
+            health.response_timeout(Patience::default(), || Some(Duration::from_millis(50))).as_millis()
+        };
+        assert_eq!(waits(&health), 1_000, "it has never been asked");
+        fails(&mut health, Failure::Silence, 1_000);
+        assert_eq!(waits(&health), 200);
+        health.answered_late(at(1_500));
+        fails(&mut health, Failure::Silence, 3_000);
+        assert_eq!(waits(&health), 1_000);
+    }
+
+    #[test]
+    fn doubts_of_one_cause_count_once() {
+        let mut health = Health::new(DeviceId(0), at(0));
+        let failures = [1_000, 1_500, 1_900, 2_000].map(|millis| {
+            fails(&mut health, Failure::Doubt, millis);
+            health.failures()
+        });
+        assert_eq!(failures, [1, 1, 1, 2]);
+    }
+}
