@@ -119,3 +119,18 @@ fn mbap(bytes: &[u8], asked: Option<&[u8]>) -> Cut {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_frame_is_waited_for_that_would_be_too_long() {
+        let begin = |count: u8| [&[1, 3, count][..], &[0x11; 7]].concat();
+        let cut_rtu = |count: u8| cut(Framing::Rtu, &begin(count), None, false);
+        assert_eq!((cut_rtu(250), cut_rtu(252)), (Cut::Wait, Cut::Noise), "255 and 257 bytes");
+        let digits = |count: usize| [&b":"[..], &vec![b'0'; count - 1]].concat();
+        let cut_ascii = |count: usize| cut(Framing::Ascii, &digits(count), None, false);
+        assert_eq!((cut_ascii(ascii::FRAME_MAX - 1), cut_ascii(ascii::FRAME_MAX)), (Cut::Wait, Cut::Noise));
+    }
+}

@@ -359,6 +359,7 @@ mod tests {
         let came = [&[0x55], &answer[..], &[0x33]].concat();
         assert_eq!(reply(Framing::Rtu, &request, &came), Ok((1..8, None)));
         assert!(find_reply(Framing::Rtu, &request, &came, false).is_err());
+        assert!(reply(Framing::Rtu, &request, &with_crc(&[2, 0x41, 1, 2, 3])).is_err(), "another unit");
         assert_eq!(reply(Framing::Rtu, &request, &with_crc(&[1, 0xC1, 1])), Ok((0..5, Some(1))));
     }
 
@@ -371,7 +372,9 @@ mod tests {
         // It announces more than comes: only silence shows that this was all.
         let bytes = with_crc(&[1, 3, 74, 0, 10, 0, 11]);
         check(&bytes, FrameMatch::Begun);
-        assert_eq!(left_over(Framing::Rtu, &REQUEST, &bytes), Fault::WrongLength { got: 74, asked: 4 });
+        let wrong = Fault::WrongLength { got: 74, asked: 4 };
+        assert_eq!(left_over(Framing::Rtu, &REQUEST, &bytes), wrong);
+        assert_eq!(reply(Framing::Rtu, &with_crc(&REQUEST), &bytes), Err(wrong), "no silence makes an answer of it");
     }
 
     #[test]

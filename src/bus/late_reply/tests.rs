@@ -106,3 +106,15 @@ fn silence_is_tried_late_where_an_answer_has_proved_enough() {
     assert!(!tried(&mut replies, 8).contains(&Proof::Silence), "it has only been silent for a while");
     assert!(tried(&mut replies, 3).contains(&Proof::Silence), "it may be another device");
 }
+
+#[test]
+fn what_came_late_before_a_proof_has_overtaken_nothing() {
+    let s = Duration::from_secs;
+    let mut replies = LineReplies::new(s(1), 0);
+    let (request, probe) = ([1, 3, 0, 0, 0, 2], [1, 3, 0, 0, 0, 1]);
+    replies.failed(&request, s(100));
+    let late = [1, 3, 4, 0, 1, 0, 2];
+    assert!(!replies.detect_reordering(1, &late, s(101)) && replies.on_late_reply(1, &late, s(101)));
+    replies.answered(&probe, &[1, 3, 2, 0, 1], true, s(102));
+    assert!(!replies.detect_reordering(1, &[1, 3, 4, 0, 9, 0, 9], s(103)), "nothing is missing that it could be");
+}
