@@ -190,3 +190,34 @@ impl Order {
 fn mean(known: Option<Duration>, time: Duration) -> Duration {
     known.map_or(time, |known| (known * 7 + time) / 8)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FIRST: &[u8] = &[1, 3, 0, 10, 0, 2];
+    const SECOND: &[u8] = &[1, 3, 0, 20, 0, 2];
+    const NEXT: &[u8] = &[1, 3, 0, 30, 0, 1];
+
+    #[test]
+    fn requests_before_another_are_compared_by_how_often_they_are() {
+        let mut order = Order::default();
+        for (request, times) in [(FIRST, 4), (SECOND, 2)] {
+            for _ in 0..times {
+                order.ask(&key(request));
+                order.follow(&key(request), &key(NEXT), Duration::from_millis(50));
+            }
+        }
+        let before = |request: &[u8]| order.others_before(&key(request), &key(NEXT), &[1, 3, 4, 0, 1, 0, 2]);
+        assert_eq!((before(FIRST), before(SECOND), before(NEXT)), (0.5, 2.0, f64::INFINITY));
+    }
+
+    #[test]
+    fn a_wait_without_response_is_usual_once_it_was_so_long() {
+        let millis = Duration::from_millis;
+        let mut order = Order::default();
+        order.ask(&key(FIRST));
+        let gives_up = [500, 500, 900, 510].map(|waited| order.gives_up(&key(FIRST), millis(waited), millis(20)));
+        assert_eq!(gives_up, [false, true, false, true]);
+    }
+}

@@ -80,6 +80,8 @@ fn requests_and_responses_are_distinguished_and_paired() {
         let listener = check_messages(framing, exchanges, "1→ 1← 1→ 1← 2→ 2← 2→ 2← 1→ 1←");
         let unit = &listener.units()[&1];
         assert_eq!((unit.requests, unit.ok, unit.response_time.max()), (3, 3, Some(Duration::from_millis(15))));
+        let totals = listener.totals();
+        assert_eq!((totals.requests, totals.responses, totals.unmatched), (5, 5, 0), "{framing:?}");
         let refused: u64 = listener.units()[&2].exceptions.iter().map(|(_, count)| count).sum();
         assert_eq!((refused, listener.totals().noise_bytes), (1, 0));
     }

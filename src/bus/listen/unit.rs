@@ -266,3 +266,43 @@ impl Least {
         self.windows.iter().flatten().min().copied().filter(|_| known)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(millis: i64) -> Timestamp {
+        Timestamp::UNIX_EPOCH + jiff::SignedDuration::from_millis(millis)
+    }
+
+    #[test]
+    fn a_response_may_belong_to_any_request_that_is_owed_one() {
+        let [first, second] = [[1, 3, 0, 10, 0, 2], [1, 3, 0, 20, 0, 2]];
+        let response = [1, 3, 4, 0, 1, 0, 2];
+        let mut unit = Unit::new(at(0));
+        assert!(!unit.owes_another(&second, &response));
+        unit.owe(&first);
+        assert!(unit.owes_another(&second, &response) && !unit.owes_another(&first, &response));
+        assert!(!unit.owes_unknown());
+        for place in 0..2 * OWED_MAX as u8 {
+            unit.owe(&[1, 3, 1, place, 0, 2]);
+        }
+        assert!(unit.owes_unknown() && unit.owed.len() == OWED_MAX);
+    }
+
+    #[test]
+    fn usual_times_to_a_response_lie_around_their_mean() {
+        let mut unit = Unit::new(at(0));
+        let mut answer = |number: i64, time: i64| {
+            let asked_at = at(1_000 * number);
+            unit.ask(asked_at, None, Duration::from_secs(60));
+            unit.answer(asked_at, asked_at + Duration::from_millis(time as u64), at(1_000 * number + 50), true, 1e-6);
+            unit.longest()
+        };
+        for number in 0..100 {
+            let longest = answer(number, 20 + 4 * (number % 2));
+            assert_eq!(longest.is_some(), TIMES_MIN <= number as u32 + 1, "{number}");
+            assert!(longest.is_none_or(|longest| (25..35).contains(&longest.as_millis())), "{number}: {longest:?}");
+        }
+    }
+}
