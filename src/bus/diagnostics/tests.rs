@@ -341,3 +341,8 @@ fn the_outcome_of_a_test_counts_its_requests_and_errors() {
     assert_eq!(put_back.outcome_text(), "passed: RTS was set and put back; no input changed with it");
     assert!(with_signals(test, |_| Ok(0x004)).outcome_text().starts_with("failed: the port did not set RTS"));
 }
+
+#[test]
+fn what_cannot_be_printed_of_a_device_is_in_hexadecimal() {
+    assert_eq!(text_of(b"PXR ~\x7F\x1F\xB0"), "PXR ~\\x7F\\x1F\\xB0");
+}

@@ -1,7 +1,9 @@
 //! Sweeps of a unit that is a function from a span to an outcome.
 
+use jiff::Timestamp;
+
 use super::*;
-use crate::plant::tag::Table;
+use crate::plant::{command::CommandId, diagnostics::Diagnostic, number::to_u8, tag::Table};
 
 const REFUSED: Result<(), Fault> = Err(Fault::Exception(ExceptionCode::ILLEGAL_ADDRESS));
 
@@ -126,4 +128,33 @@ fn a_refused_range_has_the_reason_of_a_single_address() {
     let (job, _) = run(sweep(0, 999, 8), unit);
     let refused = SweptOutcome::Refused(ExceptionCode::ILLEGAL_ADDRESS);
     assert_eq!(job.ranges(), [SweptRange { first: 0, last: 999, outcome: refused }]);
+}
+
+#[test]
+fn an_address_behind_the_last_whole_block_is_asked_too() {
+    let (job, requests) = run(sweep(0, 120, 8), |_, _| Ok(()));
+    assert_eq!((answering(&job), requests, job.done()), (vec![(0, 120)], 2, 121));
+}
+
+#[test]
+fn where_every_address_is_asked_each_one_missing_is_a_hole() {
+    let mut job = Job::new(
+        CommandId { terminal: 1, number: 1 },
+        "anna".into(),
+        Diagnostic::Sweep(sweep(0, 9, 1)),
+        Timestamp::UNIX_EPOCH,
+    );
+    let unit = has(&[3..5]);
+    while let Some(step) = job.next().cloned() {
+        let Ask::Message(request) = &step.ask else { panic!("a sweep only reads") };
+        let word = |at: usize| u16::from_be_bytes([request[at], request[at + 1]]);
+        let span = AddressSpan { table: Table::Holding, address: word(2), count: word(4) };
+        let bytes = to_u8(2 * span.count);
+        let answer = [vec![1, 3, bytes], vec![0; bytes.into()]].concat();
+        job.on_swept(&step, unit(span, 0).map(|()| answer));
+    }
+    let (unit, holes) = job.take_holes().expect("a sweep");
+    let holes: Vec<u16> = holes.iter().map(|span| span.address).collect();
+    assert_eq!((unit, holes), (1, vec![0, 1, 2, 5, 6, 7, 8, 9]));
+    assert_eq!(job.take_holes(), Some((1, vec![])), "each is told once");
 }
