@@ -116,6 +116,7 @@ mod tests {
         assert_eq!(short(700.0, 11), "700");
         assert_eq!(short(104.69, 11), "104.69");
         assert_eq!(short(1.0 / 3.0, 6), "0.3333");
+        assert_eq!(short(1.0 / 3.0, 11), "0.333333", "never more than six decimals");
         assert_eq!(short(2.75e-37, 8), "2.75e-37");
         let counter = number(DataType::U64, ByteOrder::Abcd, &[0xFFFF; 4]).expect("a number");
         assert_eq!((short(counter, 20).as_str(), short(counter, 8).as_str()), ("18446744073709551615", "1.845e19"));

@@ -211,7 +211,11 @@ mod tests {
 
     use super::*;
     use crate::{
-        plant::{Plant, event::Event},
+        plant::{
+            Plant,
+            event::Event,
+            tag::{ByteOrder, DataType},
+        },
         profile::{self, Search},
     };
 
@@ -287,5 +291,15 @@ mod tests {
         assert_eq!(answer(&[1, 3, 4, 0, 50, 0, 1]), read);
         assert_eq!(answer(&[1, 0x83, 2]), [""; 0], "a refusal holds nothing");
         assert_eq!(answer(&[1, 3, 2, 0, 50]), ["reads TIC-1.SV, TIC-1.STBY"], "a short answer holds no values");
+    }
+
+    #[test]
+    fn of_addresses_that_hold_32_bits_each_has_its_own_two_words() {
+        let words = Some(vec![1, 2, 3, 4, 5, 6]);
+        let span = Span { table: Table::Holding, address: 100, count: 3, words, address_words: 2, writes: false };
+        let point = |address, kind| Point { table: Table::Holding, address, kind, order: ByteOrder::Abcd, field: None };
+        assert_eq!(span.words_of(point(101, DataType::EnronU32)), Some(&[3, 4][..]));
+        assert_eq!(span.words_of(point(103, DataType::EnronU32)), None);
+        assert_eq!(span.words_of(point(101, DataType::U32)), None, "it would be two addresses");
     }
 }

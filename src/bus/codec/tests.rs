@@ -294,7 +294,8 @@ fn a_part_is_modified_in_any_register_of_a_word() {
     let words = modified(high, &[0x1234, 0xABCD], 5.0).expect("it fits");
     assert_eq!(words, [0x1234, 0xAB5D]);
     assert_eq!(decode(high, &words), Some(5.0.into()));
-    assert_eq!(modified(high, &[0x1234, 0xABCD], 16.0), None, "four bits hold 0 to 15");
+    assert!(modified(high, &[0x1234, 0xABCD], 15.0).is_some(), "four bits hold 0 to 15");
+    assert_eq!(modified(high, &[0x1234, 0xABCD], 16.0), None);
     assert_eq!(modified(high, &[0x1234], 5.0), None, "too few registers");
     assert_eq!(modified(point(DataType::I8, ByteOrder::Badc), &[0x1234], -1.0), Some(vec![0xFF34]));
     assert_eq!(modified(point(DataType::U16, ByteOrder::Abcd), &[0x1234], 1.0), None, "it is the whole register");
