@@ -189,4 +189,16 @@ mod tests {
         hangups.on_answers(2);
         assert_eq!(hangups.answers_max(), None, "it allows more now");
     }
+
+    #[test]
+    fn a_host_that_gives_many_answers_allows_as_many_as_it_likes() {
+        let allowed_after = |answers| {
+            let mut hangups = Hangups::default();
+            for _ in 0..3 {
+                hangups.on_end(&[], answers);
+            }
+            hangups.answers_max()
+        };
+        assert_eq!([0, FEW, FEW + 1].map(allowed_after), [None, Some(FEW), None]);
+    }
 }

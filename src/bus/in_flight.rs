@@ -102,4 +102,13 @@ mod tests {
         assert_eq!(in_flight.step_down(1, 16), 8);
         assert_eq!((in_flight.step_down(1, 8), in_flight.found(1), in_flight.found(2)), (4, Some(4), None));
     }
+
+    #[test]
+    fn what_was_found_earlier_holds_and_is_never_none_at_all() {
+        let mut in_flight = InFlight::default();
+        in_flight.recall(1, DeviceFinding::InFlight { most: 3, stated: 8 });
+        in_flight.recall(2, DeviceFinding::InFlight { most: 0, stated: 8 });
+        assert_eq!([1, 2, 3].map(|unit| in_flight.found(unit)), [Some(3), Some(1), None]);
+        assert_eq!([1, 2, 3].map(|unit| in_flight.limit(unit, 8)), [3, 1, 8]);
+    }
 }
