@@ -218,6 +218,7 @@ mod tests {
             ],
         );
         says(&[1, 3, 0, 0], &["4 bytes of unit and PDU, function 3 / 0x03 has 6"]);
+        says(&[1, 0x10, 0, 1, 0, 2], &["6 bytes of unit and PDU, function 16 / 0x10 has 7"]);
         says(&[1], &["1 byte, expected unit and function at least"]);
         says(&[1, 0x83, 2], &["function 131 / 0x83 is an exception, not a request"]);
         says(&[1, 0x41, 2], &["function 65 / 0x41 is not in the standard"]);

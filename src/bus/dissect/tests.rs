@@ -176,6 +176,9 @@ fn broken_frames_say_what_is_wrong_and_what_it_should_be() {
     assert_eq!(wrong(&[1, 3, 3, 0xEA, 0, 1, 0xA5, 0xBB]), "CRC error: got A5 BB, computed A5 BA");
     assert_eq!(wrong(b":010303EA00010F\r\n"), "LRC error: got 0F, computed 0E");
     assert_eq!(wrong(b":010303EA00010E"), "CR LF missing at the end");
+    let end = |bytes: &[u8]| dissect(bytes, None, None, None).fields.last().map(|field| field.words.clone());
+    assert_eq!(end(b":010303EA00010E\r\n").as_deref(), Some("CR LF"));
+    assert_eq!(end(b":010303EA00010E\n").as_deref(), Some("must be CR LF"));
     assert_eq!(wrong(b":01G303EA00010E\r\n"), "`G` at character 4 is not a hex digit");
     assert_eq!(wrong(&[1, 3, 3, 0xEA, 0]), "cut short: 1 byte of count missing");
     assert_eq!(wrong(&[1, 3, 4, 0, 1]), "cut short: 2 bytes of register 2 missing");
