@@ -305,7 +305,9 @@ mod tests {
     #[test]
     fn a_quick_device_that_fails_has_the_whole_timeout_now_and_then() {
         let mut health = Health::new(DeviceId(0), at(0));
-        (0..ANSWERS_MIN).for_each(|_| drop(health.answered(Some(Duration::from_millis(10)))));
+        for _ in 0..ANSWERS_MIN {
+            health.answered(Some(Duration::from_millis(10)));
+        }
         let waits = (1..=8).map(|number| {
             let waits = health.response_timeout(Patience::default(), || None).as_millis();
             fails(&mut health, Failure::Silence, 1_000 * number);

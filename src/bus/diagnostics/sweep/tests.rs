@@ -144,7 +144,7 @@ fn where_every_address_is_asked_each_one_missing_is_a_hole() {
         Diagnostic::Sweep(sweep(0, 9, 1)),
         Timestamp::UNIX_EPOCH,
     );
-    let unit = has(&[3..5]);
+    let unit = has(std::slice::from_ref(&(3..5)));
     while let Some(step) = job.next().cloned() {
         let Ask::Message(request) = &step.ask else { panic!("a sweep only reads") };
         let word = |at: usize| u16::from_be_bytes([request[at], request[at + 1]]);
