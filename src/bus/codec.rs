@@ -58,12 +58,12 @@ fn whole(kind: DataType, bits: u64) -> Option<i128> {
     (kind.is_half() || is_filling).then_some(number)
 }
 
-/// The text that the words of a point hold, as [`text_value::decode`] shows it; `None` for a point that holds no text.
+/// The text that the words of a point hold, as `text_value::decode` shows it; `None` for a point that holds no text.
 pub fn decode_text(point: Point, words: &[u16]) -> Option<String> {
     text_value::decode(point.kind, &in_order(point.order, words))
 }
 
-/// The words that hold a text, as [`text_value::encode`] takes it.
+/// The words that hold a text, as `text_value::encode` takes it.
 pub fn encode_text(point: Point, text: &str) -> Option<Vec<u16>> {
     text_value::encode(point.kind, text).map(|words| in_order(point.order, &words))
 }

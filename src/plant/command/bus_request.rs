@@ -57,7 +57,7 @@ pub enum WriteResult {
 /// What the plant asks of a link task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum BusRequest {
-    /// Write one tag once, then read it back. Answered by [`super::event::Event::Wrote`].
+    /// Write one tag once, then read it back. Answered by [`crate::plant::event::Event::Wrote`].
     Write(WriteJob),
     /// Read every block of a device as soon as possible.
     Refresh {
