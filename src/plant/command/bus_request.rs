@@ -27,7 +27,7 @@ pub struct WriteJob {
     pub unlock: Option<(TagId, Exact)>,
     /// Read the value back afterwards.
     pub verify: bool,
-    /// It switches something off and goes before all that waits, see `super::interlock::is_stop`.
+    /// It switches something off and goes before all that waits, see `crate::plant::interlock::is_stop`.
     pub urgent: bool,
 }
 
