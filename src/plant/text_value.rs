@@ -96,7 +96,15 @@ pub fn as_held(kind: DataType, typed: &str, now: &Zoned) -> Result<String, Expec
 
 /// Does a device that shows the second text hold the first, written this long ago? A clock goes on in the meantime.
 pub fn is_held(kind: DataType, written: &str, shown: &str, ago: Duration) -> bool {
-    if let DataType::Clock(clock) = kind { clock::goes_on(clock, written, shown, ago) } else { written == shown }
+    if let (DataType::Clock(clock), true) = (kind, is_running(kind)) {
+        return clock::goes_on(clock, written, shown, ago);
+    }
+    written == shown
+}
+
+/// Does it go on by itself, so that what was seen of it is no more what it shows?
+pub fn is_running(kind: DataType) -> bool {
+    if let DataType::Clock(clock) = kind { clock::is_running(clock) } else { false }
 }
 
 /// What can be written into a type, in words.

@@ -11,9 +11,9 @@ use crate::plant::{
     process_image::ProcessImage,
     sample::Quality,
     scale,
-    tag::{Access, Bound, DataType},
+    tag::{Access, Bound},
     tag_value::TagValue,
-    text_value::ExpectedText,
+    text_value::{self, ExpectedText},
 };
 
 impl CommandTracker {
@@ -122,7 +122,7 @@ impl CommandTracker {
             return refuse(Refusal::UnderWay);
         }
         let good = image.sample(tag).quality == Quality::Good;
-        let now = image.texts[tag.index()].as_deref().filter(|_| good && !matches!(def.point.kind, DataType::Clock(_)));
+        let now = image.texts[tag.index()].as_deref().filter(|_| good && !text_value::is_running(def.point.kind));
         match now {
             Some(now) if seen.is_none() => refuse(Refusal::NotSeen(now.to_owned())),
             Some(now) if seen != Some(now) => refuse(Refusal::ChangedTo(now.to_owned())),

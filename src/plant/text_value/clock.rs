@@ -18,8 +18,6 @@ use crate::plant::{
 const DATE_TIME: &str = "%Y-%m-%d %H:%M:%S";
 /// A clock may be set, and read, this many seconds beside the second that is meant.
 const TOLERANCE: i64 = 2;
-const MINUTE: i64 = 60;
-const DAY: i64 = 86_400;
 
 /// The text of words, the most significant first.
 pub(super) fn text(clock: Clock, words: &[u16]) -> Option<String> {
@@ -107,6 +105,8 @@ pub(super) fn typed(clock: Clock, typed: &str, now: &Zoned) -> Option<String> {
             let at = typed.parse::<Timestamp>().ok().or_else(|| Some(local()?.timestamp()))?;
             Some(Timestamp::from_second(at.as_second()).ok()?.to_string())
         }
+        // An offset would be lost.
+        Clock::Words | Clock::Bytes | Clock::Bcd if typed.parse::<Timestamp>().is_ok() => None,
         Clock::Words | Clock::Bytes | Clock::Bcd => {
             let at = if is_now { now.datetime() } else { typed.parse().ok()? };
             Some(at.strftime(DATE_TIME).to_string())
@@ -120,28 +120,23 @@ pub(super) fn typed(clock: Clock, typed: &str, now: &Zoned) -> Option<String> {
 /// Does a clock show what it was set to this long ago, or what it should show by now, or between both?
 pub(super) fn goes_on(clock: Clock, written: &str, shown: &str, ago: Duration) -> bool {
     let Some((written, shown)) = seconds(clock, written).zip(seconds(clock, shown)) else { return false };
-    let most = i64::try_from(ago.as_secs()).unwrap_or(DAY) + TOLERANCE;
-    let (gone, most) = match clock {
-        Clock::Epoch | Clock::Words | Clock::Bytes | Clock::Bcd => (shown - written, most),
-        // The time of a day begins again at midnight, and its minute may just have begun.
-        Clock::TimeDecimal | Clock::TimeBytes | Clock::TimeBcd | Clock::TimeWords => {
-            ((shown - written + DAY / 2).rem_euclid(DAY) - DAY / 2, most + MINUTE)
-        }
-    };
-    -TOLERANCE <= gone && gone <= most
+    let most = i64::try_from(ago.as_secs()).unwrap_or(0) + TOLERANCE;
+    (-TOLERANCE..=most).contains(&(shown - written))
 }
 
-/// Seconds of what is shown, since a day or an hour that is the same for all of one clock.
+/// Is it a date and time, so that it goes on? A time of day is a setting: when something begins.
+pub(super) fn is_running(clock: Clock) -> bool {
+    matches!(clock, Clock::Epoch | Clock::Words | Clock::Bytes | Clock::Bcd)
+}
+
+/// Seconds of a date and time, since an instant that is the same for all of one clock.
 fn seconds(clock: Clock, shown: &str) -> Option<i64> {
     match clock {
         Clock::Epoch => Some(shown.parse::<Timestamp>().ok()?.as_second()),
         Clock::Words | Clock::Bytes | Clock::Bcd => {
             Some(shown.parse::<DateTime>().ok()?.to_zoned(TimeZone::UTC).ok()?.timestamp().as_second())
         }
-        Clock::TimeDecimal | Clock::TimeBytes | Clock::TimeBcd | Clock::TimeWords => {
-            let (hour, minute) = shown.split_once(':')?;
-            Some((hour.parse::<i64>().ok()? * 60 + minute.parse::<i64>().ok()?) * MINUTE)
-        }
+        Clock::TimeDecimal | Clock::TimeBytes | Clock::TimeBcd | Clock::TimeWords => None,
     }
 }
 

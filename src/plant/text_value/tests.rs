@@ -33,6 +33,7 @@ fn what_is_typed_is_held_as_the_device_shows_it() {
         check(kind, " 2026-02-28 23:59:05 ", Some("2026-02-28 23:59:05"));
         check(kind, "2026-02-28T23:59", Some("2026-02-28 23:59:00"));
         check(kind, "2026-02-29 10:00", None);
+        check(kind, "2026-02-28T23:59:00+09:00", None);
         check(kind, "14:05", None);
     }
     check(clock(Clock::Words), "1999-12-31 23:59:59", Some("1999-12-31 23:59:59"));
@@ -82,9 +83,9 @@ fn a_clock_holds_what_was_written_while_it_goes_on() {
         let [written, shown] = [written, shown].map(|text| format!("{}Z", text.replace(' ', "T")));
         check(Clock::Epoch, &written, &shown, ago, expect);
     }
-    check(Clock::TimeBcd, "23:59", "00:00", 1, true);
-    check(Clock::TimeBcd, "23:59", "00:01", 1, false);
-    check(Clock::TimeBcd, "00:00", "23:59", 1, false);
+    // When something begins is a setting, which is held or not.
+    check(Clock::TimeBcd, "07:30", "07:30", 30, true);
+    check(Clock::TimeBcd, "07:30", "07:31", 90, false);
     assert!(!is_held(DataType::Text(4), "AB", "AC", Duration::from_secs(30)));
 }
 

@@ -200,7 +200,7 @@ fn is_text(cx: &ViewContext, tag: TagId) -> bool {
 
 /// Is its text offered, to be changed? The time that a clock shows is not typed again.
 fn is_kept(cx: &ViewContext, tag: TagId) -> bool {
-    !matches!(cx.def().tag(tag).point.kind, DataType::Clock(_))
+    !text_value::is_running(cx.def().tag(tag).point.kind)
 }
 
 /// The character that was typed and can be in no number.

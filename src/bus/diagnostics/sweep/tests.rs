@@ -156,5 +156,5 @@ fn where_every_address_is_asked_each_one_missing_is_a_hole() {
     let (unit, holes) = job.take_holes().expect("a sweep");
     let holes: Vec<u16> = holes.iter().map(|span| span.address).collect();
     assert_eq!((unit, holes), (1, vec![0, 1, 2, 5, 6, 7, 8, 9]));
-    assert_eq!(job.take_holes(), Some((1, vec![])), "each is told once");
+    assert_eq!(job.take_holes(), Some((1, vec![])), "each is named once");
 }
