@@ -1,9 +1,10 @@
 //! What the bytes that have come over a line are: the response, another frame, noise, or the beginning of a frame.
 
+mod in_ascii;
+
 use std::ops::Range;
 
 use super::{
-    ascii,
     frame::{self, Mbap, Request, ShortException},
     pdu::{self, Length},
 };
@@ -138,7 +139,7 @@ fn ended_by_silence(request: &[u8], bytes: &[u8]) -> Option<Range<usize>> {
 pub fn find_answer<'a>(framing: Framing, message: impl Into<Request<'a>>, buffer: &[u8]) -> FrameMatch {
     let message = message.into();
     match framing {
-        Framing::Ascii => ascii::find_answer(message, buffer),
+        Framing::Ascii => in_ascii::find_answer(message, buffer),
         Framing::Rtu | Framing::Mbap => in_bytes(message, buffer),
     }
 }
@@ -208,7 +209,7 @@ fn expected_length(framing: Framing, message: Request) -> usize {
 pub fn left_over<'a>(framing: Framing, message: impl Into<Request<'a>>, buffer: &[u8]) -> Fault {
     let message = message.into();
     if framing == Framing::Ascii {
-        return ascii::left_over(message, buffer);
+        return in_ascii::left_over(message, buffer);
     }
     if buffer.is_empty() {
         return Fault::Timeout;

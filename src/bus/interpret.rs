@@ -2,8 +2,8 @@
 
 use super::codec;
 use crate::plant::{
-    exact::Exact,
-    number::{digits, to_f32},
+    exact::{Exact, digits},
+    number::to_f32,
     tag::{ByteOrder, DataType, Point, Table},
     text_value,
 };

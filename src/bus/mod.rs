@@ -23,13 +23,13 @@
 //! | [`listen`] | who says what on the line of another master |
 //! | [`hex_input`], [`request_lint`], [`filter`], [`capture`] | what a technician types, looks for and takes home |
 
+pub mod names;
 pub(crate) mod pdu;
 pub mod ascii;
 pub mod frame;
 pub mod framing;
 pub mod wide_addresses;
 mod frame_boundaries;
-pub mod names;
 pub mod request_lint;
 pub mod dissect;
 pub mod hex_input;

@@ -1,17 +1,6 @@
-//! The names of the standard: functions, sub-functions, identification objects, and what to do about an exception.
+//! The names of the standard: sub-functions, identification objects, and what to do about an exception.
 
-use super::pdu;
-use crate::{plant::tag::Table, t};
-
-/// Name of a function; `None` for one that the standard does not know.
-pub fn function(code: u8) -> Option<&'static str> {
-    pdu::function(code).map(|function| function.name)
-}
-
-/// The table that a function works on.
-pub fn table(function: u8) -> Table {
-    pdu::function(function).map_or(Table::Holding, |function| function.table)
-}
+use crate::t;
 
 /// Name of a sub-function of diagnostics 08 (V1.1b3, 6.8.1).
 pub fn diagnostic(code: u16) -> &'static str {
@@ -108,29 +97,6 @@ pub fn advice(code: u8) -> &'static str {
         0x0B => "the device behind the gateway does not respond: check its power, wiring, unit address and baud rate",
         _ => "not a standard code: see the manual of the device",
     }
-}
-
-/// `41003`.
-pub fn modicon(function: u8, address: u16) -> String {
-    table(function).modicon(address)
-}
-
-/// `41003–41012`, or `41003` for one.
-pub fn span(function: u8, address: u16, count: u16) -> String {
-    match count {
-        0 | 1 => modicon(function, address),
-        _ => format!("{}–{}", modicon(function, address), modicon(function, address.saturating_add(count - 1))),
-    }
-}
-
-/// `41003 / 0x03EA, wire address 1002`.
-pub fn place(function: u8, address: u16) -> String {
-    t!(
-        "{modicon} / 0x{hex}, wire address {address}",
-        modicon = modicon(function, address),
-        hex = format!("{address:04X}"),
-        address
-    )
 }
 
 /// `131 / 0x83`.

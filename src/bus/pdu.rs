@@ -1,11 +1,13 @@
 //! The layout of every function, one row each (Modbus application protocol V1.1b3, section 6). The link of the master, the
 //! simulated devices, the check before sending and the decoder of frames all read this table.
 
+mod place;
 mod request;
 
 use tokio_modbus::{Response, bytes::Bytes};
 
 use self::Item::*;
+pub(crate) use self::place::{modicon, place, span};
 pub use self::request::{Pdu, request_fields};
 use super::names::{self, Counted, counted};
 use crate::{plant::tag::Table, t};
@@ -179,6 +181,16 @@ const fn echo(code: u8, name: &'static str, table: Table, items: &'static [Item]
 /// The row of a function; `None` for one that the standard does not know, and for an exception.
 pub fn function(code: u8) -> Option<&'static Function> {
     FUNCTIONS.iter().find(|function| function.code == code)
+}
+
+/// Name of a function; `None` for one that the standard does not know.
+pub fn name(code: u8) -> Option<&'static str> {
+    function(code).map(|function| function.name)
+}
+
+/// The table that a function works on.
+pub fn table(code: u8) -> Table {
+    function(code).map_or(Table::Holding, |function| function.table)
 }
 
 /// Length of a message: unit and PDU.

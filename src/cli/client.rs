@@ -165,7 +165,7 @@ impl Actor {
         let credentials =
             self.password.clone().filter(|_| required).map(|password| Credentials { user: None, password });
         let note = self.note.as_deref().map(Into::into);
-        let command = Command { note, ..Command::on(&self.session.snapshots.borrow(), id, kind) };
+        let command = Command { note, ..self.session.snapshots.borrow().command(id, kind) };
         self.session.send(crate::station::Request::Command(command, credentials))?;
         let ended = |snapshot: &Snapshot| {
             snapshot.commands.iter().find(|status| status.command.id == id && !status.is_pending()).cloned()

@@ -98,7 +98,7 @@ mod tests {
         bus::io::clock::Clock,
         plant::{
             PlantDef,
-            command::{Command, CommandId, CommandStatus, Refusal},
+            command::{CommandId, CommandStatus, Refusal},
             procedure,
             record::Record,
         },
@@ -143,7 +143,7 @@ mod tests {
         };
         let seen = session.snapshots.wait_for(|snapshot| read(snapshot)).await.expect("it runs").clone();
         let id = CommandId { terminal: session.terminal, number };
-        let command = Command::on(&seen, id, CommandKind::StartProcedure(id_of(place)));
+        let command = seen.command(id, CommandKind::StartProcedure(id_of(place)));
         CommandStatus::new(command, "anna", time.now())
     }
 

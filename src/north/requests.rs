@@ -28,9 +28,8 @@ use crate::{
         command::{Command, CommandId, CommandKind, CommandStatus, Outcome},
         def::{MqttDef, TagId},
         entry,
-        exact::Exact,
+        exact::{Exact, digits},
         mqtt_request::{LastMqttRequest, MqttRefusal, MqttRequestStatus, MqttResult},
-        number::digits,
         time::elapsed,
     },
 };
@@ -105,7 +104,7 @@ impl PassOn {
         }
         // No one can be asked what was meant; a value that the device would round is refused by the plant.
         entry::check_decimals(entry::decimals_of(value), snapshot.decimals[tag.index()]).map_err(MqttRefusal::Value)?;
-        let command = Command::on(snapshot, CommandId { terminal, number }, CommandKind::Write { tag, value });
+        let command = snapshot.command(CommandId { terminal, number }, CommandKind::Write { tag, value });
         Ok(Command { expected_value: expected.or(command.expected_value), note: Some(note.into()), ..command })
     }
 }

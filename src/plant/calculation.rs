@@ -1,37 +1,16 @@
 //! Calculated tags: their values follow from those of other tags, with quality and time.
 
-use serde::{Deserialize, Serialize};
-
 use super::{
+    calculation_def::OverTime,
     def::PlantDef,
-    delay::{Delay, DelayTimer},
+    delay::DelayTimer,
     expr::Expr,
     id::TagId,
     redefinition::Redefinition,
     sample::{Cause, Quality, Sample},
     tag::TagDef,
-    totalizer::{Total, Totalizer},
+    totalizer::Totalizer,
 };
-
-/// How a value is calculated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Calculation {
-    /// As it is written.
-    pub text: String,
-    /// What becomes of the expression over time; `None` where it is the value itself.
-    pub over_time: Option<OverTime>,
-    /// What that means.
-    pub expr: Expr,
-}
-
-/// What becomes of an expression over time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum OverTime {
-    /// It is totalled.
-    Total(Total),
-    /// It is a condition that is delayed.
-    Delay(Delay),
-}
 
 /// It at work, with what it has kept so far.
 #[derive(Debug, Clone)]
@@ -180,19 +159,6 @@ impl Walk<'_> {
     }
 }
 
-impl Calculation {
-    /// The tags of the expression, each once, in the order in which they are written.
-    pub fn inputs(&self) -> Vec<TagId> {
-        let mut inputs = Vec::new();
-        for tag in self.expr.tags() {
-            if !inputs.contains(&tag) {
-                inputs.push(tag);
-            }
-        }
-        inputs
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -201,6 +167,7 @@ mod tests {
 
     use super::*;
     use crate::plant::{
+        calculation_def::Calculation,
         expr::Operator,
         fixture::{self, PV, SV},
     };

@@ -9,16 +9,15 @@ use std::{fmt, sync::Arc};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-pub use super::id::WriteId;
+pub use super::id::{CommandId, WriteId};
 use super::{
     alarm::{ActiveAlarm, AlarmCommand},
     def::{DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
-    diagnostics::Diagnostic,
+    diagnostic_request::Diagnostic,
     exact::Exact,
     fault::Fault,
-    procedure::ProcedureDef,
-    restore::RestoreRequest,
-    snapshot::Snapshot,
+    parameter_set::RestoreRequest,
+    procedure_def::ProcedureDef,
 };
 pub use bus_request::{BusRequest, WriteJob, WriteResult};
 pub use refusal::{NotConfirmed, Refusal};
@@ -28,7 +27,7 @@ pub use refusal::{NotConfirmed, Refusal};
 pub struct Command {
     /// Chosen by the terminal, which finds the outcome by it in a later snapshot.
     pub id: CommandId,
-    /// The run of the station whose snapshot it was made on, see [`Snapshot::run`]. The ids in `kind` mean nothing in
+    /// The run of the station whose snapshot it was made on, see [`Snapshot::run`](super::snapshot::Snapshot::run). The ids in `kind` mean nothing in
     /// another run: the plant file may have changed.
     pub run: u64,
     /// What to do, to what and with which value.
@@ -44,11 +43,6 @@ impl Command {
     pub fn new(run: u64, id: CommandId, kind: CommandKind) -> Command {
         Command { id, run, kind, expected_value: None, note: None }
     }
-
-    /// A command on the plant as a snapshot shows it.
-    pub fn on(snapshot: &Snapshot, id: CommandId, kind: CommandKind) -> Command {
-        Command { expected_value: snapshot.expected_value(&kind), ..Command::new(snapshot.run, id, kind) }
-    }
 }
 
 impl From<CommandKind> for Command {
@@ -56,15 +50,6 @@ impl From<CommandKind> for Command {
     fn from(kind: CommandKind) -> Command {
         Command::new(0, CommandId::default(), kind)
     }
-}
-
-/// Identifies a command: the terminal's number and its running count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize)]
-pub struct CommandId {
-    /// Which terminal.
-    pub terminal: u32,
-    /// Its running count.
-    pub number: u32,
 }
 
 /// What a command does, to what and with which value.

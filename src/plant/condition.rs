@@ -5,7 +5,7 @@ use std::{collections::VecDeque, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-use crate::plant::{exact::Exact, id::TagId, ne107::Signal, station_fault::StationFault};
+use crate::plant::{exact::Exact, id::TagId, signal::Signal, station_fault::StationFault};
 
 /// Points that the memory of a rate keeps: finer than any window needs.
 const POINTS_MAX: u32 = 32;

@@ -22,12 +22,8 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    energy::Measures,
-    id::{DeviceId, TagId},
-    keyword::keyword_enum,
-    time::elapsed,
-};
+pub use super::run_def::RunDef;
+use super::{keyword::keyword_enum, time::elapsed};
 
 pub use tracker::RunTracker;
 pub(super) use tracker::View;
@@ -46,31 +42,6 @@ pub const GAP_MAX: Duration = Duration::from_secs(10);
 pub const WHOLE: f64 = 0.9995;
 /// The default band: this share of the way from PV to SV, and of the range of PV at least.
 const BAND: (f64, f64) = (0.02, 0.005);
-
-/// The runs of a controller: each that has PV and SV has them, with the defaults or as a `[[run]]` of the plant file says.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RunDef {
-    /// The controller; the history knows its runs by its name.
-    pub controller: DeviceId,
-    /// Setpoint, as it is written.
-    pub sv: TagId,
-    /// The setpoint in use, if the controller tells it: it confirms one that was not read for a while.
-    pub sv_used: Option<TagId>,
-    /// Process value.
-    pub pv: TagId,
-    /// PV so near to SV is at SV, in its unit; `None` for 2 % of the way, 0.5 % of the range at least.
-    pub band: Option<f64>,
-    /// PV that stays at SV for so long is steady.
-    pub steady_for: Duration,
-    /// It ends after this time.
-    pub duration_max: Duration,
-    /// Energy in kWh comes from this power or energy counter.
-    pub energy: Option<(TagId, Measures)>,
-    /// The start of one of these begins a run, by place in [`PlantDef::batches`](super::PlantDef::batches).
-    pub batches: Vec<usize>,
-    /// Whose curves are compared.
-    pub tags: Vec<TagId>,
-}
 
 keyword_enum! {
     /// What began a run. The words are what the history and CSV hold.

@@ -10,20 +10,20 @@ use super::tag::{Table, TagDef};
 pub use super::{
     alarm_def::Priority,
     batch::BatchDef,
-    control_run::RunDef,
     history_def::{HistoryDef, ParquetVersion},
     id::{AlarmId, DeviceId, LineId, ProcedureId, TagId},
     line::{Framing, LineDef, Protocol, Serial, Transport},
     mimic_def::{MimicDef, MimicPage, Picture},
     north_def::{MqttDef, NorthDef, PasswordSource, TlsRoots},
     output::Output,
-    procedure::{ProcedureDef, ProcedureStep, Reference},
+    procedure_def::{ProcedureDef, ProcedureStep, Reference},
     report_def::{CsvDialect, Paper, ReportDef, Section},
     role::{Reauthentication, Role},
+    run_def::RunDef,
 };
 pub(crate) use super::{
     alarm_def::{AlarmClass, AlarmDef, AlarmRules, Condition, Guidance, Level, Subject},
-    interlock::ControlLogic,
+    interlock_def::ControlLogic,
     line::{Parity, Rs485},
     mimic_def::{MimicCommand, MimicItem, MimicRect},
     program::{ProgramDef, ProgramStep},

@@ -4,8 +4,8 @@ use super::{
     Snapshot,
     alarm::manager::subject_name,
     def::{Condition, Level, Subject, TagId},
-    exact::Exact,
-    number::{digits, to_i64, to_usize},
+    exact::{Exact, digits},
+    number::{to_i64, to_usize},
     scale,
 };
 use crate::{t, text::translate};

@@ -5,6 +5,8 @@
 //!   near, rest    9007199254740992, 1   their sum is the number
 //! ```
 
+mod digits;
+
 use std::{
     cmp::Ordering,
     fmt,
@@ -14,7 +16,7 @@ use std::{
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::number::digits;
+pub(crate) use digits::digits;
 
 /// What is less than this, and whole, an `f64` gives back with all digits, and carries through any scaling; with decimals
 /// it is what has 15 digits in all.

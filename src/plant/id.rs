@@ -38,6 +38,15 @@ id!(
     ProcedureId
 );
 
+/// Identifies a command: the terminal's number and its running count.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default, Serialize, Deserialize)]
+pub struct CommandId {
+    /// Which terminal.
+    pub terminal: u32,
+    /// Its running count.
+    pub number: u32,
+}
+
 /// Identifies a write on its way through the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct WriteId(pub u64);

@@ -5,40 +5,13 @@ use std::{fmt, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
+pub use super::signal::Signal;
 use super::{
     device_time::DeviceTime,
     fault::ExceptionCode,
-    keyword::keyword_enum,
     line_state::{DeviceState, LineState},
     request_stats::RequestStats,
 };
-
-keyword_enum! {
-    /// The four status signals of NE 107. A device that is well has none.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-    pub enum Signal: "signal of NE 107" {
-        /// Its values are not valid.
-        Failure => "F",
-        /// Its values are not valid for the moment, because it is being worked on.
-        FunctionCheck => "C",
-        /// It works outside of what it is meant for: values are late or missing now and then.
-        OutOfSpecification => "S",
-        /// Values are good, but something wears out: to be looked at before it fails.
-        Maintenance => "M",
-    }
-}
-
-impl Signal {
-    /// In the words of the recommendation.
-    pub fn label(self) -> &'static str {
-        match self {
-            Signal::Failure => "failure",
-            Signal::FunctionCheck => "function check",
-            Signal::OutOfSpecification => "out of specification",
-            Signal::Maintenance => "maintenance required",
-        }
-    }
-}
 
 /// Why a device has a signal. Its text is for the operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

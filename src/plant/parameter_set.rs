@@ -62,6 +62,19 @@ pub struct StoredSet {
     pub set: Result<Arc<ParameterSet>, Vec<String>>,
 }
 
+/// A parameter set to restore and the changes that the operator confirmed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RestoreRequest {
+    /// The device that is written.
+    pub device: DeviceId,
+    /// Label of the origin: `winter`, `copy of TIC-2`.
+    pub from: Arc<str>,
+    /// The values.
+    pub set: Arc<ParameterSet>,
+    /// The confirmed changes, in order. If the device needs others by then, nothing is written.
+    pub changes: Vec<PlannedChange>,
+}
+
 /// The good values by tag, of a snapshot or the process image.
 pub type Trusted<'a> = &'a dyn Fn(TagId) -> Option<Exact>;
 

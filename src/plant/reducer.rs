@@ -25,13 +25,13 @@ use super::{
     command::{BusRequest, CommandId, CommandKind, CommandStatus, Outcome, Refusal, WriteJob},
     commands::CommandTracker,
     control_run::RunTracker,
-    counter::{self, CounterWatch},
+    counter_watch::{self, CounterWatch},
     def::{LineDef, LineId, PlantDef, TagId},
     event::Event,
     fault::Fault,
     heard,
     interlock::ActuatorTracker,
-    line_minute::LineMinuteTracker,
+    line_minute_tracker::LineMinuteTracker,
     line_state::{DeviceState, LineState},
     line_trouble::LineTrouble,
     north_status::NorthStatus,
@@ -266,7 +266,7 @@ impl Plant {
             CommandKind::StartProcedure(id) => Some(self.start_procedure(id, &status).into()),
             CommandKind::AbortProcedure(id) => Some(self.abort_procedure(id, &status, &mut effects)),
             CommandKind::CorrectCounter { tag, amount } => {
-                Some(counter::check_correction(self.def.tag(tag), amount, status.command.note.as_ref()).into())
+                Some(counter_watch::check_correction(self.def.tag(tag), amount, status.command.note.as_ref()).into())
             }
             CommandKind::HandOver | CommandKind::TakeOver => {
                 Some(check_note(status.command.note.as_ref()).map_err(Refusal::Alarm).into())

@@ -6,6 +6,7 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
+pub use super::parameter_set::RestoreRequest;
 use super::{
     command::{CommandId, NotConfirmed, Outcome, Refusal},
     def::{DeviceId, PlantDef, TagId},
@@ -16,19 +17,6 @@ use super::{
 
 /// The device must be read within this (real) time, else nothing is written.
 pub const READ_MAX: Duration = Duration::from_secs(60);
-
-/// A parameter set to restore and the changes that the operator confirmed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct RestoreRequest {
-    /// The device that is written.
-    pub device: DeviceId,
-    /// Label of the origin: `winter`, `copy of TIC-2`.
-    pub from: Arc<str>,
-    /// The values.
-    pub set: Arc<ParameterSet>,
-    /// The confirmed changes, in order. If the device needs others by then, nothing is written.
-    pub changes: Vec<PlannedChange>,
-}
 
 /// A restore with its progress.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -10,18 +10,18 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     alarm::{ActiveAlarm, AlarmCommand, AlarmMetrics, SuppressedAlarm},
-    command::{CommandKind, CommandStatus},
+    command::{Command, CommandId, CommandKind, CommandStatus},
     control_run::ControlRun,
     def::{AlarmId, Condition, DeviceId, LineDef, LineId, PlantDef, ProcedureId, TagId},
     diagnostics::DiagnosticRun,
-    exact::Exact,
+    exact::{Exact, digits},
     fault::Fault,
     interlock::ActuatorTracker,
     line_report::LineReport,
     line_state::{DeviceState, LineCounters, LineState},
     ne107,
     north_status::NorthStatus,
-    number::{digits, to_i8, to_u32},
+    number::{to_i8, to_u32},
     parameter_set::StoredSet,
     procedure::ProcedureRun,
     process_load::ProcessLoad,
@@ -179,6 +179,10 @@ impl Snapshot {
     /// The displayed value of the tag that a command writes; `None` where it writes none, or none is displayed.
     pub fn expected_value(&self, kind: &CommandKind) -> Option<Exact> {
         self.samples.get(kind.written()?.0.index())?.exact()
+    }
+    /// A command on the plant as it is shown here.
+    pub fn command(&self, id: CommandId, kind: CommandKind) -> Command {
+        Command { expected_value: self.expected_value(&kind), ..Command::new(self.run, id, kind) }
     }
     /// The tag that a command writes, and the new value with its unit, or the new text.
     pub fn written(&self, kind: &CommandKind) -> Option<(TagId, String)> {

@@ -4,24 +4,24 @@ use std::{sync::Arc, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
+use super::{
+    bad_span::BadSpan,
+    exact::Exact,
+    expr::Expr,
+    id::{DeviceId, TagId},
+    keyword::keyword_enum,
+    role::{Reauthentication, Role},
+    sample::Sample,
+    simulate::Simulate,
+};
 pub use super::{
     bound::Bound,
-    calculation::Calculation,
+    calculation_def::Calculation,
     confidence::Confidence,
     data_type::{ByteOrder, DataType, Encoding},
     decimals::Decimals,
     poll_class::PollClass,
     store_policy::{STORE_EVERY_MAX, StorePolicy},
-};
-use super::{
-    exact::Exact,
-    expr::Expr,
-    id::{DeviceId, TagId},
-    keyword::keyword_enum,
-    raw_number::BadSpan,
-    role::{Reauthentication, Role},
-    sample::Sample,
-    simulate::Simulate,
 };
 
 /// Definition of a tag.
@@ -174,9 +174,9 @@ impl TagDef {
     }
     /// Is it the total of an expression?
     pub fn is_total(&self) -> bool {
-        self.calculation
-            .as_ref()
-            .is_some_and(|calculation| matches!(calculation.over_time, Some(super::calculation::OverTime::Total(_))))
+        self.calculation.as_ref().is_some_and(|calculation| {
+            matches!(calculation.over_time, Some(super::calculation_def::OverTime::Total(_)))
+        })
     }
 
     /// Is it read, or calculated, without anybody asking? Of all others nothing is known most of the time, and nothing is

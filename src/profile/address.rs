@@ -3,12 +3,24 @@
 use super::{
     diagnostic::{Problems, Span},
     reader::{At, Node, Value},
-    schema::Scheme,
 };
 use crate::plant::{
     address::{TABLES, in_table, of_modicon, table_named, wire},
+    keyword::keyword_enum,
     tag::Table,
 };
+
+keyword_enum! {
+    /// How addresses are written.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+    pub(crate) enum Scheme: "scheme" {
+        /// 0-based numbers, as sent.
+        #[default]
+        Modbus => "modbus",
+        /// Octal `V40500`, `Y17`, `X23`, `C54` of KOYO and AutomationDirect.
+        DirectLogic => "directlogic",
+    }
+}
 
 /// An address as written.
 #[derive(Debug, Clone, PartialEq)]

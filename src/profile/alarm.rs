@@ -5,12 +5,12 @@
 use std::{collections::HashMap, time::Duration};
 
 use super::{
-    condition::{self, AlarmTable, Requirement},
+    condition,
     diagnostic::Problems,
     expr,
     names::{Defs, Unique},
     reader::{At, OptionalKey, text},
-    schema::PlantFile,
+    schema::{AlarmTable, PlantFile, Requirement},
 };
 use crate::plant::{
     def::{

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::{diagnostic::Problems, expr, names::Defs, reader::At, tag::Defined};
 use crate::plant::{
-    calculation::{self, OverTime},
+    calculation,
+    calculation_def::OverTime,
     def::TagId,
     tag::{Access, Calculation, Poll, TagDef},
 };

@@ -1,4 +1,4 @@
-//! The keys of an alarm and its condition: exactly one, on what it fits, with what it needs beside it.
+//! The condition of an alarm: exactly one, on what it fits, with what it needs beside it.
 
 use std::time::Duration;
 
@@ -6,82 +6,15 @@ use super::{
     diagnostic::{Problems, Span},
     interlock::check_bit,
     names::{Defs, number_of},
-    reader::{At, Choice, OptionalKey, toml_tables},
+    reader::{At, OptionalKey},
+    schema::AlarmTable,
     tag::range_of,
 };
 use crate::plant::{
-    def::{AlarmClass, Condition, Level, Priority, Subject},
+    def::{Condition, Level, Subject},
     exact::Exact,
-    keyword::keyword_enum,
-    ne107::Signal,
     tag::{Bound, TagDef},
 };
-
-toml_tables! {
-    /// An `[[alarm]]`.
-    AlarmTable, "an alarm" {
-        opt "tag" tag: String,
-        opt "device" device: String,
-        opt "high_high" high_high: f64,
-        opt "high" high: f64,
-        opt "low" low: f64,
-        opt "low_low" low_low: f64,
-        opt "deviation" deviation: f64,
-        opt "from" from: String,
-        opt "is" is: Choice,
-        opt "bit" bit: u8,
-        /// Tag's unit per minute, measured `over` a time; below 0 for a fall.
-        opt "rate" rate: f64,
-        opt "over" over: Duration,
-        opt "no_change" no_change: Duration,
-        opt "no_update" no_update: Duration,
-        /// This many changes `within` a time.
-        opt "changes" changes: u32,
-        opt "within" within: Duration,
-        opt "line" line: String,
-        /// With `line`: it has too much to do, instead of not connected.
-        opt "overloaded" overloaded: bool,
-        /// Beside `device`: it takes longer for a response than its profile states.
-        opt "slower_than_stated" slower_than_stated: bool,
-        /// `F`, `C`, `S` or `M`.
-        opt "ne107" ne107: Signal,
-        opt "enabled_when" enabled_when: String,
-        opt "class" class: AlarmClass,
-        opt "area" area: String,
-        opt "latch" latch: bool,
-        opt "ack_comment" ack_comment: Requirement,
-        opt "re_alarm" re_alarm: Duration,
-        opt "deadband" deadband: f64,
-        opt "on_delay" on_delay: Duration,
-        opt "off_delay" off_delay: Duration,
-        need "priority" priority: Priority,
-        need "message" message: String,
-        /// Which alarm it is, whatever its message, tag or condition become.
-        opt "id" id: String,
-        opt "cause" cause: String,
-        opt "effect" effect: String,
-        opt "action" action: String,
-        opt "response_time" response_time: Duration,
-    }
-}
-
-impl AlarmTable {
-    /// The name of what it watches.
-    pub fn subject(&self) -> Option<&At<String>> {
-        self.tag.as_ref().or(self.device.as_ref()).or(self.line.as_ref())
-    }
-}
-
-keyword_enum! {
-    /// Whether something must be written.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-    pub(super) enum Requirement: "need for a comment" {
-        /// It must.
-        Required => "required",
-        /// It may.
-        Optional => "optional",
-    }
-}
 
 /// Most changes that can be counted.
 const CHANGES_MAX: u32 = 100;

@@ -168,15 +168,6 @@ fn alignment(value: Option<At<u16>>, of_bits: bool, problems: &mut Problems) -> 
     Some(alignment.value)
 }
 
-/// A poll period that a line can keep and an operator can wait for.
-pub(super) fn period(written: Option<At<Duration>>, default_s: u64, problems: &mut Problems) -> Duration {
-    let Some(period) = written else { return Duration::from_secs(default_s) };
-    if period.value < Duration::from_millis(50) || period.value > Duration::from_secs(86_400) {
-        problems.add(period.at, "this is not a poll period").label("expected 50ms to 1 day");
-    }
-    period.value
-}
-
 /// The function codes that the profile lists, against those that its tags need.
 pub(super) fn functions(profile: &ProfileFile, tags: &[Defined], problems: &mut Problems) -> Vec<u8> {
     let listed: Vec<u8> = profile.functions.iter().map(|function| function.value).collect();

@@ -2,11 +2,10 @@
 //! another priority, or none, and its own alarm of the same condition stands instead.
 
 use super::{
-    condition::AlarmTable,
     diagnostic::{Problems, Span},
     names::Scope,
     reader::{At, Node, Raw, Value},
-    schema::Priorities,
+    schema::{AlarmTable, Priorities},
 };
 
 /// The alarms of a device, as a plant file would write them, with the priorities that its plant file gives them.

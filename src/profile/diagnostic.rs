@@ -7,7 +7,6 @@ use miette::{
     Severity, SourceCode, SourceSpan, SpanContents,
 };
 
-use super::reader::At;
 use crate::plant::visible::{same_length, visible};
 
 /// Most problems that are drawn at once; the rest are counted.
@@ -150,6 +149,13 @@ pub(crate) struct Span {
     pub source: usize,
     pub start: usize,
     pub end: usize,
+}
+
+/// A value and where it stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct At<T> {
+    pub value: T,
+    pub at: Span,
 }
 
 impl Span {

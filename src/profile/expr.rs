@@ -12,7 +12,7 @@ use super::{
     units,
 };
 use crate::plant::{
-    calculation::OverTime,
+    calculation_def::OverTime,
     delay::Edge,
     exact::Exact,
     expr::{Compare, Expr, Function, Operator},

@@ -6,9 +6,10 @@
 use std::collections::BTreeMap;
 
 use super::{
-    condition::{AlarmTable, conditions_of},
+    condition::conditions_of,
     diagnostic::{Problems, Span},
     reader::{At, text},
+    schema::AlarmTable,
 };
 use crate::plant::{def::Priority, tag::TagDef};
 

@@ -10,8 +10,7 @@ use super::{
 use crate::plant::{
     def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
     entry,
-    exact::Exact,
-    number::digits,
+    exact::{Exact, digits},
     scale,
     tag::{Decimals, Encoding, TagDef},
 };

@@ -17,7 +17,8 @@ use self::{
 use super::{diagnostic::Problems, names::Defs, reader::At};
 use crate::plant::{
     def::{MimicItem, MimicRect, Picture, TagId},
-    number::{digits, to_u16},
+    exact::digits,
+    number::to_u16,
     tag::{Bound, Decimals, TagDef},
 };
 

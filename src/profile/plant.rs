@@ -10,9 +10,7 @@ use super::{
     address::{check_base, warn_unclear},
     alarm,
     automatic_report::Rules,
-    batch, calculated,
-    condition::AlarmTable,
-    device, device_alarms,
+    batch, calculated, device, device_alarms,
     device_line::check_lines,
     diagnostic::{Errors, Problems},
     history, interlock, line, lint, mimic,
@@ -20,11 +18,12 @@ use super::{
     north, procedure, program, reader,
     reader::{At, OptionalKey, text},
     report, rows, run,
-    schema::{DeviceTable, PlantFile, ProfileFile},
+    schema::{AlarmTable, DeviceTable, PlantFile, ProfileFile},
     sets,
     signature::probes,
-    size::is_of_size,
+    size::{TAGS_MAX, is_of_size},
     tag::{self, DeviceContext},
+    tag_keys::period,
 };
 use crate::plant::{
     classification,
@@ -295,16 +294,14 @@ fn define_device<'a>(
         limits,
         has_default: profile.default.is_some(),
         has_base: table.address_base.or(profile.address_base).is_some(),
-        fast: device::period(table.fast, 1, problems),
-        slow: device::period(table.slow, 10, problems),
+        fast: period(table.fast, 1, problems),
+        slow: period(table.slow, 10, problems),
         names,
         roles: [&table.roles, &profile.roles].map(|roles| roles.as_ref().map(|roles| &roles.value)),
     };
     (def, context)
 }
 
-/// Most tags of a plant, those of its profiles with them; an id has 16 bits, and a terminal plant is far from it.
-pub(super) const TAGS_MAX: usize = 20_000;
 /// Most bytes of a plant file and its profiles together.
 const BYTES_MAX: usize = 16 << 20;
 

@@ -12,8 +12,7 @@ use super::{
 use crate::plant::{
     control_run::LEAST,
     def::{DeviceId, ProcedureDef, ProcedureStep, Reference, RunDef, TagId},
-    exact::Exact,
-    number::digits,
+    exact::{Exact, digits},
     scale,
     tag::{Access, Bound, TagDef},
 };

@@ -3,7 +3,7 @@
 use super::{
     diagnostic::{Problems, Span},
     reader::{At, Node, Raw, Value, wrong_type},
-    schema::TypeName,
+    type_name::TypeName,
 };
 use crate::plant::{
     raw_number::{BadSpan, RawNumber},

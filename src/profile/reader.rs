@@ -13,6 +13,7 @@ use toml::{
 };
 
 pub(crate) use self::value::{Choice, Numbered, Texts, duration, wrong_type};
+pub(crate) use super::diagnostic::At;
 use super::{
     diagnostic::{Problems, Span},
     renamed,
@@ -21,13 +22,6 @@ use crate::plant::{exact::Exact, keyword::Keyword, visible::first_hidden};
 
 /// Most unknown keys of one table that are reported.
 const UNKNOWN_MAX: usize = 40;
-
-/// A value and where it stands.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct At<T> {
-    pub value: T,
-    pub at: Span,
-}
 
 /// A TOML value with the places of all that is in it.
 #[derive(Debug, Clone)]
@@ -179,6 +173,10 @@ impl<'a> Fields<'a> {
         }
         Fields { layers, what }
     }
+    /// Do the layers still use an old name of a key?
+    fn has_old_name(&self, what: &str, key: &str) -> bool {
+        renamed::old_names(what, key).any(|old| self.layers.iter().any(|layer| layer.table.contains_key(old)))
+    }
     /// Where the topmost layer stands.
     pub fn at(&self) -> Span {
         self.layers[0].at
@@ -186,7 +184,7 @@ impl<'a> Fields<'a> {
     /// A value that must be there.
     pub fn need<T: Value>(&self, key: &str, problems: &mut Problems) -> Option<At<T>> {
         let what = self.what;
-        if self.find(key).is_none() && !renamed::has_old_name(self.layers, what, key) {
+        if self.find(key).is_none() && !self.has_old_name(what, key) {
             problems.add(self.at(), format!("{what} needs `{key}`")).label("missing here");
         }
         self.opt(key, problems)

@@ -1,6 +1,6 @@
 //! Keys and keywords of earlier versions, each with the name it has now.
 
-use super::{diagnostic::Problem, reader::Raw};
+use super::diagnostic::Problem;
 
 /// Table as its messages name it (of a keyword: the kind of keyword), old spelling, new spelling.
 const RENAMED: &[(&str, &str, &str)] = &[
@@ -52,10 +52,9 @@ pub(super) fn new_name(table: &str, old: &str) -> Option<&'static str> {
     RENAMED.iter().find(|row| row.0 == table && row.1 == old).map(|row| row.2)
 }
 
-/// Whether the layers still use the old name of a key.
-pub(super) fn has_old_name(layers: &[Raw], table: &str, new: &str) -> bool {
-    let mut old = RENAMED.iter().filter(|row| row.0 == table && row.2 == new).map(|row| row.1);
-    old.any(|old| layers.iter().any(|layer| layer.table.contains_key(old)))
+/// The old names of a key.
+pub(super) fn old_names(table: &str, new: &str) -> impl Iterator<Item = &'static str> {
+    RENAMED.iter().filter(move |row| row.0 == table && row.2 == new).map(|row| row.1)
 }
 
 /// Offers the new name of an old key or keyword, otherwise the nearest of the known ones.
@@ -83,7 +82,8 @@ mod tests {
 
     #[test]
     fn every_renamed_key_of_the_schema_has_its_new_name_there() {
-        let schema = concat!(include_str!("schema.rs"), include_str!("schema/device.rs"), include_str!("condition.rs"));
+        let schema =
+            concat!(include_str!("schema.rs"), include_str!("schema/device.rs"), include_str!("schema/alarm.rs"));
         for (table, old, new) in RENAMED {
             let Some((_, keys)) = schema.split_once(&format!("\"{table}\" {{")) else { continue };
             let keys = keys.split("\n\n").next().expect("a split has a first part");

@@ -12,10 +12,11 @@
 //! ```
 
 use super::{
+    address::Scheme,
     diagnostic::Problems,
-    plant::TAGS_MAX,
     reader::{At, Node, Raw},
-    schema::{RepeatTable, Scheme},
+    schema::RepeatTable,
+    size::TAGS_MAX,
 };
 use crate::plant::address::{in_table, wire};
 

@@ -1,5 +1,6 @@
-//! The tables and keys of a plant file; those of alarms are in [`super::condition`].
+//! The tables and keys of a plant file; one page for each kind.
 
+mod alarm;
 mod device;
 mod keys;
 mod line;
@@ -9,15 +10,16 @@ use std::time::Duration;
 use jiff::civil::Time;
 
 pub(super) use self::{
+    alarm::{AlarmTable, Requirement},
     device::{
-        ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, RepeatTable, Scheme,
+        ActionTable, CheckTable, FaceplateTable, LimitsTable, PollWord, ProfileFile, ProgramTable, RepeatTable,
         SignatureTable, SimulateTable, StepTable, TableLimitsTable, TagTable,
     },
-    keys::{CounterKey, PollKey, Priorities, Roles, Stated, TypeName},
+    keys::{CounterKey, PollKey, Priorities, Roles, Stated},
     line::{ListenFraming, ListenSerialTable, ListenTcpTable, SerialTable, TcpTable, UdpTable},
 };
 use super::{
-    condition::AlarmTable,
+    address::Scheme,
     reader::{Choice, Numbered, Raw, Texts, toml_tables},
 };
 use crate::plant::{

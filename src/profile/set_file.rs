@@ -15,8 +15,7 @@ use super::{
 };
 use crate::plant::{
     def::PlantDef,
-    exact::Exact,
-    number::digits,
+    exact::{Exact, digits},
     parameter_set::{ParameterSet, SetValue},
     tag::{Decimals, TagDef},
     visible::is_control_or_bidi,

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::{
     diagnostic::{Problems, Span},
     names::{Scope, number_of},
-    reader::{At, Choice, OptionalKey, Value},
+    reader::{At, Choice, OptionalKey},
     schema::{CheckTable, SimulateTable},
     tag::field_of,
 };
@@ -14,24 +14,6 @@ use crate::plant::{
     simulate::{Case, Check, Motion, Operation, Pace, Simulate, Source, Test},
     tag::TagDef,
 };
-
-/// A number or a word, or several of them in an array.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Choices(pub Vec<At<Choice>>);
-
-impl Value for Choices {
-    fn read(value: &super::reader::Node, at: Span, problems: &mut Problems) -> Option<Self> {
-        let one = |value: &super::reader::Node, at: Span, problems: &mut Problems| {
-            Choice::read(value, at, problems).map(|value| At { value, at })
-        };
-        match value {
-            super::reader::Node::Array(array) => {
-                Some(Choices(array.iter().filter_map(|item| one(&item.value, item.at, problems)).collect()))
-            }
-            _ => one(value, at, problems).map(|choice| Choices(vec![choice])),
-        }
-    }
-}
 
 /// The simulation of a tag.
 pub(super) fn simulate(

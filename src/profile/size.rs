@@ -5,6 +5,8 @@ use super::{
     reader::{At, Node, Raw},
 };
 
+/// Most tags of a plant, those of its profiles with them; an id has 16 bits, and a terminal plant is far from it.
+pub(super) const TAGS_MAX: usize = 20_000;
 /// Most tables of each kind in a plant file.
 const MOST: [(&str, usize); 9] = [
     ("line", 64),

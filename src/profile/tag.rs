@@ -15,13 +15,12 @@ use self::{
 };
 pub(super) use self::{bits::named_bits, place::field_of, scaling::range_of};
 use super::{
-    address::is_unclear as is_unclear_at,
-    device::period,
+    address::{Scheme, is_unclear as is_unclear_at},
     diagnostic::{Problems, Span},
     names::{Names, check_name, number_of},
     reader::{At, Choice, OptionalKey, Raw, either, supersede, text},
-    schema::{CounterKey, PollKey, PollWord, Roles, Scheme, SimulateTable, TagTable},
-    tag_keys::strip_default,
+    schema::{CounterKey, PollKey, PollWord, Roles, SimulateTable, TagTable},
+    tag_keys::{period, strip_default},
     units,
 };
 use crate::plant::{

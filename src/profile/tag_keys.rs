@@ -1,10 +1,12 @@
-//! Keys that a tag which holds text, or is calculated, does not have.
+//! The keys of a tag: those that one which holds text, or is calculated, does not have, and its poll period.
+
+use std::time::Duration;
 
 use super::{
-    address::memory_table,
+    address::{Scheme, memory_table},
     diagnostic::{Problems, Span},
     reader::{At, Node, Raw},
-    schema::{Scheme, TagTable},
+    schema::TagTable,
 };
 use crate::plant::{
     address::{in_table, table_named},
@@ -25,6 +27,15 @@ const FOR_REGISTERS: [&str; 30] = [
     "confirm", "reauthenticate", "role", "bits", "bad_if", "quality_from", "quality_mask", "write_fc", "write_address", "write", "write_unlock", "poll",
     "poll_class", "simulate", "default", "set", "when",
 ];
+
+/// A poll period that a line can keep and an operator can wait for.
+pub(super) fn period(written: Option<At<Duration>>, default_s: u64, problems: &mut Problems) -> Duration {
+    let Some(period) = written else { return Duration::from_secs(default_s) };
+    if period.value < Duration::from_millis(50) || period.value > Duration::from_secs(86_400) {
+        problems.add(period.at, "this is not a poll period").label("expected 50ms to 1 day");
+    }
+    period.value
+}
 
 /// The defaults of a profile without those that its kind of tag does not have: a type of registers is no coil's, a scale no
 /// text's.

@@ -6,9 +6,8 @@ use std::collections::BTreeMap;
 use crate::{
     bus::codec,
     plant::{
-        exact::Exact,
+        exact::{Exact, digits},
         id::{DeviceId, TagId},
-        number::digits,
         raw_number::BadSpan,
         scale,
         tag::{Access, Bound, ByteOrder, DataType, Decimals, Encoding, Point, Poll, Table, TagDef},

@@ -14,8 +14,7 @@ use crate::plant::{
     batch::Batch,
     def::{CsvDialect, PlantDef},
     energy::{self, Measures},
-    exact::Exact,
-    number::digits,
+    exact::{Exact, digits},
 };
 
 /// A batch, what its tags did, and the alarms of its time.

@@ -7,7 +7,10 @@ use super::{
     curve::Bucket,
     drawing::{Anchor, Drawing, Ink, TEXT},
 };
-use crate::plant::number::{digits, to_f32, to_u8, to_u16, to_usize};
+use crate::plant::{
+    exact::digits,
+    number::{to_f32, to_u8, to_u16, to_usize},
+};
 
 /// Curves over one time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

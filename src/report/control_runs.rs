@@ -13,7 +13,7 @@ use crate::{
     plant::{
         control_run::{ControlRun, Figure, WHOLE},
         def::{CsvDialect, PlantDef},
-        number::digits,
+        exact::digits,
     },
     t,
     text::translate,

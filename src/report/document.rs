@@ -8,7 +8,7 @@ use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 
 use super::chart::Chart;
 use crate::{
-    plant::{def::Section as Kind, exact::Exact, number::digits},
+    plant::{def::Section as Kind, exact::Exact, exact::digits},
     t,
     text::{Locale, translate},
 };

@@ -7,7 +7,7 @@ use super::{
     csv::{iso, iso_millis},
     document::{Cell, ColumnKind, Content, Document, Fact, Table},
 };
-use crate::plant::number::digits;
+use crate::plant::exact::digits;
 
 /// The format `json`.
 #[derive(Debug)]

@@ -20,7 +20,7 @@ use super::{
     csv::iso,
     document::{Cell, Column, ColumnKind, Content, Document, Fact, Table},
 };
-use crate::plant::{def::Section as Kind, number::digits};
+use crate::plant::{def::Section as Kind, exact::digits};
 
 /// The format `parquet`.
 #[derive(Debug)]

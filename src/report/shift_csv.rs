@@ -8,7 +8,7 @@ use super::{
     document::{Cell, Column, ColumnKind, Content, Document, Fact, Section, Table, local, offset},
 };
 use crate::{
-    plant::{def::CsvDialect, number::digits},
+    plant::{def::CsvDialect, exact::digits},
     t,
 };
 

@@ -14,7 +14,8 @@ use super::{
 use crate::{
     plant::{
         def::Paper,
-        number::{digits, to_u8, to_u16, to_u32},
+        exact::digits,
+        number::{to_u8, to_u16, to_u32},
     },
     t,
 };

@@ -5,10 +5,7 @@ mod identity;
 pub use identity::Identity;
 
 use crate::{
-    bus::{
-        names,
-        pdu::{self, Item, MEI_IDENTIFICATION},
-    },
+    bus::pdu::{self, Item, MEI_IDENTIFICATION},
     plant::{
         def::{Limits, READ_REGISTERS_MAX},
         fault::ExceptionCode,
@@ -95,8 +92,8 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Exception
     let limits = device.limits();
     match (function, &fields[..]) {
         (0x01 | 0x02, &[address, count]) => {
-            let most = limits.most(names::table(function));
-            check_step(&limits, names::table(function), address, count)?;
+            let most = limits.most(pdu::table(function));
+            check_step(&limits, pdu::table(function), address, count)?;
             read_bits(device, function, span(function, 0, address, count, most)?)
         }
         (0x03 | 0x04, &[address, count]) => read_words(device, function, address, count),
@@ -140,7 +137,7 @@ fn answer<D: Registers>(device: &mut D, pdu: &[u8]) -> Result<Vec<u8>, Exception
 type Addresses = std::ops::RangeInclusive<u16>;
 
 fn read_bits<D: Registers>(device: &D, function: u8, addresses: Addresses) -> Result<Vec<u8>, ExceptionCode> {
-    let table = names::table(function);
+    let table = pdu::table(function);
     let bytes = addresses.len().div_ceil(8);
     let mut reply = vec![function, to_u8(bytes)];
     reply.resize(2 + bytes, 0);
@@ -161,7 +158,7 @@ fn check_step(limits: &Limits, table: Table, address: u16, count: u16) -> Result
 }
 
 fn read_words<D: Registers>(device: &D, function: u8, address: u16, count: u16) -> Result<Vec<u8>, ExceptionCode> {
-    let table = names::table(function);
+    let table = pdu::table(function);
     let limits = device.limits();
     let most = limits.most(table);
     let each = device.address_words(table, address);

@@ -27,7 +27,7 @@ use crate::{
     plant::{
         Plant, PlantDef,
         alarm::Succession,
-        command::{Command, CommandId, CommandKind, CommandStatus},
+        command::{CommandId, CommandKind, CommandStatus},
         event::Event,
         record::ChainHash,
         snapshot::HistoryStatus,
@@ -268,7 +268,7 @@ impl Station {
         let Some((procedure, _)) = snapshot.procedure_at_work() else { return };
         // Commands of the plant itself count from 1.
         let id = CommandId { terminal: 0, number: 0 };
-        let command = Command::on(&snapshot, id, CommandKind::AbortProcedure(procedure));
+        let command = snapshot.command(id, CommandKind::AbortProcedure(procedure));
         let aborted = async {
             // A plant that has ended has ended its procedure.
             let _ = self.commands.send(CommandStatus::new(command, STATION, snapshot.at)).await;

@@ -66,7 +66,7 @@ impl Session {
     /// Gives a command without note and credentials; its outcome is seen in a later snapshot.
     pub fn send_command(&self, number: u32, kind: CommandKind) -> Result<CommandId, RequestRefusal> {
         let id = CommandId { terminal: self.terminal, number };
-        let command = Command::on(&self.snapshots.borrow(), id, kind);
+        let command = self.snapshots.borrow().command(id, kind);
         self.send(Request::Command(command, None))?;
         Ok(id)
     }

@@ -218,7 +218,7 @@ pub async fn login(session: &Session, user: &str, password: &str) -> Result<(), 
 
 /// A command of this terminal.
 pub fn request(session: &Session, number: u32, kind: CommandKind) -> Command {
-    Command::on(&session.snapshots.borrow(), CommandId { terminal: session.terminal, number }, kind)
+    session.snapshots.borrow().command(CommandId { terminal: session.terminal, number }, kind)
 }
 
 /// Waits until a snapshot is so, and gives it.

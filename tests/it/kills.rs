@@ -214,7 +214,7 @@ async fn act_on(mut session: Session, done: watch::Sender<u64>, round: u64) -> R
             None => CommandKind::Write { tag, value: value.into() },
         };
         writes += usize::from(kind.written().is_some());
-        let command = Command::on(&session.snapshots.borrow(), id, kind.clone());
+        let command = session.snapshots.borrow().command(id, kind.clone());
         let command = Command { note: Some(note.as_str().into()), ..command };
         if session.send(Request::Command(command, None)).is_err() {
             break;

@@ -9,7 +9,7 @@ use sightglass::{
     bus::io::{clock::Clock, transport::Connector},
     plant::{
         PlantDef, Snapshot,
-        command::{Command, CommandId, CommandKind, Outcome, Refusal},
+        command::{CommandId, CommandKind, Outcome, Refusal},
         def::{LineDef, LineId, Serial, Transport},
         line_state::DeviceState,
         request_refusal::RequestRefusal,
@@ -62,7 +62,7 @@ async fn until(session: &mut Session, what: &str, so: impl Fn(&Snapshot) -> bool
 
 async fn send_command(session: &mut Session, number: u32, kind: CommandKind) -> Outcome {
     let id = CommandId { terminal: session.terminal, number };
-    let command = Command::on(&session.snapshots.borrow(), id, kind);
+    let command = session.snapshots.borrow().command(id, kind);
     session.send(Request::Command(command, None)).unwrap();
     let of = move |snapshot: &Snapshot| snapshot.commands.iter().find(|status| status.command.id == id).cloned();
     until(session, "the command has ended", |snapshot| of(snapshot).is_some_and(|status| !status.is_pending())).await;
@@ -136,7 +136,7 @@ async fn a_command_made_before_a_reload_is_refused() {
     let def = profile::load(Path::new("tank"), &Search::shipped()).unwrap();
     let write = |snapshot: &Snapshot, number| {
         let kind = CommandKind::Write { tag: snapshot.def.tag_named("TIC-1.SV").unwrap(), value: 61.0.into() };
-        Command::on(snapshot, CommandId { terminal: 1, number }, kind)
+        snapshot.command(CommandId { terminal: 1, number }, kind)
     };
     let mut listener = listen(&socket).unwrap();
     let station = start(&def, None, &history);

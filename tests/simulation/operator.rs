@@ -113,7 +113,7 @@ impl Operator {
         let snapshot = self.session.snapshots.borrow().clone();
         // A read is no action, and stands in no log.
         let note = (!matches!(kind, CommandKind::Refresh(_))).then(|| format!("{}n{number}", self.name).into());
-        let command = Command { note, ..Command::on(&snapshot, id, kind) };
+        let command = Command { note, ..snapshot.command(id, kind) };
         // A station that is too busy refuses it.
         let _ = self.session.send(Request::Command(command, None));
     }

@@ -7,8 +7,8 @@ use super::{
 use crate::{
     bus::{
         frame::{Request, hex},
-        names::{self, Counted, counted, place},
-        pdu::{FILE_REFERENCE, Item, MEI_IDENTIFICATION},
+        names::{self, Counted, counted},
+        pdu::{self, FILE_REFERENCE, Item, MEI_IDENTIFICATION},
         request_lint::coil_value_words,
     },
     t,
@@ -82,12 +82,12 @@ impl<'r, 'a> Fields<'r, 'a> {
         let function = self.function;
         match item {
             Item::Address(name) => {
-                let address = self.reader.word(translate(name), |address| place(function, address))?;
+                let address = self.reader.word(translate(name), |address| pdu::place(function, address))?;
                 self.start = Some(address);
                 self.values.blocks.push((address, 1));
             }
             Item::Count { name, verb, .. } => {
-                let kind = if names::table(function).is_bits() { Counted::Bits } else { Counted::Registers };
+                let kind = if pdu::table(function).is_bits() { Counted::Bits } else { Counted::Registers };
                 let label = |count: u16| format!("{} {}", counted(count.into(), kind), translate(verb));
                 let count = self.reader.word(translate(name), label)?;
                 (self.count, self.counts) = (Some(count), true);

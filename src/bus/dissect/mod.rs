@@ -312,10 +312,10 @@ fn unit_words(unit: u8, mbap: bool) -> String {
 
 /// `3 / 0x03 read holding registers`.
 pub fn function_words(code: u8) -> String {
-    format!("{} {}", names::code(code), translate(names::function(code).unwrap_or(t!("not in the standard"))))
+    format!("{} {}", names::code(code), translate(pdu::name(code).unwrap_or(t!("not in the standard"))))
 }
 
 fn function_name(code: u8) -> String {
-    let known = names::function(code & 0x7F).map(|name| translate(name).to_owned());
+    let known = pdu::name(code & 0x7F).map(|name| translate(name).to_owned());
     known.unwrap_or_else(|| t!("function {code}", code = names::code(code)))
 }

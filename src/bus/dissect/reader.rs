@@ -7,6 +7,7 @@ use crate::{
     bus::{
         frame,
         names::{self, Counted},
+        pdu,
     },
     plant::{number::to_u16, visible::is_control_or_bidi},
     t,
@@ -78,7 +79,7 @@ impl<'a> Reader<'a> {
             let name = match start {
                 Some(start) => {
                     let address = start.saturating_add(to_u16(index / address_words));
-                    let place = format!("{} / 0x{address:04X}", names::modicon(function, address));
+                    let place = format!("{} / 0x{address:04X}", pdu::modicon(function, address));
                     match address_words {
                         1 => place,
                         _ => t!("{place} word {number}", place, number = index % address_words + 1),
@@ -98,7 +99,7 @@ impl<'a> Reader<'a> {
             let first = values.len();
             let of_byte = (count - first).min(8);
             let name = match start {
-                Some(start) => names::span(function, start.saturating_add(to_u16(first)), to_u16(of_byte)),
+                Some(start) => pdu::span(function, start.saturating_add(to_u16(first)), to_u16(of_byte)),
                 None if of_byte == 1 => t!("bit {number}", number = first + 1),
                 None => t!("bits {first}–{last}", first = first + 1, last = first + of_byte),
             };

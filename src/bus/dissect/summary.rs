@@ -8,8 +8,8 @@ use super::{
 use crate::{
     bus::{
         frame::{self, Request},
-        names::{self, Counted, comm_status, counted, modicon, span},
-        pdu,
+        names::{self, Counted, comm_status, counted},
+        pdu::{self, modicon, span},
     },
     plant::{fault::ExceptionCode, number::to_u8},
     t,

@@ -39,7 +39,7 @@ fn decide(requests: &mut Requests, received: &Received, second: i64) -> String {
 fn snapshot(number: u32, outcome: Outcome) -> Snapshot {
     let mut snapshot = Snapshot::blank(fixture::shared());
     let id = CommandId { terminal: TERMINAL, number };
-    let command = Command::on(&snapshot, id, CommandKind::Write { tag: fixture::SV, value: 50.0.into() });
+    let command = snapshot.command(id, CommandKind::Write { tag: fixture::SV, value: 50.0.into() });
     let status = CommandStatus { outcome, ..CommandStatus::new(command, "mes", at(0)) };
     snapshot.commands.push(status);
     snapshot

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::CommandId;
 use crate::plant::{
     def::{DeviceId, LineDef, TagId},
-    diagnostics::Diagnostic,
+    diagnostic_request::Diagnostic,
     exact::Exact,
     fault::{ExceptionCode, Fault},
     id::WriteId,

@@ -5,7 +5,9 @@ use proptest::prelude::*;
 use super::*;
 use crate::plant::{
     PlantDef,
+    energy::Measures,
     fixture::{self, PV, RUN, SV, TIC},
+    id::TagId,
     sample::{Cause, Sample},
 };
 

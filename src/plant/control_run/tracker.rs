@@ -7,8 +7,8 @@ use jiff::Timestamp;
 use super::{ControlRun, Figure, LEAST, RunCause, RunDef, RunState, STORED, figures::Figures};
 use crate::plant::{
     def::{DeviceDef, PlantDef, ProgramDef},
+    exact::digits,
     id::TagId,
-    number::digits,
     program::ProgramPosition,
     sample::Sample,
     time::elapsed,

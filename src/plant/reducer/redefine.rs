@@ -15,7 +15,7 @@ use super::{Effects, Plant};
 use crate::plant::{
     PlantDef,
     command::{CommandKind, NotConfirmed},
-    counter::CounterWatch,
+    counter_watch::CounterWatch,
     def::{DeviceDef, LineDef, LineId, ProcedureId, TagId},
     line::Transport,
     line_trouble::LineTrouble,

@@ -72,7 +72,7 @@ pub(super) fn alarm_events(effects: Effects) -> Vec<AlarmRecord> {
 /// A write by an operator who sees the plant's present values.
 fn shown(plant: &Plant, number: u32, tag: TagId, value: f64) -> CommandStatus {
     let kind = CommandKind::Write { tag, value: value.into() };
-    let command = Command::on(&plant.snapshot(), CommandId { terminal: 1, number }, kind);
+    let command = plant.snapshot().command(CommandId { terminal: 1, number }, kind);
     CommandStatus::new(command, "anna", at(0))
 }
 

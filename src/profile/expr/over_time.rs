@@ -6,7 +6,7 @@ use jiff::SignedDuration;
 
 use super::{Expr, Reader, Total, is_condition, no_condition};
 use crate::plant::{
-    calculation::OverTime,
+    calculation_def::OverTime,
     delay::{Delay, Edge},
     keyword::Keyword,
 };

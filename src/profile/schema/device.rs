@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::keys::{CounterKey, PollKey, Roles, TypeName, WriteRole};
+use super::keys::{Choices, CounterKey, PollKey, Roles, WriteRole};
 use crate::{
     plant::{
         def::Reauthentication,
@@ -12,10 +12,10 @@ use crate::{
         tag::{Access, ByteOrder, Confidence, PollClass, StorePolicy, Table},
     },
     profile::{
-        address::{Location, Modicon},
+        address::{Location, Modicon, Scheme},
         raw_pattern::{BadIf, RawPattern},
         reader::{Choice, Numbered, Raw, toml_tables},
-        simulate::Choices,
+        type_name::TypeName,
     },
 };
 
@@ -275,17 +275,6 @@ toml_tables! {
     }
 }
 
-keyword_enum! {
-    /// How addresses are written.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-    pub(crate) enum Scheme: "scheme" {
-        /// 0-based numbers, as sent.
-        #[default]
-        Modbus => "modbus",
-        /// Octal `V40500`, `Y17`, `X23`, `C54` of KOYO and AutomationDirect.
-        DirectLogic => "directlogic",
-    }
-}
 keyword_enum! {
     /// How well a register map is known.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,11 +4,7 @@ use std::time::Duration;
 
 use super::device::{CounterTable, PollWord};
 use crate::{
-    plant::{
-        data_type::UnknownType,
-        def::{Priority, Role},
-        tag::DataType,
-    },
+    plant::def::{Priority, Role},
     profile::{
         diagnostic::{Problems, Span},
         reader::{At, Choice, Node, Raw, Value},
@@ -99,27 +95,20 @@ impl<T: Value> Value for ByName<T> {
     }
 }
 
-/// The type of a raw value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct TypeName(pub DataType);
+/// A number or a word, or several of them in an array.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Choices(pub Vec<At<Choice>>);
 
-impl Value for TypeName {
+impl Value for Choices {
     fn read(value: &Node, at: Span, problems: &mut Problems) -> Option<Self> {
-        let word = <String as Value>::read(value, at, problems)?;
-        match word.parse() {
-            Ok(kind) => return Some(TypeName(kind)),
-            Err(UnknownType::Length(most)) => {
-                let name = word.split('(').next().unwrap_or_default();
-                let problem = problems.add(at, format!("`{word}` does not say how long the text is"));
-                let unit = if most == DataType::CHARS_MAX { "registers" } else { "bytes" };
-                problem.label(format!("expected \"{name}(N)\" with N {unit}, 1 to {most}"));
+        let one = |value: &Node, at: Span, problems: &mut Problems| {
+            Choice::read(value, at, problems).map(|value| At { value, at })
+        };
+        match value {
+            Node::Array(array) => {
+                Some(Choices(array.iter().filter_map(|item| one(&item.value, item.at, problems)).collect()))
             }
-            Err(UnknownType::Name) => {
-                let names: Vec<String> = DataType::NUMBERS.into_iter().map(|kind| kind.to_string()).collect();
-                let problem = problems.add(at, format!("unknown type `{word}`")).label("not a type");
-                problem.suggest(&word, names.iter().map(String::as_str));
-            }
+            _ => one(value, at, problems).map(|choice| Choices(vec![choice])),
         }
-        None
     }
 }

@@ -6,10 +6,10 @@ use crate::{
         tag::{Access, Point, Table},
     },
     profile::{
-        address::locate,
+        address::{Scheme, locate},
         diagnostic::Problems,
         reader::OptionalKey,
-        schema::{Scheme, TagTable},
+        schema::TagTable,
     },
 };
 

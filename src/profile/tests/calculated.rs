@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::plant::{
-    calculation::OverTime,
+    calculation_def::OverTime,
     delay::{Delay, Edge},
     totalizer::Total,
 };

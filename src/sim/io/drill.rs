@@ -12,7 +12,7 @@ use super::SimulatorHandle;
 use crate::{
     plant::{
         PlantDef, Snapshot,
-        command::{Command, CommandId, CommandStatus},
+        command::{CommandId, CommandStatus},
         record::Record,
         time::elapsed,
     },
@@ -189,7 +189,7 @@ impl Task {
                 let Some(kind) = step.action.command_kind(&snapshot) else { return };
                 self.commands_sent += 1;
                 let id = CommandId { terminal: OPERATOR, number: self.commands_sent };
-                let command = Command::on(&snapshot, id, kind);
+                let command = snapshot.command(id, kind);
                 let status = CommandStatus::new(command, "operator of the drill", snapshot.at);
                 if commands.try_send(status).is_err() {
                     tracing::error!("the station has not accepted a command of the drill");

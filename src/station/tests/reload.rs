@@ -5,7 +5,7 @@ use crate::{
     access::{SessionEnd, io::users},
     plant::{
         PlantDef,
-        calculation::{Calculation, OverTime},
+        calculation_def::{Calculation, OverTime},
         def::TagId,
         expr::Expr,
         tag::TagDef,

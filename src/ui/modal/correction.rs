@@ -15,7 +15,7 @@ use crate::{
     plant::{
         alarm::command::NOTE_CHARS_MAX,
         command::{Command, CommandKind, Refusal},
-        counter::check_correction,
+        counter_watch::check_correction,
         def::{PlantDef, TagId},
         exact::Exact,
         number::to_u16,

@@ -22,9 +22,9 @@ pub(super) use crate::{
     plant::{
         command::CommandKind,
         def::{DeviceDef, DeviceId, LineDef, LineId, ProcedureId, TagId},
-        exact::Exact,
+        exact::{Exact, digits},
         line_state::DeviceState,
-        number::{digits, to_u16},
+        number::to_u16,
         role::Role,
         snapshot::Snapshot,
         time::elapsed,

@@ -38,7 +38,7 @@ pub fn run(data: &[u8]) {
             let kind = CommandKind::Write { tag, value: request.value };
             sightglass::access::right::needs(&TANK, &kind);
             let id = CommandId { terminal: 1, number: 1 };
-            let command = Command { expected_value: request.expected, ..Command::on(&plant.snapshot(), id, kind) };
+            let command = Command { expected_value: request.expected, ..plant.snapshot().command(id, kind) };
             plant.on_command(CommandStatus::new(command, "mes", now()), now());
         }
     }

@@ -17,7 +17,7 @@ fn def() -> (Arc<PlantDef>, TagId) {
     let expr = Expr::test(RUN, Compare::Equal, 1.0);
     let calculation = Calculation {
         text: String::new(),
-        over_time: Some(crate::plant::calculation::OverTime::Total(Total::OnTime)),
+        over_time: Some(crate::plant::calculation_def::OverTime::Total(Total::OnTime)),
         expr,
     };
     let tag = def.tags[RUN.index()].clone();

@@ -9,7 +9,7 @@ use super::{
 use crate::plant::{
     alarm::{AlarmCommand, AlarmState},
     batch::BatchDef,
-    calculation::{Calculation, OverTime},
+    calculation_def::{Calculation, OverTime},
     command::{BusRequest, Command, CommandId, CommandStatus},
     def::{Condition, DeviceId, LineId, ProcedureDef, ProcedureStep, TagId},
     event::{Event, WriteResult},

@@ -72,7 +72,7 @@ fn a_write_of_64_bits_is_checked_and_compared_to_its_last_digit() {
         let mut plant = counting();
         plant.on_event(numbers(0, &[(SV, LEAST)]));
         let kind = CommandKind::Write { tag: SV, value: Exact::whole(number) };
-        let command = Command::on(&plant.snapshot(), CommandId { terminal: 1, number: 1 }, kind);
+        let command = plant.snapshot().command(CommandId { terminal: 1, number: 1 }, kind);
         let effects = plant.on_command(CommandStatus::new(command, "anna", at(1)), at(1));
         let sent = effects.bus.first().map(|(_, request)| match request {
             BusRequest::Write(job) => (job.id, job.raw.number().expect("a number")),

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
-    bus::names,
+    bus::pdu,
     plant::{
         admission::Schedulability,
         line_report::{LineReport, PollReport},
@@ -68,7 +68,7 @@ impl Listing for Blocks {
             })
             .rank(1),
             Column::words(t!("registers"), |_, poll: &PollReport| {
-                names::span(poll.table.read_fc(), poll.address, poll.count)
+                pdu::span(poll.table.read_fc(), poll.address, poll.count)
             })
             .by(|a, b| (a.table, a.address).cmp(&(b.table, b.address))),
             Column::words(t!("wire"), |_, poll: &PollReport| format!("0x{:04X}", poll.address))
@@ -244,8 +244,8 @@ fn detail(cx: &ViewContext, report: &LineReport, poll: &PollReport) -> Vec<Strin
             unit = device.unit,
             code,
             code2 = format!("{code:02X}"),
-            function = translate(names::function(code).unwrap_or_default()),
-            span = names::span(code, poll.address, poll.count),
+            function = translate(pdu::name(code).unwrap_or_default()),
+            span = pdu::span(code, poll.address, poll.count),
             address = poll.address,
             last,
             address2 = format!("{:04X}", poll.address),

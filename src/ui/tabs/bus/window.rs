@@ -11,7 +11,7 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
-    bus::{dissect, frame::hex, meaning, names, wide_addresses::WideAddresses},
+    bus::{dissect, frame::hex, meaning, pdu, wide_addresses::WideAddresses},
     plant::{
         tag::Table,
         traffic::{Exchange, Frame},
@@ -273,8 +273,8 @@ fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, ad
         "{code} / 0x{code2} {function}: {span} (0x{address}), {count} in one request",
         code,
         code2 = format!("{code:02X}"),
-        function = translate(names::function(code).unwrap_or_default()),
-        span = names::span(code, address, poll.count),
+        function = translate(pdu::name(code).unwrap_or_default()),
+        span = pdu::span(code, address, poll.count),
         address = format!("{address:04X}"),
         count = poll.count
     );

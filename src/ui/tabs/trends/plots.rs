@@ -6,7 +6,7 @@ use super::{
     *,
 };
 use crate::{
-    plant::number::{digits, to_usize},
+    plant::{exact::digits, number::to_usize},
     ui::widgets::{
         axes::Axes,
         chart::{axis::Scale, mark, raster, raster::Canvas as Dots, trace::Span},

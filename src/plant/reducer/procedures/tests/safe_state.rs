@@ -118,7 +118,7 @@ fn a_person_who_writes_something_else_ends_it() {
         back_in_vain(&mut plant, 61);
         back(&mut plant, 62);
         let kind = CommandKind::Write { tag: SV, value: value.into() };
-        let command = Command::on(&plant.snapshot(), CommandId { terminal: 1, number: 9 }, kind);
+        let command = plant.snapshot().command(CommandId { terminal: 1, number: 9 }, kind);
         let written = plant.on_command(CommandStatus::new(command, "bob", at(62)), at(62));
         end(&mut plant, &written, 62, WriteResult::ReadBack);
         (actions(&written), alarm(&mut plant, 63), plant)

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
-    bus::names,
+    bus::{names, pdu},
     plant::{number::to_u8, tag::Table},
 };
 
@@ -72,7 +72,7 @@ fn range(kind: Kind, table: Table) -> String {
 
 /// The fields of a function; what was filled in under the same label before stays, where it can.
 pub fn fields(function: u8, before: &dyn Fn(&str) -> Option<String>) -> Vec<Field> {
-    let table = names::table(function);
+    let table = pdu::table(function);
     let field = |(label, kind, first): (&'static str, Kind, &str)| match kind {
         Kind::SubFunction => {
             let words = SUB_FUNCTIONS.map(|code| format!("{code} / 0x{code:02X} {}", names::diagnostic(code)));
@@ -100,7 +100,7 @@ pub fn message(unit: u8, function: u8, entries: &[String]) -> Result<Vec<u8>, St
         let each = || text.split([' ', ',', ';']).filter(|word| !word.is_empty());
         let chosen = text.parse::<usize>().unwrap_or(0);
         match kind {
-            Kind::Address => message.extend(address(text, names::table(function))?.to_be_bytes()),
+            Kind::Address => message.extend(address(text, pdu::table(function))?.to_be_bytes()),
             Kind::Count(most) => message.extend(to_u16(number(text, label, 1..=most)?).to_be_bytes()),
             Kind::Bit => message.extend(if bit(text)? { [0xFF, 0] } else { [0, 0] }),
             Kind::Register => message.extend(register(text)?.to_be_bytes()),

@@ -1,7 +1,7 @@
 //! The forms of a request: addresses and fields become bytes.
 
 use super::{fields::address, *};
-use crate::bus::names;
+use crate::bus::pdu;
 
 #[test]
 fn addresses_are_read_as_manuals_write_them() {
@@ -57,7 +57,7 @@ fn fields_become_the_bytes_of_the_standard() {
     assert!(message(6, &["40002", "65536"]).is_err_and(|why| why.contains("expected -32768 to 65535")));
     assert!(message(3, &["40002", "126"]).is_err_and(|why| why.contains("count")));
     for function in functions::FUNCTIONS {
-        assert!(names::function(function).is_some(), "{function}");
+        assert!(pdu::name(function).is_some(), "{function}");
     }
     let words = request_text(&[17, 8, 0, 4, 0, 0], Framing::Rtu).expect("a request");
     assert!(words.last().is_some_and(|words| words.starts_with("Effect: the unit listens only")), "{words:?}");

@@ -2,11 +2,11 @@
 
 use std::{collections::HashMap, sync::Arc};
 
-use super::{Counter, CounterRule, CounterStep, Reading, may_count};
 use crate::plant::{
     alarm::{AlarmRefusal, command::check_note},
     command::Refusal,
     commands::value_text,
+    counter::{Counter, CounterRule, CounterStep, Reading, may_count},
     def::{PlantDef, TagId},
     exact::Exact,
     process_image::ProcessImage,
@@ -17,8 +17,6 @@ use crate::plant::{
 
 /// The recorded word for a step of a counter that is not plain counting; its outcome says what it was.
 const STEP: &str = "counter";
-/// The recorded word for a correction of what a counter counted; its new value is what is added.
-pub const CORRECT: &str = "correct counter";
 
 /// Follows every counter by its stored samples, which are what reports are made of.
 #[derive(Debug, Clone, Default)]
