@@ -10,6 +10,7 @@
 //! | `commands` | the program as scripts see it: help, exit codes, messages, the headless demo and its report |
 //! | `terminal` | the program as a person sees it, in a pseudo-terminal: starts, keys, leaves the terminal as it was |
 //! | `peers` | our master against slaves that we did not write: pymodbus, libmodbus |
+//! | `library` | every tag of every shipped profile against pymodbus as a master with a decoding of its own |
 //! | `sunspec` | SunSpec devices of every model, by pysunspec2, against pysunspec2 as a reader |
 //! | `masters` | our simulated slaves, and those of the benches, against masters that we did not write: mbpoll, pymodbus, minimalmodbus |
 //! | `listen` | the line of a master and a slave that we did not write, heard over a tap: frames, values, capture; nothing is sent |
@@ -67,6 +68,7 @@ mod formats;
 mod guarded;
 mod hostile;
 mod kills;
+mod library;
 mod listen;
 mod listening;
 mod listening_losses;
