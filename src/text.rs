@@ -10,7 +10,7 @@ mod date;
 
 use std::{cell::Cell, collections::HashMap, fmt::Display, sync::LazyLock};
 
-pub use answers::{recorded, recorded_action};
+pub use answers::recorded;
 pub use date::{date, weekday};
 
 thread_local! {

@@ -31,12 +31,6 @@ const CUT: &str = "… (cut)";
 const HASH: (&str, &str) = (",\"hash\":\"", "\"}");
 /// Hexadecimal digits of a hash.
 const DIGITS: usize = 64;
-/// What a change of the plant file is called.
-pub const PLANT_FILE: &str = "plant file";
-
-/// What a change of the file of users is called.
-pub const USERS_FILE: &str = "users file";
-
 /// A line of the audit log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -40,6 +40,7 @@ use crate::{
         PlantDef,
         command::{CommandStatus, Refusal},
         record::ActionRecord,
+        recorded_action::RecordedAction,
         request_refusal::RequestRefusal,
         role::Role,
     },
@@ -171,7 +172,7 @@ impl AccessControl {
         let mut effects = match self.admit(&session, at) {
             Ok(effects) => effects,
             Err(why) => {
-                let entry = audit(&session, "attach", "", &format!("refused: {why}"), at);
+                let entry = audit(&session, RecordedAction::Attach, "", &format!("refused: {why}"), at);
                 let recorded = self.may_record(&session.origin, at).then_some(entry);
                 return recorded.into_iter().chain([Effect::HangUp(terminal, why)]).collect();
             }
@@ -179,12 +180,12 @@ impl AccessControl {
         session.who = self.known(&session.peer);
         session.trusted = session.who.is_some();
         if !in_process && self.may_record(&session.origin.clone(), at) {
-            effects.push(audit(&session, "attach", "", "done", at));
+            effects.push(audit(&session, RecordedAction::Attach, "", "done", at));
         }
         if let Some(who) = &session.who
             && self.users.is_some()
         {
-            effects.push(audit(&session, "login", &who.user, "done: known to the operating system", at));
+            effects.push(audit(&session, RecordedAction::Login, &who.user, "done: known to the operating system", at));
         }
         self.sessions.insert(terminal, session);
         self.publish_status(terminal, &mut effects);
@@ -210,7 +211,7 @@ impl AccessControl {
         let mut effects = self.log_out(terminal, "done: terminal disconnected", at);
         let Some(session) = self.sessions.remove(&terminal) else { return effects };
         if !session.peer.in_process && self.may_record(&session.origin, at) {
-            effects.push(audit(&session, "detach", "", "done", at));
+            effects.push(audit(&session, RecordedAction::Detach, "", "done", at));
         }
         self.publish_status(terminal, &mut effects);
         effects
@@ -234,7 +235,7 @@ impl AccessControl {
         };
         // Only a refused read of the audit log is recorded.
         let is_audit = matches!(query, Query::Audit { .. });
-        let entry = if is_audit { self.refused(terminal, "read audit log", "", &why, at) } else { None };
+        let entry = if is_audit { self.refused(terminal, RecordedAction::ReadAuditLog, "", &why, at) } else { None };
         Err((why.to_string(), entry.into_iter().collect()))
     }
 
@@ -277,17 +278,19 @@ impl AccessControl {
             SessionRequest::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
                 let new = Some(clean(&sha256).into());
-                self.record_and_reply(requester, "export", &file, new, at)
+                self.record_and_reply(requester, RecordedAction::Export, &file, new, at)
             }
             SessionRequest::Backup { folder } => self.begin_backup(requester, folder, at),
             SessionRequest::Import { file } => self.begin_import(requester, file, at),
             SessionRequest::Stop => {
-                let mut effects = self.record_and_reply(requester, "stop station", &self.plant_name(), None, at);
+                let mut effects =
+                    self.record_and_reply(requester, RecordedAction::StopStation, &self.plant_name(), None, at);
                 effects.push(Effect::Stop);
                 effects
             }
             SessionRequest::Reload => {
-                let mut effects = self.record_and_reply(requester, "reload", &self.plant_name(), None, at);
+                let mut effects =
+                    self.record_and_reply(requester, RecordedAction::Reload, &self.plant_name(), None, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
                 effects.push(Effect::Reload(ticket, self.users_digest()));
                 effects
@@ -326,7 +329,7 @@ impl AccessControl {
     fn record_and_reply(
         &self,
         requester: Requester,
-        action: &str,
+        action: RecordedAction,
         target: &str,
         new: Option<Arc<str>>,
         at: Timestamp,

@@ -12,7 +12,10 @@ use jiff::Timestamp;
 use sha2::{Digest, Sha256};
 
 use super::audit_log::{Entry, FirstBad, START, unhex};
-use crate::plant::record::{ActionRecord, ChainHash, SEAL_LOG, hex};
+use crate::plant::{
+    record::{ActionRecord, ChainHash, hex},
+    recorded_action::RecordedAction,
+};
 
 /// Seconds between two seals of a station that runs.
 const INTERVAL: i64 = 3_600;
@@ -63,7 +66,7 @@ impl Key {
 
     /// The seal, as an entry of the log, after the entry `last`.
     pub fn entry(&self, last: ChainHash, at: Timestamp) -> ActionRecord {
-        let entry = ActionRecord::new(at, "station", SEAL_LOG, self.number.to_string(), "done");
+        let entry = ActionRecord::new(at, "station", RecordedAction::SealAuditLog, self.number.to_string(), "done");
         ActionRecord { new: Some(hex(&self.seal(last, at)).into()), ..entry }
     }
 
@@ -109,7 +112,7 @@ impl VerificationKey {
 
 /// The number of a seal, if the entry is one.
 pub fn number(entry: &Entry) -> Option<u64> {
-    (&*entry.action == SEAL_LOG).then(|| entry.target.parse().ok())?
+    (*entry.action == *RecordedAction::SealAuditLog.word()).then(|| entry.target.parse().ok())?
 }
 
 /// How far a log is sealed.

@@ -6,6 +6,7 @@ use jiff::Timestamp;
 
 use super::{audit_log::sha256, password::one_form};
 use crate::plant::{
+    recorded_action::RecordedAction,
     request_refusal::{Alphabet, RequestRefusal},
     role::Role,
 };
@@ -88,15 +89,15 @@ impl UserChange {
     }
 
     /// What it is called in the audit log.
-    pub fn action(&self) -> &'static str {
+    pub fn action(&self) -> RecordedAction {
         match self {
-            UserChange::First { .. } | UserChange::Add { .. } => "add user",
-            UserChange::Role(..) => "set role",
-            UserChange::Disable(_, true) => "disable user",
-            UserChange::Disable(_, false) => "enable user",
-            UserChange::Delete(_) => "delete user",
-            UserChange::Password { must_change: true, .. } => "reset password",
-            UserChange::Password { must_change: false, .. } => "change password",
+            UserChange::First { .. } | UserChange::Add { .. } => RecordedAction::AddUser,
+            UserChange::Role(..) => RecordedAction::SetRole,
+            UserChange::Disable(_, true) => RecordedAction::DisableUser,
+            UserChange::Disable(_, false) => RecordedAction::EnableUser,
+            UserChange::Delete(_) => RecordedAction::DeleteUser,
+            UserChange::Password { must_change: true, .. } => RecordedAction::ResetPassword,
+            UserChange::Password { must_change: false, .. } => RecordedAction::ChangePassword,
         }
     }
 

@@ -164,8 +164,16 @@ impl Job {
     /// Stops it.
     pub fn stop(&mut self, state: DiagnosticState) {
         if self.run.state == DiagnosticState::Running {
+            self.end_write(&state);
             self.run.state = state;
         }
+    }
+
+    /// A write that is not at its end: what is known of it.
+    fn end_write(&mut self, state: &DiagnosticState) {
+        let Diagnostic::Write(_) = self.run.diagnostic else { return };
+        let lost = if let DiagnosticState::Failed(_) = state { Fault::NotConnected } else { Fault::Timeout };
+        self.found(Finding::Written(write::unfinished(self.made, self.written, lost)));
     }
 
     /// Handles the result of the step that was next.

@@ -99,8 +99,8 @@ mod tests {
         plant::{
             PlantDef,
             command::{CommandId, CommandStatus, Refusal},
-            procedure,
             record::Record,
+            recorded_action::RecordedAction,
         },
         profile::{self, Search},
         sim::{
@@ -122,7 +122,7 @@ mod tests {
         let seen = ends.clone();
         let observer = move |records: &[Record]| {
             let ended = records.iter().filter_map(|record| match record {
-                Record::Action(action) if &*action.action == procedure::END => Some(action.outcome.to_string()),
+                Record::Action(action) if action.is(RecordedAction::EndProcedure) => Some(action.outcome.to_string()),
                 _ => None,
             });
             seen.lock().expect("no test fails here").extend(ended);

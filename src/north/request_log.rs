@@ -88,7 +88,7 @@ impl Ended {
             Outcome::Failed(fault) => (RequestResult::Failed, Some(fault.to_string())),
             Outcome::NotConfirmed(why) => {
                 let result = match why {
-                    NotConfirmed::NotApplied(_) | NotConfirmed::Different(_) => RequestResult::Failed,
+                    NotConfirmed::NotApplied(..) | NotConfirmed::Different(_) => RequestResult::Failed,
                     NotConfirmed::NotAnswered(_)
                     | NotConfirmed::NotRead(_)
                     | NotConfirmed::PartlyWritten { .. }
@@ -240,7 +240,10 @@ mod tests {
         check(Outcome::Unchanged, Some(RequestResult::Verified));
         check(Outcome::Sent, Some(RequestResult::Sent));
         check(Outcome::NotConfirmed(NotConfirmed::Different(48.0.into())), Some(RequestResult::Failed));
-        check(Outcome::NotConfirmed(NotConfirmed::NotApplied(48.0.into())), Some(RequestResult::Failed));
+        check(
+            Outcome::NotConfirmed(NotConfirmed::NotApplied(Fault::Timeout, 48.0.into())),
+            Some(RequestResult::Failed),
+        );
         check(Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)), Some(RequestResult::Unknown));
         check(Outcome::NotConfirmed(NotConfirmed::NotRead(Fault::Timeout)), Some(RequestResult::Unknown));
         check(Outcome::NotConfirmed(NotConfirmed::StationStopped), Some(RequestResult::Unknown));

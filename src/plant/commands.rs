@@ -13,19 +13,20 @@ use super::{
         BusRequest, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal, WriteId, WriteJob,
     },
     def::{LineId, PlantDef, TagId},
-    diagnostics::{self, DiagnosticRun, DiagnosticState},
+    diagnostics::{DiagnosticRun, DiagnosticState},
     event::WriteResult,
     exact::Exact,
     fault::Fault,
     process_image::ProcessImage,
-    record::{ActionRecord, WRITE_REQUESTED},
+    record::ActionRecord,
+    recorded_action::RecordedAction,
     scale, text_value,
 };
 use crate::plant::time::elapsed;
 use outcome::without_read_back;
 use record::record;
 
-pub use record::{HAND_OVER, TAKE_OVER, alarm_action, value_text};
+pub use record::{alarm_action, value_text};
 
 /// Commands in a snapshot.
 const SHOWN: usize = 32;
@@ -105,7 +106,7 @@ impl CommandTracker {
             ..status.command.clone()
         };
         let status = CommandStatus { command, ..status.clone() };
-        let checked = self.check_text(image, (tag, held, seen));
+        let checked = self.check_text(image, (tag, held, seen), status.at);
         self.begin_write(&status, checked, image)
     }
 
@@ -186,7 +187,7 @@ impl CommandTracker {
         let (unlock_tag, tag) = (self.def.tag(unlock_tag), self.def.tag(job.tag));
         Some(ActionRecord {
             at,
-            action: "unlock".into(),
+            action: RecordedAction::Unlock.into(),
             target: unlock_tag.name.as_str().into(),
             old: image.sample(unlock_tag.id).exact().map(|old| value_text(image, unlock_tag, old).into()),
             new: tag.write_unlock.map(|(_, new)| value_text(image, unlock_tag, new).into()),
@@ -263,7 +264,7 @@ impl CommandTracker {
         image: &ProcessImage,
         at: Timestamp,
     ) -> ActionRecord {
-        let (action, outcome) = (diagnostics::END.into(), outcome.into());
+        let (action, outcome) = (RecordedAction::EndTest.into(), outcome.into());
         ActionRecord { at, action, outcome, note: None, ..record(&self.def, status, image) }
     }
 
@@ -342,7 +343,11 @@ impl CommandTracker {
         let (command, _) = self.writes.iter().find(|(_, write)| write.id == job.id)?;
         let status = self.commands.iter().find(|status| status.command.id == *command)?;
         let outcome = Outcome::Pending.label().into();
-        Some(ActionRecord { action: WRITE_REQUESTED.into(), outcome, ..record(&self.def, status, image) })
+        Some(ActionRecord {
+            action: RecordedAction::WriteRequested.into(),
+            outcome,
+            ..record(&self.def, status, image)
+        })
     }
 
     fn take_write(&mut self, id: WriteId) -> Option<(CommandId, WriteJob)> {

@@ -24,8 +24,6 @@ use super::{exact::Exact, keyword::keyword_enum, tag::TagDef, time::elapsed};
 
 pub use rule::{CounterRule, Reading, ReadingSummary};
 
-/// The recorded word for a correction of what a counter counted; its new value is what is added.
-pub const CORRECT: &str = "correct counter";
 /// Units in which only counters of energy and charge count.
 const COUNTED: [&str; 12] = ["Wh", "kWh", "MWh", "GWh", "varh", "kvarh", "Mvarh", "VAh", "kVAh", "MVAh", "Ah", "kAh"];
 /// A reading that was not plain counting is decided after this time at the latest; one that comes back sooner was false.

@@ -11,12 +11,10 @@ use crate::plant::{
     exact::Exact,
     process_image::ProcessImage,
     record::{ActionRecord, Record},
+    recorded_action::RecordedAction,
     station_fault::STATION,
     tag::TagDef,
 };
-
-/// The recorded word for a step of a counter that is not plain counting; its outcome says what it was.
-const STEP: &str = "counter";
 
 /// Follows every counter by its stored samples, which are what reports are made of.
 #[derive(Debug, Clone, Default)]
@@ -42,7 +40,7 @@ impl CounterWatch {
                 old: Some(text(old).into()),
                 new: Some(text(new).into()),
                 note: Some(format!("read at {at:.0}, counted {}", text(counted)).into()),
-                ..ActionRecord::new(sample.at, STATION, STEP, of.name.as_str(), event.word())
+                ..ActionRecord::new(sample.at, STATION, RecordedAction::Counter, of.name.as_str(), event.word())
             };
             actions.push(Record::Action(action));
         }
@@ -108,8 +106,10 @@ mod tests {
             let event = Event::Read { at: at(second), device: TIC, values, texts, response_time, exchange: None };
             found.extend(actions(plant.on_event(event).records));
         }
-        let outcomes: Vec<&str> =
-            found.iter().map(|(action, _, outcome)| (assert_eq!(action, STEP), outcome.as_str()).1).collect();
+        let outcomes: Vec<&str> = found
+            .iter()
+            .map(|(action, _, outcome)| (assert_eq!(action, RecordedAction::Counter.word()), outcome.as_str()).1)
+            .collect();
         assert_eq!(outcomes, ["false reading", "replaced"]);
     }
 

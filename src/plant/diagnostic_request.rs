@@ -9,7 +9,7 @@ use super::{
     line_check::{TIMEOUT_MIN, WAIT_MAX},
     port_signals::{HOLD_MAX_S, SignalTest},
     sweep::Sweep,
-    tag::Table,
+    tag::{Point, Table},
 };
 use crate::{t, text::translate};
 
@@ -174,6 +174,8 @@ pub struct RegisterWrite {
     pub expected: Vec<u16>,
     /// With function 15 or 16 also for one.
     pub multiple: bool,
+    /// The registers are a date and time, which go on by themselves: they are set over whatever they show.
+    pub clock: Option<Point>,
 }
 
 impl RegisterWrite {
@@ -181,7 +183,7 @@ impl RegisterWrite {
     #[cfg(test)]
     pub(crate) fn holding(address: u16, old: u16, new: u16) -> RegisterWrite {
         let (words, expected) = (vec![new], vec![old]);
-        RegisterWrite { unit: 1, table: Table::Holding, address, words, expected, multiple: false }
+        RegisterWrite { unit: 1, table: Table::Holding, address, words, expected, multiple: false, clock: None }
     }
 
     /// Function 5 or 6 for one, 15 or 16 for more, or where the device has only those.

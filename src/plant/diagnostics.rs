@@ -14,7 +14,6 @@ use super::{id::CommandId, line_trouble::LineTrouble};
 
 pub use conclusion::{Conclusion, PatternTally, SweepEnd};
 pub use finding::{DiagnosticStep, Finding, UnitReply};
-pub use outcome::END;
 
 /// Findings that a run keeps at most.
 pub const FINDINGS_MAX: usize = 1_000;

@@ -71,6 +71,7 @@ pub mod port_signals;
 pub mod diagnostic_request;
 pub(crate) mod admission;
 pub mod control_run;
+pub mod recorded_action;
 pub mod record;
 pub(crate) mod place;
 pub(crate) mod redefinition;

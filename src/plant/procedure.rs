@@ -27,35 +27,30 @@ use super::{
     exact::digits,
     id::{DeviceId, ProcedureId, TagId},
     record::ActionRecord,
+    recorded_action::RecordedAction,
 };
 use crate::t;
 
 pub(super) use run::{Instruction, View};
 
-/// The recorded word for a procedure that an operator has started.
-pub const START: &str = "start procedure";
-/// The recorded word for its abort.
-pub const ABORT: &str = "abort procedure";
-/// The recorded word for its end, however it ended.
-pub const END: &str = "end procedure";
-/// The recorded word for what is written before its end: a station that is killed meanwhile leaves that to its successor.
-pub const WRITE_SAFE_STATE: &str = "write safe state";
 /// Is it the record of a start, of what is written before an end, or of an end? The last of them says what a station that was
 /// killed has left. A refused start is none.
 pub fn is_transition(record: &ActionRecord) -> bool {
-    match &*record.action {
-        START => {
+    match record.known_action() {
+        Some(RecordedAction::StartProcedure) => {
             let done = CommandKind::StartProcedure(ProcedureId(0)).label();
             // So it was called before.
             *record.outcome == *done || *record.outcome == *Outcome::Verified.label()
         }
-        WRITE_SAFE_STATE | END => true,
+        Some(RecordedAction::WriteSafeState | RecordedAction::EndProcedure) => true,
         _ => false,
     }
 }
 
 /// In the outcome of that, before the writes that are missing.
-const NOT_SAFE: &str = "safe state NOT complete";
+fn not_safe() -> &'static str {
+    t!("safe state NOT complete")
+}
 /// How the outcome of that begins where the station stopped meanwhile.
 pub const INTERRUPTED: &str = "interrupted";
 
@@ -222,7 +217,7 @@ impl ProcedureRun {
         let end = self.end().map_or(String::new(), ToString::to_string);
         let place = match (self.end(), self.step) {
             (Some(ProcedureEnd::Done) | None, _) | (_, None) => String::new(),
-            (Some(_), Some(step)) => format!(", step {} of {steps}", (step + 1).min(steps)),
+            (Some(_), Some(step)) => format!(", {}", t!("step {step} of {steps}", step = (step + 1).min(steps), steps)),
         };
         format!("{end}{place}{}", self.safe_state(def))
     }
@@ -232,10 +227,10 @@ impl ProcedureRun {
         let missing: Vec<String> =
             self.safe.iter().filter(|write| write.is_missing()).map(|write| write.words(def)).collect();
         match self.is_safe() {
-            Some(true) => "; safe state written".to_owned(),
-            None | Some(false) if !missing.is_empty() => format!("; {NOT_SAFE}: {}", missing.join(", ")),
+            Some(true) => format!("; {}", t!("safe state written")),
+            None | Some(false) if !missing.is_empty() => format!("; {}: {}", not_safe(), missing.join(", ")),
             None => String::new(),
-            Some(false) => format!("; {NOT_SAFE}, left as it is by an operator"),
+            Some(false) => format!("; {}, {}", not_safe(), t!("left as it is by an operator")),
         }
     }
 }

@@ -10,8 +10,9 @@ use super::{
     control_run::ControlRun,
     def::{Priority, TagId},
     exact::Exact,
-    keyword::keyword_enum,
+    keyword::{Keyword, keyword_enum},
     line_minute::LineMinute,
+    recorded_action::RecordedAction,
     report::ReportRecord,
     sample::Sample,
 };
@@ -191,7 +192,7 @@ impl AlarmEvent {
     }
 }
 
-/// An operator action, written when its outcome is known; a write also before it is sent ([`WRITE_REQUESTED`]).
+/// An operator action, written when its outcome is known; a write also before it is sent ([`RecordedAction::WriteRequested`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ActionRecord {
     /// When the command was taken.
@@ -221,7 +222,7 @@ impl ActionRecord {
     pub fn new(
         at: Timestamp,
         by: impl Into<Arc<str>>,
-        action: impl Into<Arc<str>>,
+        action: RecordedAction,
         target: impl Into<Arc<str>>,
         outcome: impl Into<Arc<str>>,
     ) -> ActionRecord {
@@ -229,64 +230,22 @@ impl ActionRecord {
         let (from, old, new, note, chain_hash) = ("".into(), None, None, None, None);
         ActionRecord { at, by, from, action, target, old, new, outcome, note, chain_hash }
     }
+
+    /// What was done; `None` where another version called it so.
+    pub fn known_action(&self) -> Option<RecordedAction> {
+        RecordedAction::from_word(&self.action)
+    }
+
+    /// Did it change the plant, or was it meant to?
+    pub fn changes_plant(&self) -> bool {
+        self.known_action().is_none_or(RecordedAction::changes_plant)
+    }
+
+    /// Is it this action?
+    pub fn is(&self, action: RecordedAction) -> bool {
+        &*self.action == action.word()
+    }
 }
-
-/// The word on record for a write that is about to be sent; its outcome has a line of its own.
-pub const WRITE_REQUESTED: &str = "write requested";
-
-/// The word on record for a seal over the entries of the audit log.
-pub const SEAL_LOG: &str = "seal audit log";
-/// A backup of the history: permitted, then done or failed.
-pub const BACKUP: &str = "back up history";
-/// A backup took the place of the history.
-pub const RESTORE: &str = "restore history";
-/// Samples came from a file.
-pub const IMPORT: &str = "import samples";
-
-/// Requests from outside that were refused before the plant saw them.
-pub const OUTSIDE_REQUEST: &str = "request from outside";
-
-/// Actions on users, terminals and the station, not on the plant: for the audit log and the list of a Supervisor,
-/// not for shift reports and curves. So it is with the request of a write, whose outcome is there already.
-pub const NOT_PROCESS_ACTIONS: [&str; 36] = [
-    BACKUP,
-    RESTORE,
-    IMPORT,
-    OUTSIDE_REQUEST,
-    WRITE_REQUESTED,
-    SEAL_LOG,
-    "attach",
-    "detach",
-    "login",
-    "login failed",
-    "unlock failed",
-    "logout",
-    "lock terminal",
-    "unlock terminal",
-    "lockout",
-    "reauthentication failed",
-    "add user",
-    "change password",
-    "set role",
-    "disable user",
-    "enable user",
-    "delete user",
-    "reset password",
-    "export",
-    "delete report",
-    "too many requests",
-    "audit log",
-    "read audit log",
-    "start station",
-    "stop station",
-    "reload",
-    // In a history of an earlier version: write requested, lockout, reauthentication failed, audit log, and its reading.
-    "order",
-    "lock-out",
-    "signature failed",
-    "audit trail",
-    "read audit trail",
-];
 
 /// The place of an entry in the hash chain of the audit log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

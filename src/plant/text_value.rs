@@ -22,7 +22,7 @@ pub const NOW: &str = "now";
 
 /// The text that words hold, two characters a word, in UTF-8 (which plain ASCII is): NULs and blanks at its end are filling,
 /// each byte or character that cannot be printed is shown as [`UNPRINTABLE`], and text of which nothing can be printed as the
-/// hex of its bytes. `None` for a type that holds no text, and for what is no date, time or address.
+/// hex of its bytes, or of its registers where each holds one character. `None` for a type that holds no text, and for what is no date, time or address.
 pub fn decode(kind: DataType, words: &[u16]) -> Option<String> {
     let bytes: Vec<u8> = words.iter().copied().flat_map(u16::to_be_bytes).collect();
     if let DataType::Clock(clock) = kind {
@@ -33,9 +33,10 @@ pub fn decode(kind: DataType, words: &[u16]) -> Option<String> {
         return digits::address(address, &bytes);
     }
     let count = kind.length().filter(|_| kind.is_text())?;
-    // A character that does not fit one byte is none that can be printed.
-    let single = |pair: &[u8]| if pair[0] == 0 { pair[1] } else { 0xFF };
-    let bytes = if let DataType::Chars(_) = kind { bytes.chunks_exact(2).map(single).collect() } else { bytes };
+    // A character that does not fit one byte is none that can be printed: 0xFF is in no UTF-8.
+    let is_of_words = matches!(kind, DataType::Chars(_));
+    let single = |word: &u16| u8::try_from(*word).unwrap_or(0xFF);
+    let bytes = if is_of_words { words.iter().map(single).collect() } else { bytes };
     let bytes = bytes.get(..usize::from(count))?;
     let to_nul = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
     let bytes = if let DataType::TextToNul(_) = kind { to_nul } else { bytes };
@@ -47,7 +48,9 @@ pub fn decode(kind: DataType, words: &[u16]) -> Option<String> {
         text.extend(chunk.invalid().iter().map(|_| UNPRINTABLE));
     }
     let nothing = !text.is_empty() && text.chars().all(|letter| letter == UNPRINTABLE || letter == ' ');
-    Some(if nothing { bytes.iter().map(|byte| format!("{byte:02X}")).collect::<Vec<_>>().join(" ") } else { text })
+    let held = if is_of_words { words } else { &bytes.iter().copied().map(u16::from).collect::<Vec<_>>() };
+    let hex = held.iter().take(bytes.len()).map(|held| format!("{held:02X}"));
+    Some(if nothing { hex.collect::<Vec<_>>().join(" ") } else { text })
 }
 
 /// The words that hold a text as it is shown, filled with NULs; `None` unless they would be shown as the same text: it is too
@@ -125,7 +128,7 @@ impl fmt::Display for ExpectedText {
             }
             (DataType::NetworkAddress(NetworkAddress::Ipv4), _) => t!("an address such as 192.168.0.7").to_owned(),
             (DataType::NetworkAddress(NetworkAddress::Ipv6), _) => t!("an address such as fe80::7").to_owned(),
-            (_, Some(most)) => t!("at most {most} printable characters", most),
+            (_, Some(most)) => t!("printable characters in at most {most} bytes, no blank at the end", most),
             (_, None) => t!("a text that can be written, which this tag does not hold").to_owned(),
         })
     }

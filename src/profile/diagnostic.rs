@@ -1,6 +1,6 @@
 //! Every problem of a profile, and every warning: where it stands, what was found, what was expected, and what was probably meant.
 
-use std::fmt;
+use std::{collections::BTreeSet, fmt};
 
 use miette::{
     GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, MietteError, MietteSpanContents, Report,
@@ -259,6 +259,13 @@ impl SourceCode for DrawnText {
     }
 }
 
+/// A message with these names left out.
+fn without(message: &str, names: &BTreeSet<String>) -> String {
+    let is_of_name = |letter: char| letter.is_alphanumeric() || "-_/#+.".contains(letter);
+    let words = message.split_inclusive(|letter| !is_of_name(letter));
+    words.filter(|word| !names.contains(word.trim_end_matches(|letter| !is_of_name(letter)))).collect()
+}
+
 /// Collects the problems while files are read, so that all of them come out at once.
 #[derive(Debug, Default)]
 pub(crate) struct Problems {
@@ -266,6 +273,7 @@ pub(crate) struct Problems {
     list: Vec<Problem>,
     warnings: Vec<Problem>,
     row: Option<String>,
+    tags: BTreeSet<String>,
 }
 
 impl Problems {
@@ -289,6 +297,10 @@ impl Problems {
     /// Says of which row of a repeat the following problems are.
     pub fn of_row(&mut self, row: Option<String>) {
         self.row = row;
+    }
+    /// Says what the tags are called: at one place, what is wrong with many of them is reported once, with the first of them.
+    pub fn name_tags(&mut self, names: impl IntoIterator<Item = String>) {
+        self.tags.extend(names);
     }
     /// Reports two keys of which only one may stand, at the first.
     pub fn exclusive(&mut self, (first, at): (&str, Span), (second, other): (&str, Span)) {
@@ -317,8 +329,16 @@ impl Problems {
     pub fn finish_warned<T>(self, value: T) -> Result<(T, Errors), Errors> {
         let good = self.list.is_empty();
         let (mut list, severity) = if good { (self.warnings, Severity::Warning) } else { (self.list, Severity::Error) };
-        list.sort_by(|a, b| (a.at, &a.message).cmp(&(b.at, &b.message)));
-        list.dedup_by(|other, first| *other == Problem { row: other.row.clone(), ..first.clone() });
+        let kind = |problem: &Problem| without(&problem.message, &self.tags);
+        list.sort_by_cached_key(|problem| (problem.at, kind(problem)));
+        list.dedup_by(|other, first| {
+            let same = *other == Problem { row: other.row.clone(), ..first.clone() };
+            // Rows of a repeat, and devices with the same profile, differ in their names only.
+            same || other.at.is_some()
+                && other.at == first.at
+                && other.message != first.message
+                && kind(other) == kind(first)
+        });
         for problem in &mut list {
             if let Some(row) = problem.row.take() {
                 problem.message += &format!(" ({row})");

@@ -176,6 +176,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         }
         rows.push(of_device);
     }
+    problems.name_tags(names.tags.keys().cloned());
     let (mut devices, mut defined) = (Vec::new(), Vec::new());
     for (device, rows) in known.iter().zip(rows) {
         let (mut def, context) = define_device(DeviceId(to_u16(devices.len())), device, lines, &names, problems);

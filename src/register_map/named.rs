@@ -8,6 +8,7 @@ use crate::{
     plant::{
         exact::{Exact, digits},
         id::{DeviceId, TagId},
+        number::to_u8,
         raw_number::BadSpan,
         scale,
         tag::{Access, Bound, ByteOrder, DataType, Decimals, Encoding, Point, Poll, Table, TagDef},
@@ -127,9 +128,20 @@ impl Named {
         };
         let Some((decimals, unit)) = scaling else { return Named { unit: t!("raw").to_owned(), ..plain } };
         let power = if tag.decimals.source().is_some() { -decimals } else { 0 };
-        // As a person would write the product.
-        let scale = format!("{}e{power}", tag.scale).parse().unwrap_or(tag.scale);
+        let scale = times_power(tag.scale, power.into());
         Named { scale, offset: tag.offset, decimals: Decimals::shown(decimals), unit, ..plain }
+    }
+
+    /// The same with the power of ten that its device holds for it; `None` for one that is none: -10 to 10 are.
+    pub fn with_power(&self, power: i16) -> Option<Named> {
+        let power = Some(power).filter(|power| (-10..=10).contains(power))?;
+        let decimals = (i16::from(self.decimals) - power).clamp(0, 10);
+        Some(Named {
+            scale: times_power(self.scale, power.into()),
+            decimals: to_u8(decimals),
+            power_at: None,
+            ..self.clone()
+        })
     }
 
     /// The same of a type that holds a text: not every one can be written.
@@ -178,9 +190,10 @@ impl Named {
         if self.table.is_bits() { 1 } else { self.kind.registers() }
     }
 
-    /// Its value, of the words from its address on; `None` where there are too few or they hold no number.
+    /// Its value, of the words from its address on; `None` where there are too few, they hold no number, or the power of ten
+    /// is not known by which it is multiplied, see [`Named::with_power`].
     pub fn value(&self, words: &[u16]) -> Option<Exact> {
-        let raw = self.raw(words).filter(|raw| !self.is_bad(*raw))?;
+        let raw = self.raw(words).filter(|raw| !self.is_bad(*raw) && self.power_at.is_none())?;
         Some(scale::scaled(raw, self.scale, self.offset, 0))
     }
 
@@ -206,6 +219,9 @@ impl Named {
             let set: Vec<&str> = set.collect();
             return Some(if set.is_empty() { raw.to_string() } else { set.join(", ") });
         }
+        if self.power_at.is_some() {
+            return Some(format!("{raw} {}", t!("raw")));
+        }
         let value = digits(scale::scaled(raw, self.scale, self.offset, 0), Some(self.decimals));
         Some(if self.unit.is_empty() { value } else { format!("{value} {}", self.unit) })
     }
@@ -220,6 +236,11 @@ impl Named {
         let bit = || words.first().map(|word| f64::from(*word).into());
         if self.table.is_bits() { bit() } else { codec::decode(self.point(), words.get(..usize::from(self.count()))?) }
     }
+}
+
+/// As a person would write the product.
+fn times_power(scale: f64, power: i32) -> f64 {
+    format!("{scale}e{power}").parse().unwrap_or(scale)
 }
 
 /// Decimals that show what a scale leaves of a raw number.

@@ -19,13 +19,13 @@ use super::{
 };
 use crate::{
     plant::{
-        commands::{HAND_OVER, TAKE_OVER},
         def::{PlantDef, Priority, Section as Kind},
         exact::Exact,
         record::ActionRecord,
+        recorded_action::RecordedAction,
     },
     t,
-    text::{self, Locale, recorded, recorded_action, translate},
+    text::{self, Locale, recorded, translate},
 };
 
 /// The report as a document: the sections that the plant file asks for, without those that would be empty.
@@ -155,11 +155,16 @@ fn summary(report: &ShiftReport, def: &PlantDef) -> Vec<Fact> {
 
 /// The notes to the next shift, and who took the plant over.
 fn handover(report: &ShiftReport) -> Table {
-    let of = |action: &&ActionRecord| [HAND_OVER, TAKE_OVER].contains(&&*action.action);
+    let of = |action: &&ActionRecord| action.is(RecordedAction::HandOver) || action.is(RecordedAction::TakeOver);
     let columns = [Column::time("time"), Column::text("by"), Column::text("action"), Column::text("note")];
     Table::new(columns).with(report.actions.iter().filter(of).map(|action| {
         let note = Cell::text(action.note.as_deref().unwrap_or(""));
-        vec![Cell::Time(action.at), Cell::text(&action.by), Cell::text(recorded_action(&action.action)), note]
+        vec![
+            Cell::Time(action.at),
+            Cell::text(&action.by),
+            Cell::text(RecordedAction::translated(&action.action)),
+            note,
+        ]
     }))
 }
 
@@ -295,7 +300,7 @@ fn actions(actions: &[ActionRecord]) -> Table {
         vec![
             Cell::Time(action.at),
             Cell::text(&action.by),
-            Cell::text(recorded_action(&action.action)),
+            Cell::text(RecordedAction::translated(&action.action)),
             Cell::text(&action.target),
             text(&action.old),
             text(&action.new),

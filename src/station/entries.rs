@@ -5,12 +5,8 @@ use std::sync::Arc;
 use jiff::Timestamp;
 
 use crate::{
-    access::{
-        Users,
-        audit_log::{PLANT_FILE, USERS_FILE, sha256},
-        io::audit_log::Opened,
-    },
-    plant::record::ActionRecord,
+    access::{Users, audit_log::sha256, io::audit_log::Opened},
+    plant::{record::ActionRecord, recorded_action::RecordedAction},
     profile::PlantFile,
 };
 
@@ -44,7 +40,8 @@ impl RecordedFiles {
         at: Timestamp,
     ) -> Vec<ActionRecord> {
         let version = concat!("sightglass ", env!("CARGO_PKG_VERSION"));
-        let start = ActionRecord { new: Some(version.into()), ..entry(at, "start station", plant, "done") };
+        let start =
+            ActionRecord { new: Some(version.into()), ..entry(at, RecordedAction::StartStation, plant, "done") };
         let changed = file.and_then(|file| self.plant_file(file, at));
         let users = users.and_then(|users| self.users_file(users, at));
         [start].into_iter().chain(changed).chain(users).collect()
@@ -58,13 +55,13 @@ impl RecordedFiles {
     /// The entry of users that were found in their file; `None` if they are the last ones recorded.
     pub fn users_file(&mut self, digest: String, at: Timestamp) -> Option<ActionRecord> {
         let change = replace(&mut self.users, digest)?;
-        Some(with_change(entry(at, USERS_FILE, "users", "done: found"), change))
+        Some(with_change(entry(at, RecordedAction::UsersFile, "users", "done: found"), change))
     }
 
     /// The entry of a plant file; `None` if it is the last one recorded.
     pub fn plant_file(&mut self, file: &PlantFile, at: Timestamp) -> Option<ActionRecord> {
         let change = replace(&mut self.plant, sha256(file.bytes()))?;
-        Some(with_change(entry(at, PLANT_FILE, &file.path().display().to_string(), "done"), change))
+        Some(with_change(entry(at, RecordedAction::PlantFile, &file.path().display().to_string(), "done"), change))
     }
 }
 
@@ -84,31 +81,34 @@ fn with_change(entry: ActionRecord, (old, new): Change) -> ActionRecord {
 /// The system clock was set, from `old` to `new`.
 pub(super) fn clock_step(old: Timestamp, new: Timestamp) -> ActionRecord {
     let text = |at: Timestamp| at.strftime("%Y-%m-%dT%H:%M:%SZ").to_string().into();
-    with_change(entry(new, "clock step", "system clock", "done: applied at once"), (Some(text(old)), text(new)))
+    with_change(
+        entry(new, RecordedAction::ClockStep, "system clock", "done: applied at once"),
+        (Some(text(old)), text(new)),
+    )
 }
 
 /// The station has written a report, or found it where a station that was killed had written it.
 pub(super) fn report_exported(file: &str, sha256: &str, is_new: bool, at: Timestamp) -> ActionRecord {
     let outcome = if is_new { "done" } else { "done: found" };
-    ActionRecord { new: Some(sha256.into()), ..entry(at, "export", file, outcome) }
+    ActionRecord { new: Some(sha256.into()), ..entry(at, RecordedAction::Export, file, outcome) }
 }
 
 /// The station has deleted a report whose time is over, or left it alone because it has other bytes.
 pub(super) fn report_deleted(file: &str, sha256: &str, is_deleted: bool, at: Timestamp) -> ActionRecord {
     let outcome = if is_deleted { "done" } else { "failed: left alone" };
-    ActionRecord { old: Some(sha256.into()), ..entry(at, "delete report", file, outcome) }
+    ActionRecord { old: Some(sha256.into()), ..entry(at, RecordedAction::DeleteReport, file, outcome) }
 }
 
 /// The plant goes on as its file says now.
 pub(super) fn reloaded(plant: &str, summary: &str, at: Timestamp) -> ActionRecord {
-    entry(at, "reload", plant, &format!("done: {summary}"))
+    entry(at, RecordedAction::Reload, plant, &format!("done: {summary}"))
 }
 
 /// The last entry of a station.
 pub(super) fn stopped(plant: &str, at: Timestamp) -> ActionRecord {
-    entry(at, "stop station", plant, "done")
+    entry(at, RecordedAction::StopStation, plant, "done")
 }
 
-fn entry(at: Timestamp, action: &str, target: &str, outcome: &str) -> ActionRecord {
+fn entry(at: Timestamp, action: RecordedAction, target: &str, outcome: &str) -> ActionRecord {
     ActionRecord::new(at, "station", action, target, outcome)
 }

@@ -99,8 +99,8 @@ mod tests {
         history::io::alarm_metrics::Recent,
         plant::{
             def::Priority,
-            procedure,
             record::{AlarmEvent, ChainHash},
+            recorded_action::RecordedAction,
         },
     };
 
@@ -125,12 +125,13 @@ mod tests {
 
     #[test]
     fn a_start_that_only_the_audit_log_has_is_not_forgotten() {
-        let record = |second: i64, number: Option<u64>, action: &str| ActionRecord {
+        let record = |second: i64, number: Option<u64>, action: RecordedAction| ActionRecord {
             chain_hash: number.map(|number| ChainHash { number, ..audit_log::START }),
             ..ActionRecord::new(Timestamp::from_second(second).unwrap(), "anna", action, "fill", "done")
         };
-        let (end, start) = (record(9, Some(3), procedure::END), record(5, Some(4), procedure::START));
-        let unchained = record(11, None, procedure::END);
+        let (end, start) =
+            (record(9, Some(3), RecordedAction::EndProcedure), record(5, Some(4), RecordedAction::StartProcedure));
+        let unchained = record(11, None, RecordedAction::EndProcedure);
         for (logged, stored, expect) in [
             (Some(&start), Some(&end), Some(&start)),
             (Some(&start), None, Some(&start)),

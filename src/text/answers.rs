@@ -1,78 +1,7 @@
 //! What the station says in words of its own is English, because it stands in the audit log and in logs too; here a terminal
 //! reads it in its language: what is on record.
 
-use super::{fill, patterns, translate, translation};
-
-/// What actions are called on record, and parts of their outcomes.
-fn action_words() -> &'static [&'static str] {
-    &[
-        "write",
-        "write requested",
-        "unlock",
-        "refresh",
-        "connect",
-        "disconnect",
-        "configure",
-        "save settings",
-        "test",
-        "stop test",
-        "end test",
-        "read sets",
-        "save set",
-        "restore set",
-        "stop restore",
-        "start procedure",
-        "abort procedure",
-        "end procedure",
-        "write safe state",
-        "counter",
-        "correct counter",
-        "hand over",
-        "take over",
-        "acknowledge",
-        "silence",
-        "reset",
-        "shelve",
-        "unshelve",
-        "out of service",
-        "in service",
-        "step done",
-        "step undone",
-        "login",
-        "logout",
-        "lock terminal",
-        "unlock terminal",
-        "add user",
-        "change password",
-        "set role",
-        "disable user",
-        "enable user",
-        "delete user",
-        "reset password",
-        "export",
-        "back up history",
-        "restore history",
-        "import samples",
-        "request from outside",
-        "seal audit log",
-        "plant file",
-        "users file",
-        "audit log",
-        "too many requests",
-        "start station",
-        "stop station",
-        "reload",
-        "safe state written",
-        "safe state NOT complete",
-        "step {step} of {steps}",
-        "{count} requests",
-    ]
-}
-
-/// What an action is called on record, in the language of this thread.
-pub fn recorded_action(action: &str) -> &str {
-    if action_words().contains(&action) { translate(action) } else { action }
-}
+use super::{fill, patterns, translation};
 
 /// Between the parts of what is on record.
 const MARKS: [&str; 3] = [": ", "; ", ", "];

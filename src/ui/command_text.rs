@@ -9,6 +9,7 @@ use crate::{
         text_value,
     },
     t,
+    text::translate,
 };
 
 /// An outcome in words, and whether the operator should worry.
@@ -25,7 +26,7 @@ pub fn outcome_words(outcome: &Outcome) -> (String, bool) {
         }
         Outcome::NotConfirmed(
             why @ (NotConfirmed::NotAnswered(_)
-            | NotConfirmed::NotApplied(_)
+            | NotConfirmed::NotApplied(..)
             | NotConfirmed::Different(_)
             | NotConfirmed::NotRead(_)
             | NotConfirmed::StationStopped
@@ -47,7 +48,7 @@ pub fn command_label(cx: &ViewContext, kind: &CommandKind, old: Option<Exact>) -
         }
         CommandKind::Alarm(alarm_command) => {
             let (action, target, _) = alarm_action(cx.def(), alarm_command);
-            format!("{action} {target}")
+            format!("{} {target}", translate(action.word()))
         }
         CommandKind::Refresh(device) => t!("refresh {name}", name = cx.def().device(*device).name),
         CommandKind::Connect(line, true) => t!("connect {name}", name = cx.def().line(*line).name),

@@ -38,7 +38,8 @@ use sightglass::{
         alarm::{ActiveAlarm, AlarmCommand},
         command::{Command, CommandId, CommandKind, Outcome},
         def::AlarmId,
-        record::{AlarmEvent, AlarmRecord, SEAL_LOG},
+        record::{AlarmEvent, AlarmRecord},
+        recorded_action::RecordedAction,
         role::Role,
     },
     profile::{self, Search},
@@ -389,7 +390,7 @@ async fn what_was_reported_as_done_survives_the_kill_of_a_station() {
     station.signal("TERM");
     assert_eq!(station.end(), Some(0), "{:?}", station.said);
     let actions: Vec<_> = entries(&place.audit_log()).into_iter().map(|entry| entry.action).collect();
-    assert!(actions.ends_with(&["stop station".into(), SEAL_LOG.into()]), "{:?}", actions.last());
+    assert!(actions.ends_with(&["stop station".into(), RecordedAction::SealAuditLog.into()]), "{:?}", actions.last());
     // Each start has completed the history by what the log held before it.
     let def = profile::load(&place.plant(), &Search::shipped()).unwrap();
     let chain_hashes = Store::open_read_only(&place.history(), &def).unwrap().chain_hashes().unwrap();

@@ -13,6 +13,7 @@ use sightglass::{
         PlantDef,
         def::Priority,
         record::{ActionRecord, AlarmEvent, AlarmRecord, Record},
+        recorded_action::RecordedAction,
         sample::Sample,
     },
     profile::{self, Search},
@@ -95,8 +96,8 @@ fn a_report_says_which_entries_only_the_audit_log_has() {
     let path = folder.path().join("tank.duckdb");
     history(&path, |_, _| Vec::new());
     let at = |second| START.parse::<Timestamp>().unwrap() + SignedDuration::from_secs(second);
-    let mut entries =
-        [60, 120, 5_000].map(|second| ActionRecord::new(at(second), "anna", "write", "TIC-1.SV", "verified"));
+    let mut entries = [60, 120, 5_000]
+        .map(|second| ActionRecord::new(at(second), "anna", RecordedAction::Write, "TIC-1.SV", "verified"));
     AuditLog::open(&beside(&path)).unwrap().0.append(&mut entries).unwrap();
     let period = ["--from", START, "--to", "2026-03-02T07:00:00Z", "--out", "-"];
     let missing = |stored: &[ActionRecord]| {

@@ -15,7 +15,7 @@ use syn::{
 pub type Texts = BTreeMap<String, BTreeSet<String>>;
 
 /// Functions and fields whose texts are translated where they are drawn.
-const LABELS: [&str; 9] = ["label", "word", "words", "action_words", "message", "advice", "mode", "effect", "guidance"];
+const LABELS: [&str; 8] = ["label", "word", "words", "message", "advice", "mode", "effect", "guidance"];
 
 /// Texts of one file: of `t!`, of functions that label a state, and of rows of tables.
 #[derive(Default)]

@@ -46,7 +46,11 @@ fn texts_dates_and_addresses_are_written_into_pymodbus() {
     let port = port.to_string();
     for (tag, typed, words) in [
         ("M.PLACE", "Line 7", "→ Line 7: verified"),
-        ("M.PLACE", "A long text", "M.PLACE: found `A long text`, expected at most 8 printable characters"),
+        (
+            "M.PLACE",
+            "A long text",
+            "M.PLACE: found `A long text`, expected printable characters in at most 8 bytes, no blank at the end",
+        ),
         ("M.CLOCK", "2026-02-29 10:00", "M.CLOCK: found `2026-02-29 10:00`, expected a date and time such as"),
         ("M.CLOCK", "2026-02-28 23:59:05", "→ 2026-02-28 23:59:05: verified"),
         ("M.UTC", "2026-11-30 14:05:07", "→ 2026-11-30T07:05:07Z: verified"),

@@ -11,9 +11,7 @@ use super::{
 use crate::{
     access::{SessionRequest, user},
     plant::{
-        record::{ActionRecord, BACKUP, IMPORT},
-        request_refusal::RequestRefusal,
-        time::elapsed,
+        record::ActionRecord, recorded_action::RecordedAction, request_refusal::RequestRefusal, time::elapsed,
         visible::is_control_or_bidi,
     },
 };
@@ -57,7 +55,7 @@ impl AccessControl {
     pub(super) fn refuse(
         &mut self,
         requester: Requester,
-        action: &str,
+        action: RecordedAction,
         target: &str,
         why: RequestRefusal,
         at: Timestamp,
@@ -70,7 +68,7 @@ impl AccessControl {
     pub(super) fn refused(
         &mut self,
         terminal: u32,
-        action: &str,
+        action: RecordedAction,
         target: &str,
         why: &RequestRefusal,
         at: Timestamp,
@@ -86,7 +84,7 @@ impl AccessControl {
         for (origin, refusals) in &mut self.refusals {
             if refusals.unrecorded > 0 && elapsed(refusals.recorded_at, at) >= SUMMARY_EVERY {
                 let outcome = format!("refused: {} requests", refusals.unrecorded);
-                let entry = ActionRecord::new(at, NOT_LOGGED_IN, "too many requests", "", outcome);
+                let entry = ActionRecord::new(at, NOT_LOGGED_IN, RecordedAction::TooManyRequests, "", outcome);
                 effects.push(Effect::Record(ActionRecord { from: format!("user {origin}").into(), ..entry }));
                 (refusals.unrecorded, refusals.recorded_at) = (0, at);
             }
@@ -96,28 +94,28 @@ impl AccessControl {
 }
 
 /// What a request is called on record, and whom or what it is about.
-pub(super) fn words(request: &SessionRequest) -> (&'static str, Arc<str>) {
+pub(super) fn words(request: &SessionRequest) -> (RecordedAction, Arc<str>) {
     // What is typed in the wrong field may be a password.
     let name = |user: &str| if user::check_name(user).is_ok() { user.into() } else { "unknown user".into() };
     match request {
-        SessionRequest::Login { .. } => ("login", "unknown user".into()),
-        SessionRequest::Logout => ("logout", "".into()),
-        SessionRequest::Lock => ("lock terminal", "".into()),
-        SessionRequest::Unlock(_) => ("unlock terminal", "".into()),
-        SessionRequest::Active => ("active", "".into()),
-        SessionRequest::FirstSupervisor { user, .. } => ("add user", name(user)),
-        SessionRequest::ChangePassword { .. } => ("change password", "".into()),
-        SessionRequest::AddUser { user, .. } => ("add user", name(user)),
-        SessionRequest::SetRole { user, .. } => ("set role", name(user)),
-        SessionRequest::Disable { user, disabled: true } => ("disable user", name(user)),
-        SessionRequest::Disable { user, disabled: false } => ("enable user", name(user)),
-        SessionRequest::DeleteUser { user } => ("delete user", name(user)),
-        SessionRequest::ResetPassword { user, .. } => ("reset password", name(user)),
-        SessionRequest::Exported { file, .. } => ("export", clean(file).into()),
-        SessionRequest::Backup { folder } => (BACKUP, clean(folder).into()),
-        SessionRequest::Import { file } => (IMPORT, clean(file).into()),
-        SessionRequest::Stop => ("stop station", "".into()),
-        SessionRequest::Reload => ("reload", "".into()),
+        SessionRequest::Login { .. } => (RecordedAction::Login, "unknown user".into()),
+        SessionRequest::Logout => (RecordedAction::Logout, "".into()),
+        SessionRequest::Lock => (RecordedAction::Lock, "".into()),
+        SessionRequest::Unlock(_) => (RecordedAction::Unlocked, "".into()),
+        SessionRequest::Active => (RecordedAction::Active, "".into()),
+        SessionRequest::FirstSupervisor { user, .. } => (RecordedAction::AddUser, name(user)),
+        SessionRequest::ChangePassword { .. } => (RecordedAction::ChangePassword, "".into()),
+        SessionRequest::AddUser { user, .. } => (RecordedAction::AddUser, name(user)),
+        SessionRequest::SetRole { user, .. } => (RecordedAction::SetRole, name(user)),
+        SessionRequest::Disable { user, disabled: true } => (RecordedAction::DisableUser, name(user)),
+        SessionRequest::Disable { user, disabled: false } => (RecordedAction::EnableUser, name(user)),
+        SessionRequest::DeleteUser { user } => (RecordedAction::DeleteUser, name(user)),
+        SessionRequest::ResetPassword { user, .. } => (RecordedAction::ResetPassword, name(user)),
+        SessionRequest::Exported { file, .. } => (RecordedAction::Export, clean(file).into()),
+        SessionRequest::Backup { folder } => (RecordedAction::BackUpHistory, clean(folder).into()),
+        SessionRequest::Import { file } => (RecordedAction::ImportSamples, clean(file).into()),
+        SessionRequest::Stop => (RecordedAction::StopStation, "".into()),
+        SessionRequest::Reload => (RecordedAction::Reload, "".into()),
     }
 }
 
@@ -131,12 +129,24 @@ pub(super) fn actor_name(session: &SessionState) -> Arc<str> {
     }
 }
 
-pub(super) fn record(session: &SessionState, action: &str, target: &str, outcome: &str, at: Timestamp) -> ActionRecord {
+pub(super) fn record(
+    session: &SessionState,
+    action: RecordedAction,
+    target: &str,
+    outcome: &str,
+    at: Timestamp,
+) -> ActionRecord {
     let from = session.peer.from.clone();
     ActionRecord { from, ..ActionRecord::new(at, actor_name(session), action, target, outcome) }
 }
 
-pub(super) fn audit(session: &SessionState, action: &str, target: &str, outcome: &str, at: Timestamp) -> Effect {
+pub(super) fn audit(
+    session: &SessionState,
+    action: RecordedAction,
+    target: &str,
+    outcome: &str,
+    at: Timestamp,
+) -> Effect {
     Effect::Record(record(session, action, target, outcome, at))
 }
 

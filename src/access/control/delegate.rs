@@ -9,7 +9,7 @@ use super::{
     audit_entries::{audit, clean},
     session::SessionState,
 };
-use crate::{access::LoggedInUser, plant::record::OUTSIDE_REQUEST};
+use crate::{access::LoggedInUser, plant::recorded_action::RecordedAction};
 
 /// What its refusals are counted under.
 const ORIGIN: &str = "requests from outside";
@@ -22,7 +22,7 @@ impl AccessControl {
         (session.origin, session.acts_as) = (ORIGIN.into(), Some(user.clone()));
         (session.who, session.trusted) = (self.delegate(user), true);
         let outcome = if session.who.is_some() { "done: named by the plant file" } else { "refused: no such user" };
-        let mut effects = vec![audit(&session, "login", user, outcome, at)];
+        let mut effects = vec![audit(&session, RecordedAction::Login, user, outcome, at)];
         self.sessions.insert(terminal, session);
         self.publish_status(terminal, &mut effects);
         effects
@@ -32,7 +32,10 @@ impl AccessControl {
     /// there are.
     pub fn record_refusal(&self, terminal: u32, what: &str, outcome: &str, at: Timestamp) -> Vec<Effect> {
         let session = self.sessions.get(&terminal).filter(|session| session.acts_as.is_some());
-        session.map(|session| audit(session, OUTSIDE_REQUEST, &clean(what), &clean(outcome), at)).into_iter().collect()
+        session
+            .map(|session| audit(session, RecordedAction::OutsideRequest, &clean(what), &clean(outcome), at))
+            .into_iter()
+            .collect()
     }
 
     /// The user as whom requests act, as long as that user exists and is not disabled.

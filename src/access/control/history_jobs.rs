@@ -8,24 +8,21 @@ use super::{
     AccessControl, Effect, Requester,
     audit_entries::{clean, record},
 };
-use crate::plant::{
-    record::{ActionRecord, BACKUP, IMPORT},
-    request_refusal::RequestRefusal,
-};
+use crate::plant::{record::ActionRecord, recorded_action::RecordedAction, request_refusal::RequestRefusal};
 
 impl AccessControl {
     pub(super) fn begin_backup(&mut self, requester: Requester, folder: String, at: Timestamp) -> Vec<Effect> {
-        self.begin_history_job(requester, BACKUP, absolute(&folder), folder, Effect::Backup, at)
+        self.begin_history_job(requester, RecordedAction::BackUpHistory, absolute(&folder), folder, Effect::Backup, at)
     }
 
     pub(super) fn begin_import(&mut self, requester: Requester, file: String, at: Timestamp) -> Vec<Effect> {
-        self.begin_history_job(requester, IMPORT, plain_name(&file), file, Effect::Import, at)
+        self.begin_history_job(requester, RecordedAction::ImportSamples, plain_name(&file), file, Effect::Import, at)
     }
 
     fn begin_history_job(
         &mut self,
         requester: Requester,
-        action: &str,
+        action: RecordedAction,
         checked: Result<(), RequestRefusal>,
         path: String,
         effect: fn(u64, String) -> Effect,

@@ -6,7 +6,7 @@ use jiff::Timestamp;
 
 use super::{AccessControl, Effect, Requester, audit_entries::audit};
 use crate::access::{Secret, lockout::Key, password, user, user::UserChange};
-use crate::plant::{command::Command, request_refusal::RequestRefusal};
+use crate::plant::{command::Command, recorded_action::RecordedAction, request_refusal::RequestRefusal};
 
 /// Passwords of all users of the operating system that may be checked or wait; more are refused.
 pub(super) const JOBS_MAX: usize = 64;
@@ -260,12 +260,12 @@ impl AccessControl {
         let mut effects = Vec::new();
         if let (true, Some(user)) = (locked.account, user) {
             let outcome = format!("done: for {seconds} s, system user {origin}");
-            effects.push(audit(session, "lockout", &user, &outcome, at));
+            effects.push(audit(session, RecordedAction::Lockout, &user, &outcome, at));
             self.publish_status(terminal, &mut effects);
         }
         if locked.origin {
             let outcome = format!("done: for up to {seconds} s");
-            effects.push(audit(session, "lockout", &format!("system user {origin}"), &outcome, at));
+            effects.push(audit(session, RecordedAction::Lockout, &format!("system user {origin}"), &outcome, at));
         }
         effects
     }

@@ -11,7 +11,7 @@ use super::{
     session_status::LOCK_NEAR,
 };
 use crate::access::{LoggedInUser, Secret, user};
-use crate::plant::{request_refusal::RequestRefusal, time::elapsed};
+use crate::plant::{recorded_action::RecordedAction, request_refusal::RequestRefusal, time::elapsed};
 
 impl AccessControl {
     pub(super) fn login(&mut self, requester: Requester, user: &str, password: Secret, at: Timestamp) -> Vec<Effect> {
@@ -36,7 +36,7 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
-            return self.failed(requester, "login failed", user.as_deref(), wrong, at);
+            return self.failed(requester, RecordedAction::LoginFailed, user.as_deref(), wrong, at);
         }
         let Some(user) = user.and_then(|user| self.users.as_ref()?.get(&user).cloned()) else { return Vec::new() };
         if !self.sessions.contains_key(&requester.terminal) {
@@ -55,7 +55,7 @@ impl AccessControl {
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let name = who.user.clone();
         session.enter(who, at);
-        let mut effects = vec![audit(session, "login", &name, "done", at)];
+        let mut effects = vec![audit(session, RecordedAction::Login, &name, "done", at)];
         if let Some(users) = &mut self.users {
             users.logged_in(&name, utc);
             self.unsaved = true;
@@ -68,7 +68,7 @@ impl AccessControl {
     pub(super) fn failed(
         &mut self,
         requester: Requester,
-        action: &str,
+        action: RecordedAction,
         user: Option<&str>,
         JobError { why, message }: JobError,
         at: Timestamp,
@@ -96,7 +96,8 @@ impl AccessControl {
         let asked = self.users.is_some();
         let Some(session) = self.sessions.get_mut(&terminal) else { return Vec::new() };
         let Some(who) = &session.who else { return Vec::new() };
-        let effects = if asked { vec![audit(session, "logout", &who.user, outcome, at)] } else { Vec::new() };
+        let effects =
+            if asked { vec![audit(session, RecordedAction::Logout, &who.user, outcome, at)] } else { Vec::new() };
         session.leave();
         effects
     }
@@ -109,7 +110,7 @@ impl AccessControl {
             Some(session) if session.acting().is_some() => {
                 session.locked = true;
                 let target = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                let mut effects = vec![audit(session, "lock terminal", &target, "done", at), requester.done()];
+                let mut effects = vec![audit(session, RecordedAction::Lock, &target, "done", at), requester.done()];
                 self.publish_status(requester.terminal, &mut effects);
                 effects
             }
@@ -141,11 +142,11 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
-            return self.failed(requester, "unlock failed", Some(&user), wrong, at);
+            return self.failed(requester, RecordedAction::UnlockFailed, Some(&user), wrong, at);
         }
         let Some(session) = self.sessions.get_mut(&requester.terminal) else { return Vec::new() };
         (session.locked, session.active) = (false, at);
-        let mut effects = vec![audit(session, "unlock terminal", &user, "done", at), requester.done()];
+        let mut effects = vec![audit(session, RecordedAction::Unlocked, &user, "done", at), requester.done()];
         self.publish_status(requester.terminal, &mut effects);
         effects
     }
@@ -168,7 +169,7 @@ impl AccessControl {
             if let Some(session) = self.sessions.get_mut(&terminal).filter(|_| left.is_zero()) {
                 session.locked = true;
                 let name = session.who.as_ref().map(|who| who.user.clone()).unwrap_or_default();
-                effects.push(audit(session, "lock terminal", &name, "done: idle", at));
+                effects.push(audit(session, RecordedAction::Lock, &name, "done: idle", at));
                 self.publish_status(terminal, &mut effects);
             } else {
                 effects.push(Effect::SessionStatus(terminal));

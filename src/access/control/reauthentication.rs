@@ -18,6 +18,7 @@ use crate::{
         def::{Reauthentication, TagId},
         exact::Exact,
         interlock,
+        recorded_action::RecordedAction,
         request_refusal::RequestRefusal,
     },
 };
@@ -78,7 +79,7 @@ impl AccessControl {
             let mut effects = Vec::new();
             if let Some(session) = self.sessions.get(&terminal) {
                 let (approver, outcome) = (approver.as_deref().unwrap_or("unknown user"), format!("refused: {why}"));
-                effects.push(audit(session, "reauthentication failed", approver, &outcome, at));
+                effects.push(audit(session, RecordedAction::ReauthenticationFailed, approver, &outcome, at));
             }
             effects.extend(self.refuse_reauthentication(terminal, command, message, at));
             return effects;

@@ -13,12 +13,10 @@ use super::{
 };
 use crate::{
     access::{
-        LoggedInUser, Secret, SessionRequest, Users,
-        audit_log::USERS_FILE,
-        password,
+        LoggedInUser, Secret, SessionRequest, Users, password,
         user::{self, UserChange},
     },
-    plant::{record::ActionRecord, request_refusal::RequestRefusal, role::Role},
+    plant::{record::ActionRecord, recorded_action::RecordedAction, request_refusal::RequestRefusal, role::Role},
 };
 
 /// In a change until the new password is hashed.
@@ -127,7 +125,7 @@ impl AccessControl {
         at: Timestamp,
     ) -> Vec<Effect> {
         if let Some(wrong) = wrong {
-            return self.failed(requester, "change password", Some(&user), wrong, at);
+            return self.failed(requester, RecordedAction::ChangePassword, Some(&user), wrong, at);
         }
         let change = UserChange::Password { user, hash: NO_HASH.into(), must_change: false };
         self.new_password(requester, new, change).unwrap_or_else(|why| requester.refused(why))
@@ -254,7 +252,7 @@ impl AccessControl {
         let before = self.users.replace(users);
         let digest = |users: Option<&Users>| users.map(|users| users.digest().into());
         let (old, new) = (digest(before.as_ref()), digest(self.users.as_ref()));
-        let file = ActionRecord::new(record.at, "station", USERS_FILE, "users", record.outcome.clone());
+        let file = ActionRecord::new(record.at, "station", RecordedAction::UsersFile, "users", record.outcome.clone());
         let file = ActionRecord { old, new, ..file };
         let mut effects = vec![Effect::Record(*record), Effect::Record(file), requester.done()];
         effects.extend(self.apply_to_sessions(requester.terminal, &change, at));

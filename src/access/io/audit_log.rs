@@ -14,13 +14,14 @@ use jiff::Timestamp;
 
 use crate::{
     access::{
-        audit_log::{self, Check, FirstBad, PLANT_FILE, Summary, USERS_FILE},
+        audit_log::{self, Check, FirstBad, Summary},
         sealing::{self, Key},
     },
     history::io::chain::CHAIN_HASHES_MAX,
     plant::{
         procedure,
         record::{ActionRecord, ChainHash},
+        recorded_action::RecordedAction,
     },
     profile::io::{atomic, regular},
 };
@@ -175,10 +176,10 @@ impl AuditLog {
         let mut check = Check::new(head, &[]);
         let mut last_seal = None;
         let Scanned { bytes, torn } = scan(file.try_clone()?, &mut check, |entry, chain_hash| {
-            if &*entry.action == PLANT_FILE {
+            if *entry.action == *RecordedAction::PlantFile.word() {
                 opened.plant_file.clone_from(&entry.new);
                 opened.plant_file_since = Some(entry.utc);
-            } else if &*entry.action == USERS_FILE {
+            } else if *entry.action == *RecordedAction::UsersFile.word() {
                 opened.users_file.clone_from(&entry.new);
             }
             last_seal = sealing::number(&entry).map(|number| (number, entry.n)).or(last_seal);

@@ -34,7 +34,10 @@ use crate::{
         },
         words::plain,
     },
-    plant::record::{ActionRecord, AlarmRecord, ChainHash, Record},
+    plant::{
+        record::{ActionRecord, AlarmRecord, ChainHash, Record},
+        recorded_action::RecordedAction,
+    },
 };
 
 /// Write groups on their way to the thread; the sender handles a full queue.
@@ -334,7 +337,13 @@ impl Recorder {
 
     /// Something about the log itself.
     fn note(&self, outcome: &str) -> ActionRecord {
-        ActionRecord::new(self.clock.utc(), "station", "audit log", self.path.display().to_string(), outcome)
+        ActionRecord::new(
+            self.clock.utc(),
+            "station",
+            RecordedAction::AuditLog,
+            self.path.display().to_string(),
+            outcome,
+        )
     }
 
     fn status(&self) -> Recorded {

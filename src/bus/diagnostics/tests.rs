@@ -6,10 +6,13 @@ use crate::plant::{
     def::Framing,
     fault::ExceptionCode,
     line_trouble::LineTrouble,
+    tag::{ByteOrder, DataType, Point},
+    tag_value::TagValue,
 };
 use crate::{
     bus::names,
     plant::{
+        data_type::Clock,
         diagnostics::{PatternTally, Scan},
         port_signals::SignalTest,
     },
@@ -24,19 +27,7 @@ pub(super) fn run(diagnostic: Diagnostic, device: impl Fn(&[u8]) -> Result<Vec<u
         let result = match next.ask.clone() {
             Ask::Raw(bytes) => StepResult::Bytes(bytes, Some(Duration::from_millis(1))),
             Ask::Hold(..) | Ask::PutBack => panic!("no diagnostic of these tests sets a signal"),
-            Ask::Message(request) => {
-                let answer = device(&request);
-                let exchange = Exchange {
-                    at: Timestamp::UNIX_EPOCH,
-                    framing: Framing::Mbap,
-                    outcome: answer.as_ref().map(drop).map_err(|fault| *fault),
-                    answer: answer.clone().unwrap_or_default().into(),
-                    request: request.into(),
-                    response_time: answer.is_ok().then_some(Duration::from_millis(12)),
-                    tries: 1,
-                };
-                StepResult::Answer(answer, Arc::new(exchange))
-            }
+            Ask::Message(request) => answered(device(&request)),
         };
         job.on_result(result);
     }
@@ -219,7 +210,7 @@ fn a_write_is_sent_once_and_read_back() {
     assert_eq!(written(&held, |_| Err(Fault::Exception(ExceptionCode(3)))), (refused, 1));
     let differs = Outcome::NotConfirmed(NotConfirmed::Different(700.0.into()));
     assert_eq!(written(&held, |_| Ok(())), (differs, 1), "accepted and not done");
-    let silent = Outcome::NotConfirmed(NotConfirmed::NotApplied(700.0.into()));
+    let silent = Outcome::NotConfirmed(NotConfirmed::NotApplied(Fault::Timeout, 700.0.into()));
     assert_eq!(written(&held, |_| Err(Fault::Timeout)), (silent, 1), "never repeated");
     let late = |word| {
         held.set(word);
@@ -235,12 +226,80 @@ fn a_write_is_sent_once_and_read_back() {
     assert!(done.findings.contains(&unknown), "the same value as before proves nothing: {:?}", done.findings);
 }
 
+/// The result of a step that was answered so.
+fn answered(answer: Result<Vec<u8>, Fault>) -> StepResult {
+    let exchange = Exchange {
+        at: Timestamp::UNIX_EPOCH,
+        framing: Framing::Mbap,
+        outcome: answer.as_ref().map(drop).map_err(|fault| *fault),
+        answer: answer.clone().unwrap_or_default().into(),
+        request: Vec::new().into(),
+        response_time: answer.is_ok().then_some(Duration::from_millis(12)),
+        tries: 1,
+    };
+    StepResult::Answer(answer, Arc::new(exchange))
+}
+
+#[test]
+fn a_write_that_is_cut_short_says_what_is_known_of_it() {
+    let lost = DiagnosticState::Failed(LineTrouble::NotConnected);
+    let not_confirmed = |why| Outcome::NotConfirmed(why);
+    let read = || Ok(vec![1, 3, 2, 0x02, 0xBC]);
+    for (answers, state, expect) in [
+        (vec![], lost.clone(), Outcome::Refused(Refusal::NotSent(Fault::NotConnected))),
+        (vec![read()], lost.clone(), not_confirmed(NotConfirmed::NotAnswered(Fault::NotConnected))),
+        (vec![read()], DiagnosticState::Cancelled, not_confirmed(NotConfirmed::NotAnswered(Fault::Timeout))),
+        (vec![read(), Ok(vec![1, 6])], lost.clone(), not_confirmed(NotConfirmed::NotRead(Fault::NotConnected))),
+        (vec![read(), Err(Fault::Hangup)], lost, not_confirmed(NotConfirmed::NotAnswered(Fault::Hangup))),
+    ] {
+        let write = Diagnostic::Write(RegisterWrite::holding(1_002, 700, 601));
+        let mut job = Job::new(CommandId { terminal: 1, number: 1 }, "anna".into(), write, Timestamp::UNIX_EPOCH);
+        answers.into_iter().for_each(|answer| job.on_result(answered(answer)));
+        job.stop(state);
+        assert_eq!(job.run().findings.last(), Some(&Finding::Written(expect.clone())));
+        assert!(job.run().outcome_text().ends_with(&expect.to_string()), "{}", job.run().outcome_text());
+    }
+}
+
+#[test]
+fn a_clock_is_set_over_whatever_it_shows_and_goes_on() {
+    let point = Point {
+        table: Table::Holding,
+        address: 50,
+        kind: DataType::Clock(Clock::Bytes),
+        order: ByteOrder::Abcd,
+        field: None,
+    };
+    let check = |shown: [u16; 3], expect: Outcome| {
+        let write = RegisterWrite {
+            words: vec![0x1A0B, 0x1C11, 0x031D],
+            expected: vec![0x1A01, 0x0101, 0x0101],
+            clock: Some(point),
+            ..RegisterWrite::holding(50, 0, 0)
+        };
+        let held = std::cell::Cell::new([0x1A01, 0x0101, 0x0109]);
+        let done = run(Diagnostic::Write(write), |request| match request[1] {
+            3 => Ok([vec![1, 3, 6], held.get().into_iter().flat_map(u16::to_be_bytes).collect()].concat()),
+            _ => {
+                held.set(shown);
+                Ok(request[..6].to_vec())
+            }
+        });
+        assert!(done.findings.contains(&Finding::Written(expect)), "{:?}", done.findings);
+    };
+    check([0x1A0B, 0x1C11, 0x031D], Outcome::Verified);
+    check([0x1A0B, 0x1C11, 0x031E], Outcome::Verified);
+    let earlier = TagValue::Text("6667 7185 796".into());
+    check([0x1A0B, 0x1C11, 0x031C], Outcome::NotConfirmed(NotConfirmed::Different(earlier)));
+}
+
 #[test]
 fn writes_of_several_and_of_bits_have_their_functions() {
     let sent = std::cell::RefCell::new(Vec::new());
     let write = |table, words: Vec<u16>, multiple| {
         let expected = vec![0; words.len()];
-        let write = RegisterWrite { unit: 1, table, address: 5, words, expected: expected.clone(), multiple };
+        let write =
+            RegisterWrite { unit: 1, table, address: 5, words, expected: expected.clone(), multiple, clock: None };
         run(Diagnostic::Write(write), |request| match request[1] {
             1 => Ok(vec![1, 1, 2, 0, 0]),
             3 => Ok([vec![1, 3, 2 * expected.len() as u8], vec![0; 2 * expected.len()]].concat()),

@@ -1,17 +1,27 @@
 //! A write without a plant file: read what the operator saw, write once, read back. Nothing is ever sent twice.
 
+use std::time::Duration;
+
 use super::{Step, read, step};
 use crate::{
-    bus::pdu::{self, Pdu},
+    bus::{
+        codec,
+        pdu::{self, Pdu},
+    },
     plant::{
         command::{NotConfirmed, Outcome, Refusal},
         diagnostics::RegisterWrite,
         exact::Exact,
         fault::Fault,
         number::to_u16,
+        tag::Point,
+        tag_value::TagValue,
+        text_value,
     },
 };
 
+/// A clock is read back at once, and may have gone on by this.
+const READ_BACK_AFTER: Duration = Duration::from_secs(1);
 /// Steps of a write.
 pub const STEPS: u32 = 3;
 
@@ -37,7 +47,7 @@ fn message(write: &RegisterWrite) -> Vec<u8> {
 /// Before the write: its end, if the device no longer holds what the operator saw, or does not say what it holds.
 pub fn after_first_read(write: &RegisterWrite, held: Result<Vec<u16>, Fault>) -> Option<Outcome> {
     match held {
-        Ok(held) if held == write.expected => None,
+        Ok(held) if held == write.expected || write.clock.is_some() => None,
         Ok(held) => Some(Outcome::Refused(Refusal::ChangedTo(text(&held)))),
         Err(Fault::Exception(code)) => Some(Outcome::Refused(Refusal::Exception(code))),
         Err(fault) => Some(Outcome::Refused(Refusal::NotSent(fault))),
@@ -57,12 +67,32 @@ pub fn after_read_back(write: &RegisterWrite, answered: Result<(), Fault>, held:
     Outcome::NotConfirmed(match (held, answered) {
         // What it held before proves nothing of a write that was not answered.
         (Ok(held), Err(fault)) if held == write.words && held == write.expected => NotConfirmed::NotAnswered(fault),
-        (Ok(held), _) if held == write.words => return Outcome::Verified,
-        (Ok(held), Ok(())) => NotConfirmed::Different(number(&held).into()),
-        (Ok(held), Err(_)) => NotConfirmed::NotApplied(number(&held).into()),
+        (Ok(held), _) if is_held(write, &held) => return Outcome::Verified,
+        (Ok(held), Ok(())) => NotConfirmed::Different(value(&held)),
+        (Ok(held), Err(fault)) => NotConfirmed::NotApplied(fault, value(&held)),
         (Err(_), Err(fault)) => NotConfirmed::NotAnswered(fault),
         (Err(fault), Ok(())) => NotConfirmed::NotRead(fault),
     })
+}
+
+/// Does a device that shows these words hold what was written? A clock has gone on since.
+fn is_held(write: &RegisterWrite, held: &[u16]) -> bool {
+    let shown = |point: Point, words| codec::decode_text(point, words);
+    let clock = write.clock.map(|point| (point.kind, shown(point, &write.words), shown(point, held)));
+    match clock {
+        Some((kind, Some(written), Some(shown))) => text_value::is_held(kind, &written, &shown, READ_BACK_AFTER),
+        _ => held == write.words,
+    }
+}
+
+/// What becomes of a write that ends before it was read back: `lost` is why, `made` how many of its steps were made.
+pub fn unfinished(made: u32, written: Result<(), Fault>, lost: Fault) -> Outcome {
+    match (made, written) {
+        (0 | 1, _) => Outcome::Refused(Refusal::NotSent(lost)),
+        (2, _) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(lost)),
+        (_, Err(fault)) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(fault)),
+        (_, Ok(())) => Outcome::NotConfirmed(NotConfirmed::NotRead(lost)),
+    }
 }
 
 /// The values that a response to a read holds.
@@ -71,11 +101,11 @@ pub fn words_of(request: &[u8], answer: &[u8]) -> Option<Vec<u16>> {
     Some(words)
 }
 
-/// Several words as one number, the first the most significant.
-fn number(words: &[u16]) -> Exact {
-    match words.len() {
-        0..=4 => Exact::whole(words.iter().fold(0, |number, word| number << 16 | i128::from(*word))),
-        _ => words.iter().fold(0.0, |number, word| number * 65_536.0 + f64::from(*word)).into(),
+/// One word as a number; several as they are written.
+fn value(words: &[u16]) -> TagValue {
+    match words {
+        [word] => Exact::whole((*word).into()).into(),
+        several => TagValue::Text(text(several).into()),
     }
 }
 

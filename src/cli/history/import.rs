@@ -25,7 +25,7 @@ use crate::{
             store::Store,
         },
     },
-    plant::{PlantDef, record::IMPORT},
+    plant::{PlantDef, recorded_action::RecordedAction},
     station::Session,
 };
 
@@ -113,8 +113,9 @@ fn into_file(def: &Arc<PlantDef>, path: &Path, file: &Path) -> Result<(), CliErr
     };
     let mut progress = Progress::new(importing.import.rows);
     let cancelled = cancelled_by_ctrl_c(|| {});
-    let mut put_on_record =
-        |outcome: String| record(&mut log, IMPORT, &file.display().to_string(), &outcome, Timestamp::now());
+    let mut put_on_record = |outcome: String| {
+        record(&mut log, RecordedAction::ImportSamples, &file.display().to_string(), &outcome, Timestamp::now())
+    };
     while store.import_piece(&mut importing)? {
         progress.show(importing.done());
         if cancelled.load(Ordering::Relaxed) {

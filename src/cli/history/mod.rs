@@ -14,7 +14,7 @@ use jiff::Timestamp;
 use super::{CliError, StationArgs, client, load, source::Source};
 use crate::{
     access::io::{audit_log::AuditLog, own_user},
-    plant::{PlantDef, record::ActionRecord},
+    plant::{PlantDef, record::ActionRecord, recorded_action::RecordedAction},
 };
 
 /// Arguments of `history`.
@@ -95,7 +95,13 @@ fn open_log(log: &Path) -> Result<AuditLog, CliError> {
 }
 
 /// Puts what was done to a history without its station on record.
-fn record(log: &mut AuditLog, action: &str, target: &str, outcome: &str, at: Timestamp) -> Result<(), CliError> {
+fn record(
+    log: &mut AuditLog,
+    action: RecordedAction,
+    target: &str,
+    outcome: &str,
+    at: Timestamp,
+) -> Result<(), CliError> {
     let entry = ActionRecord::new(at, own_user(), action, target, outcome);
     let entry = ActionRecord { from: "command line".into(), ..entry };
     log.append(&mut [entry]).map_err(CliError::io("the audit log cannot be written"))

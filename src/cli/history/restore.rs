@@ -20,7 +20,7 @@ use crate::{
             reunite::{self, Reunited},
         },
     },
-    plant::record::RESTORE,
+    plant::recorded_action::RecordedAction,
     profile::io::atomic::write_atomic,
     station::companions,
 };
@@ -70,10 +70,10 @@ fn from_set_aside(db: &Path, now: Timestamp) -> Result<(), CliError> {
     let target = sound.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ");
     let mut log = open_log(&audit_log::beside(db))?;
     let outcome = |word: &str| format!("{word}: {rows} rows that were set aside");
-    record(&mut log, RESTORE, &target, &outcome("begun"), now)?;
+    record(&mut log, RecordedAction::RestoreHistory, &target, &outcome("begun"), now)?;
     restore::commit(db)?;
     restore::finish(db)?;
-    record(&mut log, RESTORE, &target, &outcome("done"), now)?;
+    record(&mut log, RecordedAction::RestoreHistory, &target, &outcome("done"), now)?;
     say(&format!("brought back {target}: {rows} rows, with those recorded since{}", set_aside(&aside)));
     Ok(())
 }
@@ -95,13 +95,13 @@ fn from_backup(from: &Path, plant: &str, db: &Path, now: Timestamp) -> Result<()
     let outcome = |word: &str| format!("{word}: {what}{}", set_aside(&aside));
     let mut kept = present.filter(|_| is_kept);
     if let Some(log) = &mut kept {
-        record(log, RESTORE, &target, &outcome("begun"), now)?;
+        record(log, RecordedAction::RestoreHistory, &target, &outcome("begun"), now)?;
     }
     let (restored, present) = restore_companions(from, &sound.backup, db, plant)?;
     restore::commit(db)?;
     restore::finish(db)?;
     let mut log = kept.map_or_else(|| open_log(&log), Ok)?;
-    record(&mut log, RESTORE, &target, &outcome("done"), now)?;
+    record(&mut log, RecordedAction::RestoreHistory, &target, &outcome("done"), now)?;
     say(&format!(
         "restored {}: {what}{}",
         from.display(),

@@ -16,6 +16,7 @@ use crate::{
         source::{Source, unexpected},
     },
     history::{Answer, Query},
+    plant::recorded_action::RecordedAction,
     profile::io::atomic::with_suffix,
     station::io::{report_files::CHECKSUM, reports::REPORTS_MAX},
 };
@@ -124,7 +125,7 @@ async fn of_record(source: &Source, file: &Path, sha: &str) -> Result<Compared, 
 
 /// Whether the audit log has an export of it.
 async fn of_log(source: &Source, sha: &str) -> Compared {
-    let (words, by, action) = (sha.to_owned(), String::new(), "export".to_owned());
+    let (words, by, action) = (sha.to_owned(), String::new(), RecordedAction::Export.word().to_owned());
     let query = Query::Audit { from: Timestamp::UNIX_EPOCH, to: Timestamp::MAX, words, by, action, limit: ENTRIES_MAX };
     match source.query(query).await {
         Ok(Answer::Actions(actions)) => match actions.iter().find(|action| action.new.as_deref() == Some(sha)) {

@@ -27,10 +27,11 @@ use crate::{
         tiers::{Aggregate, CurvePart, HOUR, Piece, Tier, floor, rise},
     },
     plant::{
-        counter::{self, Counter, CounterEvent, CounterRule, CounterStep, Reading, pace},
+        counter::{Counter, CounterEvent, CounterRule, CounterStep, Reading, pace},
         def::TagId,
         exact::Exact,
         record::ActionRecord,
+        recorded_action::RecordedAction,
     },
 };
 
@@ -252,7 +253,9 @@ impl Store {
     fn correct(&self, tags: &mut [(TagId, CountedTag)], leg: &Leg) -> Result<(), HistoryError> {
         let (Some(from), Some(to)) = (instant(leg.from), instant(leg.to)) else { return Ok(()) };
         let sql = sql::corrections(&leg.epochs.condition());
-        for correction in self.list(&sql, params![counter::CORRECT, utc(from), utc(to)], ActionRecord::read)? {
+        for correction in
+            self.list(&sql, params![RecordedAction::CorrectCounter.word(), utc(from), utc(to)], ActionRecord::read)?
+        {
             let amount = correction.new.as_deref().and_then(|new| new.split(' ').next()?.parse().ok());
             let tag = tags.iter_mut().find(|(id, _)| *self.def.tag(*id).name == *correction.target);
             if let (Some((_, tag)), Some(amount)) = (tag, amount) {

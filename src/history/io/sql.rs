@@ -12,8 +12,8 @@ use crate::{
         command::{CommandKind, Outcome},
         def::{ParquetVersion, ProcedureId},
         line_minute::LineMinute,
-        procedure,
-        record::{ActionRecord, AlarmRecord, NOT_PROCESS_ACTIONS},
+        record::{ActionRecord, AlarmRecord},
+        recorded_action::RecordedAction,
     },
 };
 
@@ -141,7 +141,7 @@ pub fn restore() -> String {
 
 /// Actions on the plant in a span, without those on users and terminals.
 pub fn actions(order: &str) -> String {
-    let others = NOT_PROCESS_ACTIONS.map(|word| format!("'{word}'")).join(", ");
+    let others = RecordedAction::words_beside_process().map(|word| format!("'{word}'")).collect::<Vec<_>>().join(", ");
     format!(
         "SELECT {} FROM operator_action WHERE utc >= ? AND utc < ? AND action NOT IN ({others}) {order}",
         ActionRecord::columns()
@@ -183,12 +183,12 @@ pub fn latest_procedure() -> String {
         "SELECT {} FROM operator_action WHERE (action = '{}' AND outcome IN ('{}', '{}')) OR action IN ('{}', '{}')
          ORDER BY rowid DESC LIMIT 1",
         ActionRecord::columns(),
-        procedure::START,
+        RecordedAction::StartProcedure.word(),
         CommandKind::StartProcedure(ProcedureId(0)).label(),
         // So it was called before.
         Outcome::Verified.label(),
-        procedure::WRITE_SAFE_STATE,
-        procedure::END
+        RecordedAction::WriteSafeState.word(),
+        RecordedAction::EndProcedure.word()
     )
 }
 

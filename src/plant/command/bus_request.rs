@@ -36,8 +36,8 @@ pub struct WriteJob {
 pub enum WriteResult {
     /// The device accepted it; then it was read back: this raw number, or this text.
     ReadBack(TagValue),
-    /// No valid answer; read once the unit was in sync again, the device holds this raw number, or this text.
-    ReadBackAfterNoResponse(TagValue),
+    /// No valid answer, for this reason; read once the unit was in sync again, the device holds this raw number, or this text.
+    ReadBackAfterFault(Fault, TagValue),
     /// The device accepted it, but the read-back failed.
     NotRead(Fault),
     /// The device accepted it; the profile excludes a read-back.

@@ -129,9 +129,9 @@ pub enum NotConfirmed {
     /// No valid answer: it may or may not have taken effect.
     #[error("{}", t!("{what}; it may have taken effect", what = .0))]
     NotAnswered(Fault),
-    /// No valid answer, and the device holds another value.
-    #[error("{}", t!("no response, not applied: the device has {what}", what = .0))]
-    NotApplied(TagValue),
+    /// No valid answer, for this reason, and the device holds another value.
+    #[error("{}", t!("{what}, not applied: the device has {held}", what = .0, held = .1))]
+    NotApplied(Fault, TagValue),
     /// Read back, and different.
     #[error("{}", t!("read back {what}", what = .0))]
     Different(TagValue),

@@ -1,5 +1,9 @@
 //! The checks of a write before it goes to the bus.
 
+use std::time::Duration;
+
+use jiff::Timestamp;
+
 use super::{CommandTracker, Limits};
 use crate::plant::{
     command::{CommandStatus, Outcome, Refusal, WriteId, WriteJob},
@@ -13,7 +17,15 @@ use crate::plant::{
     tag::{Access, Bound},
     tag_value::TagValue,
     text_value::{self, ExpectedText},
+    time::elapsed,
 };
+
+/// What was read longer ago may have been changed at the device: it is written, not called unchanged.
+const FRESH: Duration = Duration::from_secs(5);
+
+fn is_fresh(image: &ProcessImage, tag: TagId, at: Timestamp) -> bool {
+    elapsed(image.sample(tag).at, at) <= FRESH
+}
 
 impl CommandTracker {
     /// Checks a write against access, choices, bounds, type, what is under way, and the value that the operator saw.
@@ -24,7 +36,7 @@ impl CommandTracker {
         written: (TagId, Exact),
         limits: Limits,
     ) -> Result<WriteJob, Outcome> {
-        let job = self.check_value(image, written, limits)?;
+        let job = self.check_value(image, written, limits, status.at)?;
         self.check_expected(image, status, &job)?;
         Ok(job)
     }
@@ -48,6 +60,7 @@ impl CommandTracker {
         image: &ProcessImage,
         (tag, value): (TagId, Exact),
         limits: Limits,
+        at: Timestamp,
     ) -> Result<WriteJob, Outcome> {
         let refuse = |refusal| Err(Outcome::Refused(refusal));
         let def = self.def.tag(tag);
@@ -99,7 +112,8 @@ impl CommandTracker {
             return refuse(Refusal::Resolution(value_text(image, def, held)));
         }
         // What was read before the write under way says nothing about the time after it.
-        if !is_busy && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw)) {
+        if !is_busy && is_fresh(image, tag, at) && image.good_raw(tag).is_some_and(|now| scale::same_raw(def, now, raw))
+        {
             return Err(Outcome::Unchanged);
         }
         Ok(self.job(image, tag, raw.into(), urgent))
@@ -110,6 +124,7 @@ impl CommandTracker {
         &self,
         image: &ProcessImage,
         (tag, held, seen): (TagId, Result<String, ExpectedText>, Option<&str>),
+        at: Timestamp,
     ) -> Result<WriteJob, Outcome> {
         let refuse = |refusal| Err(Outcome::Refused(refusal));
         let def = self.def.tag(tag);
@@ -125,7 +140,7 @@ impl CommandTracker {
         match now {
             Some(now) if seen.is_none() => refuse(Refusal::NotSeen(now.to_owned())),
             Some(now) if seen != Some(now) => refuse(Refusal::ChangedTo(now.to_owned())),
-            Some(now) if now == held => Err(Outcome::Unchanged),
+            Some(now) if now == held && is_fresh(image, tag, at) => Err(Outcome::Unchanged),
             _ => Ok(self.job(image, tag, TagValue::Text(held.into()), false)),
         }
     }

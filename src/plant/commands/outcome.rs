@@ -29,9 +29,11 @@ pub(super) fn of_write(
         (TagValue::Number(_), TagValue::Text(_)) | (TagValue::Text(_), TagValue::Number(_)) => false,
     };
     match result {
-        WriteResult::ReadBack(back) | WriteResult::ReadBackAfterNoResponse(back) if is_held(&back) => Outcome::Verified,
+        WriteResult::ReadBack(back) | WriteResult::ReadBackAfterFault(_, back) if is_held(&back) => Outcome::Verified,
         WriteResult::ReadBack(back) => Outcome::NotConfirmed(NotConfirmed::Different(value(back))),
-        WriteResult::ReadBackAfterNoResponse(back) => Outcome::NotConfirmed(NotConfirmed::NotApplied(value(back))),
+        WriteResult::ReadBackAfterFault(fault, back) => {
+            Outcome::NotConfirmed(NotConfirmed::NotApplied(fault, value(back)))
+        }
         unread => without_read_back(&unread),
     }
 }
@@ -45,7 +47,7 @@ pub(super) fn without_read_back(result: &WriteResult) -> Outcome {
         WriteResult::NoValidResponse(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
         WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(*fault)),
         WriteResult::Sent => Outcome::Sent,
-        WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::ReadBackAfterNoResponse(_) => {
+        WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::ReadBackAfterFault(..) => {
             Outcome::NotConfirmed(NotConfirmed::NoReadBack)
         }
     }

@@ -3,9 +3,6 @@
 use super::{Conclusion, Diagnostic, DiagnosticRun, DiagnosticState, Finding};
 use crate::t;
 
-/// The recorded word for the end of a test.
-pub const END: &str = "end test";
-
 impl DiagnosticRun {
     /// Did all that it was for go well?
     pub fn has_passed(&self) -> bool {
@@ -38,8 +35,11 @@ impl DiagnosticRun {
             DiagnosticState::Running => return String::new(),
             DiagnosticState::Done if self.has_passed() => (t!("passed"), self.result(true)),
             DiagnosticState::Done => (t!("failed"), self.result(false)),
-            DiagnosticState::Cancelled => (t!("cancelled"), None),
-            DiagnosticState::Failed(why) => (t!("failed"), Some(why.to_string())),
+            DiagnosticState::Cancelled => (t!("cancelled"), self.written()),
+            DiagnosticState::Failed(why) => (
+                t!("failed"),
+                Some([Some(why.to_string()), self.written()].into_iter().flatten().collect::<Vec<_>>().join("; ")),
+            ),
         };
         let requests = match self.requests {
             1 => t!("1 request").to_owned(),
@@ -66,16 +66,20 @@ impl DiagnosticRun {
         { conclusions }.find(|conclusion| !matches!(conclusion, Conclusion::Deaf(_)))
     }
 
-    /// What follows from all of it; else what became of its write, or why it failed.
-    fn result(&self, has_passed: bool) -> Option<String> {
-        let written = self.findings.iter().find_map(|finding| {
+    /// What became of its write.
+    fn written(&self) -> Option<String> {
+        self.findings.iter().find_map(|finding| {
             let Finding::Written(outcome) = finding else { return None };
             Some(outcome.to_string())
-        });
+        })
+    }
+
+    /// What follows from all of it; else what became of its write, or why it failed.
+    fn result(&self, has_passed: bool) -> Option<String> {
         let failed = self.findings.iter().rev().find_map(|finding| {
             let Finding::Failed { fault, .. } = finding else { return None };
             Some(fault.to_string())
         });
-        self.conclusion().map(ToString::to_string).or(written).or(failed.filter(|_| !has_passed))
+        self.conclusion().map(ToString::to_string).or_else(|| self.written()).or(failed.filter(|_| !has_passed))
     }
 }

@@ -5,8 +5,8 @@ use std::{sync::Arc, time::Duration};
 use jiff::Timestamp;
 
 use super::{
-    NOT_SAFE, NotConfirmed, PlantDef, ProcedureDef, ProcedureEnd, ProcedureRun, ProcedureState, ProcedureStep,
-    SafeWrite, StepFailure,
+    NotConfirmed, PlantDef, ProcedureDef, ProcedureEnd, ProcedureRun, ProcedureState, ProcedureStep, SafeWrite,
+    StepFailure, not_safe,
 };
 use crate::plant::{
     command::{CommandId, Outcome},
@@ -80,7 +80,7 @@ impl ProcedureRun {
 
     /// The same, with what its station has put on record as missing: those writes are still to be reached.
     pub(in crate::plant) fn with_missing(self, plant: &PlantDef, def: &ProcedureDef, recorded: &str) -> ProcedureRun {
-        let missing = recorded.split_once(&format!("{NOT_SAFE}: ")).map_or("", |(_, missing)| missing);
+        let missing = recorded.split_once(&format!("{}: ", not_safe())).map_or("", |(_, missing)| missing);
         let stopped = || Some(Outcome::NotConfirmed(NotConfirmed::StationStopped));
         let safe = def.safe.iter().map(|write| SafeWrite::new(*write, stopped()));
         let is_named = |write: &SafeWrite| missing.split(", ").any(|named| named == write.words(plant));

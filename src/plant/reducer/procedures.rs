@@ -19,6 +19,7 @@ use crate::plant::{
     number::to_u16,
     procedure::{self, Instruction, ProcedureEnd, ProcedureRun, View},
     record::{ActionRecord, Record},
+    recorded_action::RecordedAction,
     scale,
     station_fault::{FaultState, StationFault},
 };
@@ -157,7 +158,7 @@ impl Plant {
     /// It does not go on. Where its end is not on record, that is returned.
     pub fn restore_procedures(&mut self, latest: Option<&ActionRecord>) -> Vec<Record> {
         let Some(latest) = latest else { return Vec::new() };
-        let has_ended = &*latest.action == procedure::END;
+        let has_ended = latest.is(RecordedAction::EndProcedure);
         let is_interrupted = !has_ended || latest.outcome.starts_with(procedure::INTERRUPTED);
         let place = self.def.procedures.iter().position(|def| *def.name == *latest.target);
         let mut missing = String::new();
@@ -173,7 +174,7 @@ impl Plant {
         }
         let outcome = format!("{}: the station stopped{missing}", procedure::INTERRUPTED);
         self.faults.set(StationFault::Procedure, occurred(&latest.target, &outcome));
-        let (at, action, outcome) = (self.at, procedure::END.into(), outcome.into());
+        let (at, action, outcome) = (self.at, RecordedAction::EndProcedure.into(), outcome.into());
         vec![Record::Action(ActionRecord { at, action, outcome, chain_hash: None, ..latest.clone() })]
     }
 
@@ -214,7 +215,8 @@ impl Plant {
                     if run.is_fault() && !run.at_work() {
                         self.faults.set(StationFault::Procedure, occurred(&def.name, &outcome));
                     }
-                    let action = if run.at_work() { procedure::WRITE_SAFE_STATE } else { procedure::END };
+                    let action =
+                        if run.at_work() { RecordedAction::WriteSafeState } else { RecordedAction::EndProcedure };
                     let action = ActionRecord::new(at, run.actor().clone(), action, def.name.clone(), outcome);
                     effects.records.push(Record::Action(action));
                 }

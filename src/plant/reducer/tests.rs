@@ -17,6 +17,7 @@ use crate::plant::{
     interlock::{InterlockCondition, InterlockDef},
     line_report::LineReport,
     record::{ActionRecord, AlarmEvent, AlarmRecord},
+    recorded_action::RecordedAction,
     sample::{Cause, Quality},
 };
 
@@ -114,11 +115,11 @@ fn a_write_is_verified_only_by_its_own_read_back() {
             Outcome::NotConfirmed(NotConfirmed::NotAnswered(Fault::Timeout)),
             Some(725.0),
         ),
-        (72.5, WriteResult::ReadBackAfterNoResponse(725.0.into()), Outcome::Verified, Some(725.0)),
+        (72.5, WriteResult::ReadBackAfterFault(Fault::Timeout, 725.0.into()), Outcome::Verified, Some(725.0)),
         (
             72.5,
-            WriteResult::ReadBackAfterNoResponse(700.0.into()),
-            Outcome::NotConfirmed(NotConfirmed::NotApplied(70.0.into())),
+            WriteResult::ReadBackAfterFault(Fault::Timeout, 700.0.into()),
+            Outcome::NotConfirmed(NotConfirmed::NotApplied(Fault::Timeout, 70.0.into())),
             Some(725.0),
         ),
         (70.0, WriteResult::Accepted, Outcome::Unchanged, None),
@@ -193,10 +194,7 @@ fn a_write_is_recorded_before_it_is_sent() {
         (&*requested.action, &*requested.target, &*requested.outcome),
         ("write requested", "TIC-1.SV", "pending")
     );
-    assert!(
-        crate::plant::record::NOT_PROCESS_ACTIONS.contains(&&*requested.action),
-        "a shift report has the outcome alone"
-    );
+    assert!(!RecordedAction::WriteRequested.is_on_process(), "a shift report has the outcome alone");
     assert_eq!(plant.write_requested_record(&BusRequest::StopTest), None);
     let ended = plant.on_stop().records;
     let [Record::Action(action)] = &ended[..] else { panic!("{ended:?}") };

@@ -43,7 +43,7 @@ impl Plant {
                 self.image.written(tag, Some(*fault), at)
             }
             WriteResult::ReadBack(_)
-            | WriteResult::ReadBackAfterNoResponse(_)
+            | WriteResult::ReadBackAfterFault(..)
             | WriteResult::Refused(_)
             | WriteResult::NotSent(_)
             | WriteResult::Superseded => {}

@@ -117,11 +117,11 @@ pub(super) fn typed(clock: Clock, typed: &str, now: &Zoned) -> Option<String> {
     }
 }
 
-/// Does a clock show what it was set to this long ago, or what it should show by now, or between both?
+/// Does a clock show what it was set to this long ago, or what it should show by now, or between both? It never shows less.
 pub(super) fn goes_on(clock: Clock, written: &str, shown: &str, ago: Duration) -> bool {
     let Some((written, shown)) = seconds(clock, written).zip(seconds(clock, shown)) else { return false };
     let most = i64::try_from(ago.as_secs()).unwrap_or(0) + TOLERANCE;
-    (-TOLERANCE..=most).contains(&(shown - written))
+    (0..=most).contains(&(shown - written))
 }
 
 /// Is it a date and time, so that it goes on? A time of day is a setting: when something begins.

@@ -66,6 +66,18 @@ fn what_is_typed_is_held_as_the_device_shows_it() {
 }
 
 #[test]
+fn a_text_of_which_nothing_can_be_printed_is_shown_as_the_device_holds_it() {
+    let check = |kind: DataType, words: &[u16], expect: &str| {
+        assert_eq!(decode(kind, words).as_deref(), Some(expect), "{kind} {words:04X?}");
+    };
+    check(DataType::Chars(3), &[0x2744, 0xD4DF, 0x2E89], "2744 D4DF 2E89");
+    check(DataType::Chars(3), &[0x4142, 0x0005, 0x0020], "4142 05");
+    check(DataType::Chars(3), &[0x0041, 0x4142, 0x0043], "A·C");
+    check(DataType::Text(3), &[0xE900, 0x0520], "E9 00 05");
+    check(DataType::Text(4), &[0x4101, 0x0000], "A·");
+}
+
+#[test]
 fn a_clock_holds_what_was_written_while_it_goes_on() {
     let check = |kind, written: &str, shown: &str, ago, expect| {
         let held = is_held(DataType::Clock(kind), written, shown, Duration::from_secs(ago));
@@ -76,7 +88,7 @@ fn a_clock_holds_what_was_written_while_it_goes_on() {
         ("2026-11-30 14:05:07", "2026-11-30 14:05:09", 0, true),
         ("2026-11-30 14:05:07", "2026-11-30 14:05:10", 0, false),
         ("2026-11-30 14:05:07", "2026-11-30 14:05:37", 30, true),
-        ("2026-11-30 14:05:07", "2026-11-30 14:05:04", 30, false),
+        ("2026-11-30 14:05:07", "2026-11-30 14:05:06", 30, false),
         ("2026-12-31 23:59:59", "2027-01-01 00:00:01", 1, true),
     ] {
         check(Clock::Words, written, shown, ago, expect);

@@ -77,6 +77,7 @@ impl Entry {
             let checked = match self.line.missed() {
                 true => Err(t!("the text was cut; Ctrl-U clears the line").to_owned()),
                 false if is_text(cx, self.tag) => match self.held(cx) {
+                    Ok(_) if self.asks_over_other_text(cx) => return Next::Stay(Modal::Entry(self)),
                     Ok(held) => return self.send_text(cx, &held),
                     Err(expected) => Err(t!("expected {what}", what = expected)),
                 },
@@ -111,6 +112,20 @@ impl Entry {
     fn held(&self, cx: &ViewContext) -> Result<String, ExpectedText> {
         let now = cx.now.to_zoned(cx.def().time_zone.clone());
         text_value::as_held(cx.def().tag(self.tag).point.kind, &self.line.text(), &now)
+    }
+
+    /// Has the text become another one since it was shown? That is what was seen from now on, and says so.
+    fn asks_over_other_text(&mut self, cx: &ViewContext) -> bool {
+        let now = cx.snapshot.texts[self.tag.index()].clone();
+        if now.is_none() || now == self.seen || text_value::is_running(cx.def().tag(self.tag).point.kind) {
+            return false;
+        }
+        let text = |text: &Option<Arc<str>>| text.as_deref().map_or(t!("unknown").to_owned(), text_value::quoted);
+        let words =
+            t!("changed to {trim_end}{by} (was {text})", trim_end = text(&now), by = "", text = text(&self.seen));
+        self.problem = Some(t!("{words}; ⏎ writes all the same", words));
+        self.seen = now;
+        true
     }
 
     /// Asks again where the tag wants that. What is meant is said then; only "now" is as late as its write.

@@ -13,6 +13,7 @@ use crate::{
         def::{Pen, Subject},
         number::to_u16,
         record::{ActionRecord, AlarmRecord},
+        recorded_action::RecordedAction,
         snapshot::Snapshot,
     },
     ui::{
@@ -179,17 +180,22 @@ impl EventPage {
     /// Who was logged in at the instant, and where from; `None` until it is known, or where it may not be.
     fn logged_in(&self) -> Option<Vec<(String, String)>> {
         let (logins, detached) = (self.logins.value.as_ref()?, self.detached.value.as_ref()?);
-        let mut entries: Vec<&ActionRecord> =
-            logins.iter().chain(detached).filter(|row| &*row.outcome == "done" || &*row.action == "logout").collect();
+        let mut entries: Vec<&ActionRecord> = logins
+            .iter()
+            .chain(detached)
+            .filter(|row| &*row.outcome == "done" || row.is(RecordedAction::Logout))
+            .collect();
         entries.sort_by_key(|row| row.at);
         let mut sessions: Vec<(String, String)> = Vec::new();
         for row in entries {
-            match &*row.action {
-                "login" => {
+            match row.known_action() {
+                Some(RecordedAction::Login) => {
                     sessions.retain(|(_, from)| *from != *row.from);
                     sessions.push((row.target.to_string(), row.from.to_string()));
                 }
-                "logout" | "detach" => sessions.retain(|(_, from)| *from != *row.from),
+                Some(RecordedAction::Logout | RecordedAction::Detach) => {
+                    sessions.retain(|(_, from)| *from != *row.from)
+                }
                 _ => {}
             }
         }

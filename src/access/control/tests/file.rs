@@ -1,7 +1,7 @@
 //! What the audit log says of the file of users.
 
 use super::*;
-use crate::access::audit_log::USERS_FILE;
+use crate::plant::recorded_action::RecordedAction;
 
 #[test]
 fn user_changes_are_chained_and_a_login_changes_nothing() {
@@ -16,7 +16,7 @@ fn user_changes_are_chained_and_a_login_changes_nothing() {
         let effects = bench.access.on_request(1, 99, SessionRequest::SetRole { user: "tech".into(), role }, bench.now);
         let effects = bench.work(effects);
         let file = effects.iter().find_map(|effect| match effect {
-            Effect::Record(record) if &*record.action == USERS_FILE => Some(record),
+            Effect::Record(record) if record.is(RecordedAction::UsersFile) => Some(record),
             _ => None,
         });
         let now = bench.access.users_digest().unwrap();

@@ -15,7 +15,7 @@ use crate::{
     },
     plant::{
         def::Priority,
-        record::{AlarmEvent, ChainHash, SEAL_LOG},
+        record::{AlarmEvent, ChainHash},
     },
 };
 

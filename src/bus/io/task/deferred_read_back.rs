@@ -92,8 +92,8 @@ impl Task<'_> {
         self.publish(read_alone(link, tag, &held, at)).await?;
         let write = self.unconfirmed.remove(index);
         let result = match write.result {
-            WriteResult::NotRead(_) => WriteResult::ReadBack(held),
-            _ => WriteResult::ReadBackAfterNoResponse(held),
+            WriteResult::NoValidResponse(fault) => WriteResult::ReadBackAfterFault(fault, held),
+            _ => WriteResult::ReadBack(held),
         };
         self.publish_write_result(write.id, result).await
     }

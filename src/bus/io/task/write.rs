@@ -115,7 +115,7 @@ impl Task<'_> {
             WriteResult::Refused(_)
             | WriteResult::NotSent(_)
             | WriteResult::Superseded
-            | WriteResult::ReadBackAfterNoResponse(_) => {}
+            | WriteResult::ReadBackAfterFault(..) => {}
         }
         Ok(())
     }

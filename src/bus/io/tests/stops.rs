@@ -121,7 +121,11 @@ async fn a_stop_is_not_held_by_a_write_that_is_not_answered() {
         let waited = stops.lock().expect("no panic")[0] - sent_at;
         assert!(waited < 600 * MS, "{mode:?}: {waited:?}");
         silent.store(false, Ordering::Relaxed);
-        assert_eq!(end_of(&mut line, &def, 1).await, WriteResult::ReadBackAfterNoResponse(10.0.into()), "{mode:?}");
+        assert_eq!(
+            end_of(&mut line, &def, 1).await,
+            WriteResult::ReadBackAfterFault(Fault::Timeout, 10.0.into()),
+            "{mode:?}"
+        );
     }
 }
 

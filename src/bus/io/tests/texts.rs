@@ -45,7 +45,7 @@ async fn a_text_is_written_at_once_and_read_back() {
             let back = TagValue::Text("Nr 7".into());
             // A connection on which an answer is missing is closed.
             let expect = match (is_lost, mode) {
-                (true, Mode::Rtu | Mode::Ascii) => WriteResult::ReadBackAfterNoResponse(back),
+                (true, Mode::Rtu | Mode::Ascii) => WriteResult::ReadBackAfterFault(Fault::Timeout, back),
                 (true, _) => WriteResult::NoValidResponse(Fault::Timeout),
                 (false, _) => WriteResult::ReadBack(back),
             };

@@ -7,12 +7,13 @@ use super::{
     archive::{HOUR_S, archive_all},
     *,
 };
+use crate::plant::recorded_action::RecordedAction;
 use crate::{
     plant::{
         batch::{BatchDef, BatchEvent, BatchRecord},
         command::Outcome,
         control_run::{ControlRun, Figure, RunCause, RunDef, RunState},
-        counter::{self, CounterEvent},
+        counter::CounterEvent,
         def::DeviceId,
         energy::Measures,
         exact::Exact,
@@ -244,7 +245,7 @@ fn a_correction_counts_in_the_period_in_which_it_is_entered() {
     let store = Store::open(&db, &def(), sec(0)).unwrap().store;
     let correction = |at, new: &str, outcome: Outcome| {
         let outcome = outcome.to_string();
-        let action = ActionRecord::new(sec(at), "anna", counter::CORRECT, "TIC-1.PV", outcome.as_str());
+        let action = ActionRecord::new(sec(at), "anna", RecordedAction::CorrectCounter, "TIC-1.PV", outcome.as_str());
         Record::Action(ActionRecord { new: Some(new.into()), note: Some("new meter".into()), ..action })
     };
     let mut records = samples(|at| Some(plain(at)), 2 * DAY_S);

@@ -1,10 +1,10 @@
 //! What a station knows of the procedure that the one before it left at work.
 
 use super::*;
-use crate::plant::procedure::{END, START};
+use crate::plant::recorded_action::RecordedAction;
 
-fn procedure(at: i64, word: &str, name: &str, outcome: &str) -> Record {
-    Record::Action(ActionRecord::new(sec(at), "anna", word, name, outcome))
+fn procedure(at: i64, action: RecordedAction, name: &str, outcome: &str) -> Record {
+    Record::Action(ActionRecord::new(sec(at), "anna", action, name, outcome))
 }
 
 #[test]
@@ -12,11 +12,11 @@ fn the_last_start_or_end_of_a_procedure_is_restored() {
     let (_folder, db) = folder();
     let mut expected = None;
     for (n, (record, is_restored)) in [
-        (procedure(10, START, "fill", "verified"), true),
-        (procedure(20, "write", "TIC-1.SV", "verified"), false),
-        (procedure(30, START, "heat", "refused: procedure fill is running"), false),
-        (procedure(40, END, "fill", "interrupted: the station stopped"), true),
-        (procedure(50, START, "heat", "verified"), true),
+        (procedure(10, RecordedAction::StartProcedure, "fill", "verified"), true),
+        (procedure(20, RecordedAction::Write, "TIC-1.SV", "verified"), false),
+        (procedure(30, RecordedAction::StartProcedure, "heat", "refused: procedure fill is running"), false),
+        (procedure(40, RecordedAction::EndProcedure, "fill", "interrupted: the station stopped"), true),
+        (procedure(50, RecordedAction::StartProcedure, "heat", "verified"), true),
     ]
     .into_iter()
     .enumerate()

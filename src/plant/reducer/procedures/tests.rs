@@ -291,7 +291,13 @@ fn one_procedure_at_a_time() {
     assert_eq!(actions(&second), ["anna start procedure other refused: procedure heat is running"]);
     assert_eq!(plant.snapshot().procedure_at_work().map(|(id, _)| id), Some(HEAT));
     // Nor is the safe state of another one written meanwhile.
-    plant.restore_procedures(Some(&ActionRecord::new(at(-50), "anna", procedure::START, "other", "verified")));
+    plant.restore_procedures(Some(&ActionRecord::new(
+        at(-50),
+        "anna",
+        RecordedAction::StartProcedure,
+        "other",
+        "verified",
+    )));
     let aborted = command(&mut plant, 3, CommandKind::AbortProcedure(OTHER), 3);
     assert_eq!(actions(&aborted), ["anna abort procedure other refused: procedure heat is running"]);
 }
@@ -322,11 +328,11 @@ fn a_station_that_stops_leaves_it_interrupted() {
 
 #[test]
 fn a_restarted_station_shows_it_and_goes_on_with_nothing() {
-    let record = |action: &str, outcome: &str| ActionRecord::new(at(-50), "anna", action, "heat", outcome);
+    let record = |action: RecordedAction, outcome: &str| ActionRecord::new(at(-50), "anna", action, "heat", outcome);
     for (latest, is_shown, is_recorded) in [
-        (record(procedure::START, "verified"), true, true),
-        (record(procedure::END, "interrupted, step 1 of 6"), true, false),
-        (record(procedure::END, "done"), false, false),
+        (record(RecordedAction::StartProcedure, "verified"), true, true),
+        (record(RecordedAction::EndProcedure, "interrupted, step 1 of 6"), true, false),
+        (record(RecordedAction::EndProcedure, "done"), false, false),
     ] {
         let mut plant = plant();
         let records = plant.restore_procedures(Some(&latest));

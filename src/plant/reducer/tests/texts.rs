@@ -61,13 +61,26 @@ fn a_text_is_written_over_the_one_that_was_seen() {
     check("", seen, back(""), (Some(""), "verified"));
     check("Line 2", seen, back("Line"), (Some("Line 2"), "not confirmed: read back Line"));
     check("Line 2", seen, WriteResult::ReadBack(7.0.into()), (Some("Line 2"), "not confirmed: read back 7"));
-    let not_applied = WriteResult::ReadBackAfterNoResponse(TagValue::Text("Line 1".into()));
-    let outcome = "not confirmed: no response, not applied: the device has Line 1";
+    let not_applied = WriteResult::ReadBackAfterFault(Fault::Timeout, TagValue::Text("Line 1".into()));
+    let outcome = "not confirmed: response timeout, not applied: the device has Line 1";
     check("Line 2", seen, not_applied, (Some("Line 2"), outcome));
+    let fault = Fault::Exception(ExceptionCode(4));
+    let failed = WriteResult::ReadBackAfterFault(fault, TagValue::Text("Line 1".into()));
+    check(
+        "Line 2",
+        seen,
+        failed,
+        (Some("Line 2"), &format!("not confirmed: {fault}, not applied: the device has Line 1")),
+    );
     check("Line 1", seen, back(""), (None, "unchanged, not written"));
     check("Line 2", Some("Line 3"), back(""), (None, "refused: it was changed to Line 1 after it was shown"));
     check("Line 2", None, back(""), (None, "refused: it is Line 1 now; check and confirm again"));
-    check("A long line", seen, back(""), (None, "refused: expected at most 8 printable characters"));
+    check(
+        "A long line",
+        seen,
+        back(""),
+        (None, "refused: expected printable characters in at most 8 bytes, no blank at the end"),
+    );
 }
 
 #[test]
@@ -97,7 +110,7 @@ fn a_number_is_no_text_and_a_text_no_number() {
         actions(&effects)
     };
     let mut plant = plant_with(DataType::Text(8), "Line 1");
-    let expected = "anna write TIC-1.SV refused: expected at most 8 printable characters";
+    let expected = "anna write TIC-1.SV refused: expected printable characters in at most 8 bytes, no blank at the end";
     assert_eq!(refused(&mut plant, CommandKind::Write { tag: SV, value: 5.0.into() }), [expected]);
     let text = |tag| CommandKind::WriteText { tag, text: "5".into(), seen: None };
     let expected = "refused: expected a text that can be written, which this tag does not hold";

@@ -258,3 +258,13 @@ fn a_broadcast_is_sent_and_its_device_never_silent() {
     let outcome = &plant.snapshot().commands[0].outcome;
     assert!(outcome.is_success() && *outcome == Outcome::Sent, "{outcome:?}");
 }
+
+#[test]
+fn what_was_read_long_ago_is_written_not_called_unchanged() {
+    for (second, expect) in [(1, Outcome::Unchanged), (5, Outcome::Unchanged), (6, Outcome::Pending)] {
+        let mut plant = running();
+        let status = CommandStatus { at: at(second), ..shown(&plant, 1, SV, 70.0) };
+        plant.on_command(status, at(second));
+        assert_eq!(plant.snapshot().commands[0].outcome, expect, "{second} s after it was read");
+    }
+}

@@ -75,6 +75,35 @@ fn an_error_names_the_row_of_the_repeat_once() {
 }
 
 #[test]
+fn what_is_wrong_with_every_row_of_a_repeat_is_reported_once() {
+    let once = |text: &str, expect: &str| {
+        let found = errors(text);
+        assert_eq!((found.lines().count(), found.contains(expect)), (1, true), "{found}");
+    };
+    let relays = "[[repeat]]\ncount = 3\nstep = 1\n[[repeat.tag]]\nname = \"K{n}\"\ntable = \"coil\"\naddress = 16\n\
+                  access = \"rw\"\n";
+    let knows = |functions: &str| meter(relays).replacen("status =", &format!("functions = {functions}\nstatus ="), 1);
+    once(&knows("[1, 3, 4, 6]"), "D1.K1 needs function 5, which `functions` lacks");
+    let found = errors(&knows("[3, 4, 6]"));
+    assert_eq!(found.lines().count(), 2, "function 1 and function 5: {found}");
+    let words = "[[repeat]]\ncount = 3\nstep = 1\n[[repeat.tag]]\nname = \"W{n}\"\ntable = \"input\"\naddress = 7\n\
+                 type = \"uint32\"\n";
+    once(&meter(words), "overlap with different types");
+    once(
+        &meter(&words.replace("step = 1", "step = 2").replace("uint32\"", "uint32\"\nunit_from = \"DP\"")),
+        "DP gives no unit",
+    );
+    // Two devices of one profile are wrong in one place.
+    let two = PLANT.replacen(
+        "[[alarm]]",
+        "[[device]]\nname = \"D2\"\nprofile = \"meter\"\nline = \"L1\"\nunit = 9\n[[alarm]]",
+        1,
+    );
+    let both = load(two.as_bytes(), &knows("[1, 3, 4, 6]"), PLC).expect_err("it is wrong");
+    assert_eq!(both.full_lines().filter(|line| line.contains("needs function 5")).count(), 1);
+}
+
+#[test]
 fn a_device_says_how_many_of_a_repeat_it_has() {
     let text = |from: &str, more: &str| {
         meter(&format!(

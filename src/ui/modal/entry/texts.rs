@@ -50,7 +50,7 @@ fn a_typed_text_replaces_the_one_that_is_shown() {
     let text = DataType::Text(8);
     assert_eq!(typed(text, false, "Line 1", "Nr. 7"), ("Line 1".to_owned(), sent("Nr. 7")));
     assert_eq!(typed(text, false, "Line 1", ""), ("Line 1".to_owned(), sent("Line 1")));
-    let why = Err("expected at most 8 printable characters".to_owned());
+    let why = Err("expected printable characters in at most 8 bytes, no blank at the end".to_owned());
     assert_eq!(typed(text, false, "Line 1", "Line 1234"), ("Line 1".to_owned(), why));
     assert_eq!(typed(text, true, "Line 1", "Nr. 7").1, Err("write and verify".to_owned()), "it is asked again");
 }
@@ -65,4 +65,24 @@ fn a_clock_offers_no_text_and_is_set_when_it_is_written() {
     assert_eq!(typed(clock, false, shown, "2026-11-30 14:05"), (String::new(), sent("2026-11-30 14:05")));
     let why = "expected a date and time such as 2026-11-30 14:05:00, or now".to_owned();
     assert_eq!(typed(clock, false, shown, "14:05"), (String::new(), Err(why)));
+}
+
+#[test]
+fn a_text_that_changes_while_another_is_typed_is_shown_first() {
+    let mut fixture = Fixture::normal();
+    let sv = fixture.tag("TIC-1.SV");
+    fixture.def.tags[sv.index()].point.kind = DataType::Text(8);
+    let shown = |text: &str| {
+        let mut snapshot = (*fixture.snapshot()).clone();
+        Arc::make_mut(&mut snapshot.texts)[sv.index()] = Some(text.into());
+        snapshot
+    };
+    let entry = with_cx(&shown("Line 1"), |cx| Entry::new(cx, sv));
+    let enter = |entry: Entry| with_cx(&shown("Line 9"), |cx| entry.on_key(cx, press(KeyCode::Enter)));
+    let Next::Stay(Modal::Entry(entry)) = enter(entry) else { panic!("it is asked again") };
+    assert_eq!(entry.problem.as_deref(), Some("changed to Line 9 (was Line 1); ⏎ writes all the same"));
+    let Next::Do(actions) = enter(entry) else { panic!("it is written") };
+    let seen = Some("Line 9".into());
+    let kind = CommandKind::WriteText { tag: sv, text: "Line 1".into(), seen };
+    assert!(matches!(&actions[..], [UiAction::SendCommand(command, None)] if command.kind == kind), "{actions:?}");
 }

@@ -3,12 +3,7 @@
 use super::{journal::action_text, metrics::stale, span};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{
-        alarm::SuppressedAlarm,
-        commands::{HAND_OVER, TAKE_OVER},
-        line_state::LineState,
-        record::ActionRecord,
-    },
+    plant::{alarm::SuppressedAlarm, line_state::LineState, record::ActionRecord, recorded_action::RecordedAction},
     report::Period,
     ui::modal::{faceplate::device_text, reason::subject},
 };
@@ -19,21 +14,6 @@ const ROWS: usize = 500;
 const EVERY_S: f64 = 2.0;
 /// Bad or uncertain values that are named at most.
 const NAMED: usize = 8;
-/// Actions that only concern the program and change nothing in the plant.
-pub(in crate::ui) const NO_CHANGE: [&str; 11] = [
-    "acknowledge",
-    "silence",
-    "login",
-    "logout",
-    "lock terminal",
-    "unlock terminal",
-    "export",
-    "delete report",
-    "read sets",
-    HAND_OVER,
-    TAKE_OVER,
-];
-
 #[derive(Debug, Default)]
 pub struct Handover {
     /// The chosen shift; `None` is the running one.
@@ -120,8 +100,8 @@ impl Handover {
                 let rows = actions.iter().filter(|row| from <= row.at && keep(row));
                 folded(cx, rows.map(|row| (row.at, action_text(cx, row).trim_start().to_owned())))
             };
-            section(t!("failed in this shift"), of(|row| is_failed(row) && is_change(row)), true);
-            section(t!("changed in this shift"), of(|row| !is_failed(row) && is_change(row)), false);
+            section(t!("failed in this shift"), of(|row| is_failed(row) && ActionRecord::changes_plant(row)), true);
+            section(t!("changed in this shift"), of(|row| !is_failed(row) && ActionRecord::changes_plant(row)), false);
             if actions.len() >= ROWS {
                 section(t!("the oldest actions are omitted"), Vec::new(), true);
             }
@@ -134,7 +114,7 @@ impl Handover {
         let theme = cx.theme;
         let when = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
         let actions = self.actions.value.as_deref().unwrap_or_default();
-        let note = actions.iter().enumerate().find(|(_, row)| &*row.action == HAND_OVER && !is_failed(row));
+        let note = actions.iter().enumerate().find(|(_, row)| row.is(RecordedAction::HandOver) && !is_failed(row));
         let Some((n, note)) = note else {
             let answered = self.actions.value.is_some();
             let words = if answered { t!("No handover recorded for this shift or the one before.") } else { "" };
@@ -143,7 +123,7 @@ impl Handover {
         let mut lines = vec![(t!("handed over {when} by {by}", when = when(note), by = note.by), theme.strong())];
         let text = note.note.as_deref().unwrap_or(t!("without a note"));
         lines.extend(wrap(text, room).into_iter().map(|line| (format!("  {line}"), theme.normal())));
-        let taken = actions[..n].iter().rev().find(|row| &*row.action == TAKE_OVER && !is_failed(row));
+        let taken = actions[..n].iter().rev().find(|row| row.is(RecordedAction::TakeOver) && !is_failed(row));
         lines.push(match taken {
             Some(row) => (t!("taken over {when} by {by}", when = when(row), by = row.by), theme.strong()),
             None if is_own(cx, note) => {
@@ -156,9 +136,11 @@ impl Handover {
 
     /// Did the current user hand over, with no take-over since?
     pub fn is_own(&self, cx: &ViewContext) -> bool {
-        let last = |row: &&ActionRecord| [HAND_OVER, TAKE_OVER].contains(&&*row.action) && !is_failed(row);
+        let last = |row: &&ActionRecord| {
+            (row.is(RecordedAction::HandOver) || row.is(RecordedAction::TakeOver)) && !is_failed(row)
+        };
         let actions = self.actions.value.as_deref().unwrap_or_default();
-        actions.iter().find(last).is_some_and(|row| &*row.action == HAND_OVER && is_own(cx, row))
+        actions.iter().find(last).is_some_and(|row| row.is(RecordedAction::HandOver) && is_own(cx, row))
     }
 }
 
@@ -282,9 +264,4 @@ fn doubtful(cx: &ViewContext) -> Vec<String> {
 
 fn is_failed(row: &ActionRecord) -> bool {
     [t!("refused"), t!("not confirmed"), t!("failed")].iter().any(|word| row.outcome.starts_with(word))
-}
-
-/// Did it change the plant, or was it meant to?
-fn is_change(row: &ActionRecord) -> bool {
-    !NO_CHANGE.contains(&&*row.action)
 }

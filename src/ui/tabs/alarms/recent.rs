@@ -7,7 +7,8 @@ use crate::{
     plant::{
         alarm::{ActiveAlarm, AlarmState, manager::subject_name},
         def::{AlarmDef, Pen, Subject},
-        record::{ActionRecord, AlarmEvent, AlarmRecord, NOT_PROCESS_ACTIONS},
+        record::{ActionRecord, AlarmEvent, AlarmRecord},
+        recorded_action::RecordedAction,
     },
     ui::{layout::Size, tabs::trends::span::View, widgets::chart},
 };
@@ -147,7 +148,7 @@ impl Recent {
         let is_process = |action: &&ActionRecord| {
             let rest = action.target.strip_prefix(device);
             let is_of_device = rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-            !NOT_PROCESS_ACTIONS.contains(&&*action.action) && action.new.is_some() && is_of_device
+            action.known_action().is_none_or(RecordedAction::is_on_process) && action.new.is_some() && is_of_device
         };
         let of_device: Vec<&ActionRecord> = actions.iter().filter(is_process).collect();
         Some(occurrences(&of_alarm.collect::<Vec<_>>(), &of_device, just_before(now)))
@@ -323,7 +324,7 @@ mod tests {
         let write = ActionRecord {
             old: Some("70.0 °C".into()),
             new: Some("65.0 °C".into()),
-            ..ActionRecord::new(ago(52), "tom", "write", "TIC-1.SV", "verified")
+            ..ActionRecord::new(ago(52), "tom", RecordedAction::Write, "TIC-1.SV", "verified")
         };
         let (times, all) = occurrences(&records.iter().collect::<Vec<_>>(), &[&write], ago(1));
         assert_eq!(times, 1, "this time and one without a beginning do not count");
@@ -341,7 +342,7 @@ mod tests {
         recent.alarms.value.iter_mut().for_each(|events| events.push(oldest.clone()));
         assert_eq!(recent.searched_since(), [Some(ago(90)), None]);
         recent.actions.value =
-            Some(vec![ActionRecord::new(ago(70), "tom", "write", "TIC-1.SV", "verified"); ACTIONS_MAX]);
+            Some(vec![ActionRecord::new(ago(70), "tom", RecordedAction::Write, "TIC-1.SV", "verified"); ACTIONS_MAX]);
         assert_eq!(recent.searched_since(), [Some(ago(90)), Some(ago(70))]);
     }
 
@@ -352,7 +353,7 @@ mod tests {
         let event = |minutes, event| AlarmRecord::new(ago(minutes), "TIC-1.PV", &def.message, def.priority, event);
         let write = |target: &str| ActionRecord {
             new: Some("65.0".into()),
-            ..ActionRecord::new(ago(55), "tom", "write", target, "verified")
+            ..ActionRecord::new(ago(55), "tom", RecordedAction::Write, target, "verified")
         };
         let mut recent = Recent::default();
         recent.alarms.value = Some(vec![event(50, AlarmEvent::ReturnedToNormal), event(60, AlarmEvent::Raised)]);

@@ -100,7 +100,7 @@ impl ParameterTable {
     ) {
         let theme = cx.theme;
         let shown = value::show(cx, tag.id);
-        let text = shown.bare(ParameterColumns::VALUE);
+        let text = shown.bare(columns.value);
         let now = matches!(tag.poll, Poll::Every(_))
             && cx.age(tag.id).as_secs() < 60
             && cx.snapshot.sample(tag.id).quality.is_good();
@@ -126,7 +126,7 @@ impl ParameterTable {
         let row = columns.row([pen, &name, &text, &shown.unit, &range, &default, &read, meaning]);
         canvas.text(1, y, &row, if selected { theme.focus() } else { theme.normal() });
         if !selected && tag.is_read() && !cx.snapshot.sample(tag.id).quality.is_good() {
-            canvas.text(1 + columns.value_at(), y, &pad_left(&text, ParameterColumns::VALUE), shown.style);
+            canvas.text(1 + columns.value_at(), y, &pad_left(&text, columns.value), shown.style);
         }
     }
 }
@@ -148,6 +148,7 @@ pub fn default_text(cx: &ViewContext, tag: &TagDef) -> Option<String> {
 struct ParameterColumns {
     short: u16,
     name: u16,
+    value: u16,
     range: u16,
     default: u16,
     meaning: u16,
@@ -155,6 +156,8 @@ struct ParameterColumns {
 
 impl ParameterColumns {
     const VALUE: u16 = 10;
+    /// Of a value that is a text, at most.
+    const TEXT: u16 = 26;
     const UNIT: u16 = 6;
     const RANGE: u16 = 16;
     const AGE: u16 = 6;
@@ -172,9 +175,13 @@ impl ParameterColumns {
         let free = wide.saturating_sub(fixed + range);
         let name = (short + 1 + label).min(free);
         let left = free - name;
+        // A text, a date, an address in full, where there is room.
+        let text = tags().filter_map(|tag| cx.snapshot.texts[tag.id.index()].as_deref()).map(width).max().unwrap_or(0);
+        let longer = text.clamp(ParameterColumns::VALUE, ParameterColumns::TEXT) - ParameterColumns::VALUE;
+        let (value, left) = (ParameterColumns::VALUE + longer.min(left), left - longer.min(left));
         let any = tags().any(|tag| tag.default.is_some());
         let default = if any && left >= 8 { 7 } else { 0 };
-        ParameterColumns { short, name, range, default, meaning: left.saturating_sub(default + 1) }
+        ParameterColumns { short, name, value, range, default, meaning: left.saturating_sub(default + 1) }
     }
     fn value_at(&self) -> u16 {
         2 + self.name + 1
@@ -187,7 +194,7 @@ impl ParameterColumns {
         format!(
             "{pen:1} {} {} {} {range}{default}{} {}",
             pad(name, self.name),
-            pad_left(value, ParameterColumns::VALUE),
+            pad_left(value, self.value),
             pad(unit, ParameterColumns::UNIT),
             pad_left(age, ParameterColumns::AGE),
             pad(meaning, self.meaning)

@@ -1,7 +1,7 @@
 //! The shift on one time axis: steps of sequences and programs, alarms and operator actions, with a line at the present.
 
 use super::attention::AttentionRow;
-use crate::ui::tabs::{alarms::NO_CHANGE, prelude::*};
+use crate::ui::tabs::prelude::*;
 use crate::{
     history::Series,
     plant::{
@@ -159,7 +159,7 @@ impl Shift {
     /// What operators did: a mark for each action, and its words where there is room behind it.
     fn operators(&self, cx: &ViewContext, canvas: &mut Canvas, axis: Axis) {
         let Some(actions) = &self.actions.value else { return unknown(cx, canvas, self.actions.trouble.as_deref()) };
-        let changes = actions.iter().filter(|row| !NO_CHANGE.contains(&&*row.action) || row.note.is_some());
+        let changes = actions.iter().filter(|row| row.changes_plant() || row.note.is_some());
         // The newest first, so that an older one never covers it.
         for row in changes {
             let Some(x) = axis.column(row.at).filter(|x| canvas.is_blank(*x, 0, 1)) else { continue };

@@ -6,6 +6,7 @@ use crate::{
     plant::{
         def::{DeviceDef, DeviceId, MimicDef, Priority},
         record::{ActionRecord, AlarmEvent, AlarmRecord},
+        recorded_action::RecordedAction,
         sample::Sample,
         tag::TagDef,
     },
@@ -32,7 +33,7 @@ fn answer(model: &mut Model, effects: Vec<Effect>) {
             }
             Query::Actions { .. } => {
                 let new = Some("70.0 °C".into());
-                let write = ActionRecord::new(ago(90), "anna", "write", "TIC-1.SV", "verified");
+                let write = ActionRecord::new(ago(90), "anna", RecordedAction::Write, "TIC-1.SV", "verified");
                 Answer::Actions(vec![ActionRecord { new, ..write }])
             }
             Query::Series { tags, from, to, buckets } => {

@@ -1,6 +1,9 @@
 //! What was read of a unit: a cell for every register or bit, with what it held before.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, VecDeque},
+};
 
 use jiff::Timestamp;
 
@@ -12,6 +15,7 @@ use crate::{
         number::to_u16,
         tag::Table,
     },
+    register_map::named::Named,
 };
 
 /// Values of a cell that are remembered.
@@ -57,6 +61,13 @@ impl Cells {
         let at = self.get(table, address)?.at;
         let word = |address: u32| self.get(table, u16::try_from(address).ok()?).filter(|cell| cell.at == at)?.word;
         AddressSpan { table, address, count }.range().map(word).collect()
+    }
+
+    /// A name with the power of ten that the unit holds for it, once that was read.
+    pub fn scaled<'a>(&self, named: &'a Named) -> Cow<'a, Named> {
+        let word = named.power_at.and_then(|at| self.held(named.table, at, 1)?.first().copied());
+        let scaled = word.and_then(|word| named.with_power(word.cast_signed()));
+        scaled.map_or(Cow::Borrowed(named), Cow::Owned)
     }
 
     /// What the last read of an address has brought.

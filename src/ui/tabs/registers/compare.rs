@@ -212,7 +212,7 @@ fn side(
     // A named register in its own terms.
     let named = tab.names.get(tab.table, address);
     let meaning = match named {
-        Some(named) => cells.held(tab.table, address, named.count()).and_then(|words| named.text(&words)),
+        Some(named) => cells.held(tab.table, address, named.count()).and_then(|words| cells.scaled(named).text(&words)),
         None => interpret::float(tab.order, &cells.words(tab.table, address, 2), 10),
     };
     canvas.text_right(at.float, y, &fit(meaning.as_deref().unwrap_or("–"), 11), style);

@@ -108,7 +108,7 @@ impl Registers {
         let of_profile = profile.map(|profile| suggested_alarms(&device.name, &profile.tags)).unwrap_or_default();
         let seen = |tag: &TagDef| {
             let (table, address) = (tag.point.table, tag.point.address);
-            let named = self.names.get(table, address)?;
+            let named = self.cells.scaled(self.names.get(table, address)?);
             let now = self.cells.held(table, address, named.count()).and_then(|words| named.value(&words));
             let cell = self.cells.get(table, address).filter(|_| named.count() == 1);
             let before = cell.into_iter().flat_map(|cell| &cell.seen).filter_map(|(_, word)| named.value(&[*word]));

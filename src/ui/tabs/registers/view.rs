@@ -303,10 +303,15 @@ pub fn is_long_ago(tab: &Registers, cx: &ViewContext, at: Timestamp) -> bool {
     limit < cx.now.duration_since(at)
 }
 
-/// A named value, and whether it is good: `70.0 °C`, `70.0 °C?` for an old one, `----` for none.
+/// A named value, and whether it is good: `70.0 °C`, `70.0 °C?` for an old one, `----` for none, `700 raw` where it is not
+/// known by which power of ten it is multiplied.
 pub fn named_text(tab: &Registers, cx: &ViewContext, named: &Named) -> (String, bool) {
     let words = tab.cells.held(named.table, named.address, named.count());
-    let Some(text) = words.and_then(|words| named.text(&words)) else { return ("----".to_owned(), false) };
+    let scaled = tab.cells.scaled(named);
+    let Some(text) = words.and_then(|words| scaled.text(&words)) else { return ("----".to_owned(), false) };
+    if scaled.power_at.is_some() {
+        return (text, false);
+    }
     let mut cells = (0..named.count()).filter_map(|n| tab.cells.get(named.table, named.address.checked_add(n)?));
     if cells.any(|cell| is_old(tab, cx, cell)) { (format!("{text}?"), false) } else { (text, true) }
 }

@@ -205,6 +205,7 @@ impl Registers {
         for item in &mut self.watch.items {
             let Some(named) = self.names.get(item.at.0, item.at.1) else { continue };
             let before = item.samples.back().copied().unwrap_or(Sample::bad(Cause::NotRead, at));
+            let named = &self.cells.scaled(named);
             let sample = sample(reading, named, Sample { at, ..before });
             item.push(sample);
             cells.push((sample.good_exact().map_or(String::new(), |value| logged(named, value)), sample.quality));
@@ -304,7 +305,7 @@ fn named(text: &str, plain: Named) -> Result<Named, String> {
     let name = words.next().ok_or_else(|| t!("expected a name").to_owned())?.to_owned();
     let mut named = Named { name, unit: String::new(), ..plain };
     for word in words {
-        let kind = word.parse::<DataType>().ok().filter(|kind| !kind.is_text());
+        let kind = word.parse::<DataType>().ok();
         let order = ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(word));
         match (kind, order, word.parse::<f64>()) {
             (Some(kind), ..) if named.table.is_bits() && kind != DataType::Bool => {
@@ -321,11 +322,24 @@ fn named(text: &str, plain: Named) -> Result<Named, String> {
                 (named.scale, named.decimals) = (scale, decimals);
             }
             (.., Ok(_)) => return Err(t!("found `{word}`, expected a scale other than 0", word)),
+            (None, None, Err(_)) if is_like_type(word) => return Err(t!("`{word}` is no type", word)),
             (None, None, Err(_)) if named.unit.is_empty() => named.unit = unit_of(word),
             (None, None, Err(_)) => return Err(t!("found `{word}`, expected one unit at the end", word)),
         }
     }
     Ok(named)
+}
+
+/// Was it meant for a type: one of their names with another number?
+fn is_like_type(word: &str) -> bool {
+    let stem = |word: &str| {
+        let end = word.find(|letter: char| letter.is_ascii_digit() || letter == '(').unwrap_or(word.len());
+        word[..end].to_ascii_lowercase()
+    };
+    let numbered = stem(word).len() < word.len();
+    let texts = ["string", "cstring", "chars", "version", "epoch", "ipv", "eui"].map(str::to_owned);
+    numbered
+        && DataType::NUMBERS.into_iter().map(|kind| stem(&kind.to_string())).chain(texts).any(|of| of == stem(word))
 }
 
 fn notice(words: String) -> Vec<UiAction> {
@@ -345,6 +359,7 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
     for (y, item) in tab.watch.items.iter().enumerate().map(|(n, item)| (to_u16(n) + 1, item)) {
         let (table, address) = item.at;
         let Some(named) = tab.names.get(table, address) else { continue };
+        let named = &tab.cells.scaled(named);
         let (text, good) = named_text(tab, cx, named);
         canvas.text(1, y, &pad(&fit(&named.name, 16), 16), theme.normal());
         canvas.text_right(34, y, &text, if good { theme.strong() } else { theme.trouble() });
@@ -382,6 +397,19 @@ mod tests {
         assert_eq!(parse("T degC").map(|named| named.unit), Ok("°C".to_owned()));
         assert_eq!(parse("run").map(|named| named.kind), Ok(DataType::U16));
         assert!(parse("SV 0").is_err() && parse("SV a b").is_err());
+        for word in
+            ["string(10)", "chars(6)", "epoch32", "clock_words", "ipv4", "ipv6", "eui48", "version(1)", "time_decimal"]
+        {
+            assert_eq!(
+                parse(&format!("N {word}")).map(|named| named.kind),
+                Ok(word.parse().expect("a type")),
+                "{word}"
+            );
+        }
+        for word in ["int99", "uint17", "float31", "string(900)", "chars()", "bcd8", "ipv5", "epoch64"] {
+            assert_eq!(parse(&format!("N {word}")), Err(format!("`{word}` is no type")));
+        }
+        assert_eq!(parse("A m3").map(|named| named.unit), Ok("m³".to_owned()));
         let bit = Named { table: Table::Coil, kind: DataType::Bool, ..plain.clone() };
         assert!(named("run float32", bit).is_err());
     }

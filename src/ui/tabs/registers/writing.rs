@@ -3,6 +3,8 @@
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
+
 use jiff::Zoned;
 
 use super::{AddressSpan, Registers};
@@ -10,12 +12,13 @@ use crate::ui::{command_text::outcome_words, tabs::prelude::*};
 use crate::{
     bus::codec,
     plant::{
-        command::{CommandId, Outcome, Refusal},
-        diagnostics::{Diagnostic, DiagnosticState, Finding, RegisterWrite},
+        command::{CommandId, NotConfirmed, Outcome, Refusal},
+        diagnostics::{Diagnostic, Finding, RegisterWrite},
         fault::ExceptionCode,
         live::number,
         scale,
         tag::{ByteOrder, DataType, Encoding, Point, Table},
+        tag_value::TagValue,
         text_value::{self, ExpectedText},
     },
     register_map::named::{Named, Names},
@@ -45,7 +48,7 @@ impl Writing {
     /// Notes a write that the line has ended.
     pub fn follow(&mut self, cx: &ViewContext, line: LineId) {
         let Some(run) = cx.snapshot.lines.get(line.index()).and_then(|line| line.test.as_ref()) else { return };
-        let (Diagnostic::Write(write), DiagnosticState::Done) = (&run.diagnostic, &run.state) else { return };
+        let Diagnostic::Write(write) = &run.diagnostic else { return };
         let outcome = run.findings.iter().find_map(|finding| match finding {
             Finding::Written(outcome) => Some(outcome.clone()),
             _ => None,
@@ -60,14 +63,16 @@ impl Writing {
     /// The last write in words, and whether its reader should worry.
     pub fn last(&self, names: &Names) -> Option<(String, bool)> {
         let written = self.list.last()?;
-        let (outcome, trouble) = outcome_words(&written.outcome);
+        let (outcome, trouble) = outcome_words(&named_outcome(names, written));
         Some((format!("{outcome}: {}", change(names, &written.write)), trouble))
     }
 
     /// The last verified write that no later one has taken back.
     fn undoable(&self) -> Option<&RegisterWrite> {
         let mut standing: Vec<&RegisterWrite> = Vec::new();
-        for write in self.list.iter().filter(|written| written.outcome == Outcome::Verified).map(|one| &one.write) {
+        let verified = self.list.iter().filter(|written| written.outcome == Outcome::Verified).map(|one| &one.write);
+        // The time that a clock showed is over.
+        for write in verified.filter(|write| write.clock.is_none()) {
             if standing.pop_if(|last| inverse(last) == *write).is_none() {
                 standing.push(write);
             }
@@ -156,7 +161,7 @@ impl Registers {
         let first = held.first().copied().ok_or_else(|| t!("it is not known what it holds now").to_owned())?;
         let words = match self.named_and_held() {
             Some((named, held)) if !text.starts_with("0x") && !text.starts_with("0X") => {
-                typed_as(text, named, &held, &cx.now.to_zoned(cx.def().time_zone.clone()))?
+                typed_as(text, &named, &held, &cx.now.to_zoned(cx.def().time_zone.clone()))?
             }
             Some(_) | None => typed(text, self.table, self.order, first)?,
         };
@@ -164,8 +169,9 @@ impl Registers {
     }
 
     /// The name of what is selected, if it has one, and the words that it holds.
-    fn named_and_held(&self) -> Option<(&Named, Vec<u16>)> {
+    fn named_and_held(&self) -> Option<(Cow<'_, Named>, Vec<u16>)> {
         let named = self.names.get(self.table, self.selected).filter(|named| !named.table.is_bits())?;
+        let named = Some(self.cells.scaled(named)).filter(|named| named.power_at.is_none())?;
         let held = self.cells.words(self.table, self.selected, named.count());
         (held.len() == usize::from(named.count())).then_some((named, held))
     }
@@ -179,7 +185,7 @@ impl Registers {
         let Some(word) = held.first() else { return vec![unknown()] };
         let most = if self.table.is_bits() { 1 } else { u16::MAX };
         let words = match self.named_and_held() {
-            Some((named, held)) => next_step(named, &held, by),
+            Some((named, held)) => next_step(&named, &held, by),
             None => word.checked_add_signed(by).filter(|word| *word <= most).map(|word| vec![word]),
         };
         let confirm =
@@ -202,7 +208,9 @@ impl Registers {
         }
         let (unit, table, address) = (self.unit, self.table, self.selected);
         let multiple = words.len() == 1 && self.writing.multiple(unit, table);
-        let write = RegisterWrite { unit, table, address, words, expected, multiple };
+        let named = self.named_and_held().map(|(named, _)| named);
+        let clock = named.filter(|named| text_value::is_running(named.kind)).map(|named| named.point());
+        let write = RegisterWrite { unit, table, address, words, expected, multiple, clock };
         Diagnostic::Write(write.clone()).check()?;
         Ok(vec![self.confirmation(t!("write"), write)])
     }
@@ -234,9 +242,30 @@ fn change(names: &Names, write: &RegisterWrite) -> String {
     said.unwrap_or(raw)
 }
 
+/// What became of it, with what the device holds as its name shows that.
+fn named_outcome(names: &Names, ListedWrite { write, outcome, .. }: &ListedWrite) -> Outcome {
+    let shown = |held: &TagValue| {
+        let words = match held {
+            TagValue::Number(word) => vec![to_u16(word.near())],
+            TagValue::Text(words) => words.split(' ').filter_map(|word| word.parse().ok()).collect(),
+        };
+        let named = names.get(write.table, write.address).filter(|named| usize::from(named.count()) == words.len());
+        named.and_then(|named| named.text(&words)).map_or_else(|| held.clone(), |text| TagValue::Text(text.into()))
+    };
+    match outcome {
+        Outcome::NotConfirmed(NotConfirmed::Different(held)) => {
+            Outcome::NotConfirmed(NotConfirmed::Different(shown(held)))
+        }
+        Outcome::NotConfirmed(NotConfirmed::NotApplied(fault, held)) => {
+            Outcome::NotConfirmed(NotConfirmed::NotApplied(*fault, shown(held)))
+        }
+        other => other.clone(),
+    }
+}
+
 fn words(cx: &ViewContext, names: &Names, written: &ListedWrite) -> String {
     let at = clock(written.at, &cx.def().time_zone);
-    format!("{at} {}  {}", change(names, &written.write), outcome_words(&written.outcome).0)
+    format!("{at} {}  {}", change(names, &written.write), outcome_words(&named_outcome(names, written)).0)
 }
 
 fn list(words: &[u16]) -> String {

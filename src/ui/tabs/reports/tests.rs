@@ -19,6 +19,7 @@ use crate::{
         command::Command,
         def::Priority,
         record::{ActionRecord, AlarmEvent, AlarmRecord, ChainHash},
+        recorded_action::RecordedAction,
     },
     report::{TagFigures, batch::BatchReport},
     ui::{
@@ -169,7 +170,7 @@ fn report(period: Period, full: bool) -> ShiftReport {
     let action = ActionRecord {
         old: Some("60.0 °C".into()),
         new: Some("70.0 °C".into()),
-        ..ActionRecord::new(at(20), "tech1", "write", "TIC-1.SV", "verified")
+        ..ActionRecord::new(at(20), "tech1", RecordedAction::Write, "TIC-1.SV", "verified")
     };
     ShiftReport {
         counters: Vec::new(),

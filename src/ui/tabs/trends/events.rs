@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     plant::record::{ActionRecord, AlarmEvent},
     report::batch::BatchReport,
-    ui::tabs::alarms::{NO_CHANGE, action_text, event_text},
+    ui::tabs::alarms::{action_text, event_text},
 };
 
 /// Events of each kind that are read; where there are more, the oldest are missing, and the row says so.
@@ -131,7 +131,7 @@ impl Trends {
             style: theme.severity(record.priority),
             text: event_text(cx, record),
         });
-        let done = actions.iter().filter(|action| !NO_CHANGE.contains(&&*action.action) || action.note.is_some());
+        let done = actions.iter().filter(|action| action.changes_plant() || action.note.is_some());
         let done = done.map(|action| Mark {
             at: action.at,
             kind: if action.note.is_some() { EventKind::Note } else { EventKind::Command },

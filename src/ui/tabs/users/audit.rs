@@ -4,7 +4,11 @@ use std::sync::Arc;
 
 use super::{Key, Users};
 use crate::ui::tabs::prelude::*;
-use crate::{plant::record::ActionRecord, report::Period, ui::modal::AuditEntryDialog};
+use crate::{
+    plant::{record::ActionRecord, recorded_action::RecordedAction},
+    report::Period,
+    ui::modal::AuditEntryDialog,
+};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchField {
@@ -112,7 +116,7 @@ impl Listing for AuditLog {
         let [newest, .., oldest] = group else { return None };
         let at = |entry: &ActionRecord| moment(entry.at, cx.now, &cx.def().time_zone);
         let (newest, oldest, count) = (at(newest), at(oldest), group.len());
-        let attached = group.iter().filter(|entry| &*entry.action == "attach").count();
+        let attached = group.iter().filter(|entry| entry.is(RecordedAction::Attach)).count();
         let number = cx.theme.pick("…", "..");
         let words = t!(
             "{count} entries since {oldest}: terminals attached {attached} ×, d shows them",
@@ -198,7 +202,7 @@ fn number(entry: &ActionRecord) -> String {
 
 /// Does an entry only say that a terminal came or went? One that was refused is never folded.
 fn is_terminal(entry: &ActionRecord) -> bool {
-    matches!(&*entry.action, "attach" | "detach") && &*entry.outcome == "done"
+    (entry.is(RecordedAction::Attach) || entry.is(RecordedAction::Detach)) && &*entry.outcome == "done"
 }
 
 /// The change and the outcome of an entry; where it is too long, its outcome is kept.

@@ -4,10 +4,11 @@ use super::*;
 use crate::plant::{
     line_report::LineReport,
     record::ActionRecord,
+    recorded_action::RecordedAction,
     traffic::{Frame, Frames},
 };
 
-fn login(at: Timestamp, action: &str, user: &str, from: &str) -> ActionRecord {
+fn login(at: Timestamp, action: RecordedAction, user: &str, from: &str) -> ActionRecord {
     ActionRecord { from: from.into(), ..ActionRecord::new(at, user, action, user, "done") }
 }
 
@@ -17,7 +18,13 @@ fn answer_page(model: &mut Model, effects: &[Effect], at: Timestamp) {
         let write = ActionRecord {
             old: Some("70.0 °C".into()),
             new: Some("65.0 °C".into()),
-            ..ActionRecord::new(at + SignedDuration::from_secs(20), "anna", "write", "TIC-1.SV", "verified")
+            ..ActionRecord::new(
+                at + SignedDuration::from_secs(20),
+                "anna",
+                RecordedAction::Write,
+                "TIC-1.SV",
+                "verified",
+            )
         };
         let reply = match query {
             Query::Past { at } => {
@@ -28,13 +35,13 @@ fn answer_page(model: &mut Model, effects: &[Effect], at: Timestamp) {
             Query::Journal { .. } => Answer::Journal(vec![raised(at), raised(at - SignedDuration::from_mins(40))]),
             Query::Actions { .. } => Answer::Actions(vec![write]),
             Query::Audit { action, .. } if action == "log" => Answer::Actions(vec![
-                login(at - SignedDuration::from_mins(50), "login", "somchai", "tty1"),
-                login(at - SignedDuration::from_mins(90), "login", "anna", "pts/3"),
-                login(at - SignedDuration::from_mins(95), "login", "tom", "pts/4"),
-                login(at - SignedDuration::from_mins(60), "logout", "tom", "pts/4"),
+                login(at - SignedDuration::from_mins(50), RecordedAction::Login, "somchai", "tty1"),
+                login(at - SignedDuration::from_mins(90), RecordedAction::Login, "anna", "pts/3"),
+                login(at - SignedDuration::from_mins(95), RecordedAction::Login, "tom", "pts/4"),
+                login(at - SignedDuration::from_mins(60), RecordedAction::Logout, "tom", "pts/4"),
             ]),
             Query::Audit { .. } => {
-                Answer::Actions(vec![login(at - SignedDuration::from_mins(30), "detach", "", "tty1")])
+                Answer::Actions(vec![login(at - SignedDuration::from_mins(30), RecordedAction::Detach, "", "tty1")])
             }
             Query::Series { .. } => Answer::Series(Vec::new()),
             other => panic!("no query of the page: {other:?}"),

@@ -128,7 +128,7 @@ fn a_key_that_cannot_be_replaced_makes_one_seal_only() {
     }
     assert_eq!(
         stored(&mut rows).iter().map(|row| row.action.to_string()).collect::<Vec<_>>(),
-        ["start", SEAL_LOG, "write"]
+        ["start", RecordedAction::SealAuditLog.word(), "write"]
     );
     assert_eq!(sealed(&log, &verification), (1, 1));
     fs::remove_dir(&obstacle).unwrap();

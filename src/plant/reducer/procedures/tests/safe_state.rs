@@ -6,7 +6,7 @@ use crate::{
         reducer::tests::recorded,
         tag::{Bound, Decimals},
     },
-    text::{Language, recorded_action},
+    text::Language,
 };
 
 const NOT_SENT: fn(TagValue) -> WriteResult = |_| WriteResult::NotSent(Fault::NotConnected);
@@ -143,7 +143,7 @@ fn who_starts_a_procedure_ends_it() {
 
 #[test]
 fn a_restarted_station_writes_what_was_on_record() {
-    let record = |outcome: &str| ActionRecord::new(at(-50), "anna", procedure::END, "heat", outcome);
+    let record = |outcome: &str| ActionRecord::new(at(-50), "anna", RecordedAction::EndProcedure, "heat", outcome);
     let restored = |outcome: &str| {
         let mut plant = plant_of(with_alarm());
         plant.restore_procedures(Some(&record(outcome)));
@@ -172,9 +172,9 @@ fn a_station_killed_while_it_is_written_leaves_it_to_the_next() {
     let aborted = command(&mut plant, 2, CommandKind::AbortProcedure(HEAT), 3);
     for (last_words, why) in [(failed, "failed"), (aborted, "aborted by anna")] {
         assert!(written(&last_words).contains(&(SV, 0.0)), "{why}");
-        let latest = recorded(&last_words).find(|action| &*action.action == procedure::WRITE_SAFE_STATE).expect(why);
+        let latest = recorded(&last_words).find(|action| action.is(RecordedAction::WriteSafeState)).expect(why);
         assert!(latest.outcome.starts_with(why), "{latest:?}");
-        let thai = Language::THAI.locale().within(|| recorded_action(&latest.action).to_owned());
+        let thai = Language::THAI.locale().within(|| RecordedAction::translated(&latest.action).to_owned());
         assert_ne!(thai, *latest.action, "a report says it in its own language");
         let mut next = plant_of(with_alarm());
         let records = next.restore_procedures(Some(latest));

@@ -179,6 +179,32 @@ fn a_list_that_can_be_read_in_two_ways_asks_before_it_is_taken() {
 }
 
 #[test]
+fn a_power_of_ten_of_the_unit_scales_its_value_and_nothing_else_does() {
+    let model = |list: &[(&str, &str)]| {
+        let points = list.iter().map(|(name, more)| format!("{{ \"name\": \"{name}\", \"size\": 1, {more} }}"));
+        let points = points.collect::<Vec<_>>().join(", ");
+        format!("{{ \"id\": 103, \"group\": {{ \"name\": \"inverter\", \"points\": [ {points} ] }} }}")
+    };
+    let scaled = "\"type\": \"uint16\", \"sf\": \"A_SF\", \"units\": \"A\"";
+    let text = model(&[("A", scaled), ("AphA", scaled), ("A_SF", "\"type\": \"sunssf\"")]);
+    for (power, expect) in
+        [(-2_i16, "10.02 A"), (0, "1002 A"), (1, "10020 A"), (11, "1002 raw"), (i16::MIN, "1002 raw")]
+    {
+        let mut bench = Bench::at_unit(|_, _| None);
+        bench.send(Msg::Loaded(Tab::Registers, Ok(text.clone().into_bytes())));
+        let registers = [(40_070, 1_002), (40_071, 7), (40_072, power.cast_unsigned())];
+        let held = |address: u16| registers.iter().find(|(at, _)| *at == address).map(|(_, word)| *word);
+        bench.answer(1, held);
+        assert!(bench.screen(120, 24).contains(expect), "{power}: {}", bench.screen(120, 24));
+        bench.keys("⏎");
+        bench.keys("j40070⏎");
+        bench.answer(2, held);
+        let shown = bench.screen(160, 40);
+        assert!(shown.contains(expect), "{power}: {shown}");
+    }
+}
+
+#[test]
 fn the_meaning_of_a_column_is_changed_by_a_key() {
     let mut bench = Bench::at_unit(|_, _| None);
     bench.send(Msg::Loaded(Tab::Registers, Ok("address;name;factor\n5;W;10\n6;VA;100\n".into())));

@@ -191,7 +191,8 @@ impl Registers {
     fn show_graph(&mut self, cx: &ViewContext, title: &str, log: Option<(Timestamp, String)>) {
         let (now, least) = log.as_ref().map_or((cx.now, WINDOW_MIN), |(end, _)| (*end, SignedDuration::ZERO));
         let named = self.watch.items.iter().filter_map(|item| self.names.get(item.at.0, item.at.1));
-        let tag = |(n, named): (usize, &Named)| TagDef { id: TagId(to_u16(n)), ..named.tag(&named.name) };
+        let tag =
+            |(n, named): (usize, &Named)| TagDef { id: TagId(to_u16(n)), ..self.cells.scaled(named).tag(&named.name) };
         let past = self.watch.since().map_or(SignedDuration::ZERO, |since| now.duration_since(since));
         let mut graph = Graph::new(cx, title, named.enumerate().map(tag).collect(), past.max(least), log);
         let selected = self.watch.items.iter().position(|item| item.at == (self.table, self.selected)).unwrap_or(0);

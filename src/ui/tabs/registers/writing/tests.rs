@@ -31,7 +31,7 @@ fn a_named_value_is_typed_as_it_is_shown() {
     assert_eq!(words_of("4294967296", &long, &[0; 4]), Ok(vec![0, 1, 0, 0]));
     let text = Named { kind: DataType::Text(4), ..sv() };
     assert_eq!(words_of("AB", &text, &[0; 2]), Ok(vec![0x4142, 0]));
-    let why = "found `ABCDE`, expected at most 4 printable characters".to_owned();
+    let why = "found `ABCDE`, expected printable characters in at most 4 bytes, no blank at the end".to_owned();
     assert_eq!(words_of("ABCDE", &text, &[0; 2]), Err(why));
     let clock = Named { kind: DataType::Clock(Clock::Bcd), ..sv() };
     assert_eq!(words_of("now", &clock, &[0; 3]), Ok(vec![0x2611, 0x3014, 0x0507]));
@@ -42,8 +42,15 @@ fn a_named_value_is_typed_as_it_is_shown() {
 }
 
 fn write(old: u16, new: u16, multiple: bool, outcome: Outcome) -> ListedWrite {
-    let write =
-        RegisterWrite { unit: 1, table: Table::Holding, address: 5, words: vec![new], expected: vec![old], multiple };
+    let write = RegisterWrite {
+        unit: 1,
+        table: Table::Holding,
+        address: 5,
+        words: vec![new],
+        expected: vec![old],
+        multiple,
+        clock: None,
+    };
     ListedWrite { id: CommandId::default(), at: Timestamp::UNIX_EPOCH, write, outcome }
 }
 
