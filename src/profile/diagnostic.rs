@@ -298,9 +298,10 @@ impl Problems {
     pub fn of_row(&mut self, row: Option<String>) {
         self.row = row;
     }
-    /// Says what the tags are called: at one place, what is wrong with many of them is reported once, with the first of them.
-    pub fn name_tags(&mut self, names: impl IntoIterator<Item = String>) {
-        self.tags.extend(names);
+    /// Knows what a tag is called: at one place, what is wrong with many of them is reported once, with the first of them.
+    pub fn named(&mut self, name: String) -> String {
+        self.tags.insert(name.clone());
+        name
     }
     /// Reports two keys of which only one may stand, at the first.
     pub fn exclusive(&mut self, (first, at): (&str, Span), (second, other): (&str, Span)) {

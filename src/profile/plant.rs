@@ -157,8 +157,7 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     let mut names = Names::default();
     let known = known_devices(file, library, &mut names, problems);
     // All names come first, because tags refer to tags.
-    let mut count = 0;
-    let mut rows = Vec::new();
+    let (mut count, mut rows) = (0, Vec::new());
     for device in &known {
         let of_device = rows::rows(device.table, &device.profile, problems);
         if TAGS_MAX < count + of_device.len() {
@@ -170,13 +169,13 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
         for row in &of_device {
             // A row without a name is reported when it is read.
             if !row.short.is_empty() {
-                names.tags.insert(format!("{}.{}", device.name, row.short), TagId(to_u16(count)));
+                let name = problems.named(format!("{}.{}", device.name, row.short));
+                names.tags.insert(name, TagId(to_u16(count)));
             }
             count += 1;
         }
         rows.push(of_device);
     }
-    problems.name_tags(names.tags.keys().cloned());
     let (mut devices, mut defined) = (Vec::new(), Vec::new());
     for (device, rows) in known.iter().zip(rows) {
         let (mut def, context) = define_device(DeviceId(to_u16(devices.len())), device, lines, &names, problems);

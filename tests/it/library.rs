@@ -15,6 +15,7 @@ fn every_tag_of_the_library_is_what_pymodbus_reads() {
         .args([root.join("profiles/devices"), root.join("tests/peers/every_type.toml")])
         .args(["--passes", "2", "--work"])
         .arg(work.path())
+        .envs(["XDG_RUNTIME_DIR", "XDG_STATE_HOME"].map(|place| (place, work.path())))
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&read.stdout);

@@ -3,7 +3,6 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `architecture` | the laws: the line of modules, the io edge, sizes, style of tests, words |
-//! | `answers` | what the station says in words of its own: each answer is one that a terminal can translate |
 //! | `archive` | closed hours as files: what `sightglass history` says of them, and what other engines read |
 //! | `backup` | backups and restores by command, beside a station and on a full disk |
 //! | `attach` | the station's socket: equal snapshots at both ends, stuck and hostile terminals, reconnecting |
@@ -48,7 +47,6 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout)]
 #![allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 
-mod answers;
 mod architecture;
 mod archive;
 mod automatic_reports;

@@ -66,7 +66,7 @@ fn what_is_typed_is_held_as_the_device_shows_it() {
 }
 
 #[test]
-fn a_text_of_which_nothing_can_be_printed_is_shown_as_the_device_holds_it() {
+fn what_cannot_be_printed_is_shown_as_the_device_holds_it() {
     let check = |kind: DataType, words: &[u16], expect: &str| {
         assert_eq!(decode(kind, words).as_deref(), Some(expect), "{kind} {words:04X?}");
     };

@@ -68,8 +68,7 @@ every!(diagnostics: Diagnostic {
     Diagnostic::Scan(_) => [scan(Vec::new()), scan(vec![Serial::USUAL])],
     Diagnostic::Sweep(_) => [Diagnostic::Sweep(Sweep { unit: UNIT, table: Table::Holding, first: 0, last: 9, every: 1 })],
     Diagnostic::Write(_) => [Diagnostic::Write(RegisterWrite {
-        unit: UNIT, table: Table::Holding, address: 0, words: vec![1], expected: vec![0], multiple: false,
-        clock: None,
+        unit: UNIT, table: Table::Holding, address: 0, words: vec![1], expected: vec![0], multiple: false, clock: None
     })],
     Diagnostic::Signal(_) => [Diagnostic::Signal(SignalTest { signal: OutputSignal::Rts, on: true, seconds: 1 })],
 });

@@ -179,7 +179,7 @@ fn a_list_that_can_be_read_in_two_ways_asks_before_it_is_taken() {
 }
 
 #[test]
-fn a_power_of_ten_of_the_unit_scales_its_value_and_nothing_else_does() {
+fn a_power_of_ten_of_the_unit_scales_its_value() {
     let model = |list: &[(&str, &str)]| {
         let points = list.iter().map(|(name, more)| format!("{{ \"name\": \"{name}\", \"size\": 1, {more} }}"));
         let points = points.collect::<Vec<_>>().join(", ");
