@@ -4,6 +4,7 @@
 mod base;
 pub mod calculated;
 pub mod cells;
+mod codes;
 mod columns;
 mod form;
 mod formula;
@@ -263,6 +264,9 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
         },
     };
     sections::assign(&mut rows, &sections, context.is_table_stated);
+    if matches!(context.base, None | Some(AddressBase::Modicon)) {
+        base::assign_to_coils(&mut rows, context.base.is_some());
+    }
     let stated = Some(context.table).filter(|_| context.is_table_stated);
     let written = rows.iter().filter(|row| row.base.is_none());
     let written: Vec<(&str, Option<Table>)> =

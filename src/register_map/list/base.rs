@@ -40,6 +40,29 @@ pub fn is_sent(rows: &[Row]) -> bool {
     rows.iter().any(|row| row.is_register && row.address.as_ref().is_some_and(is_bit))
 }
 
+/// Gives the coils of a list of Modicon numbers the base from which they count, where they have lost the leading 0 of theirs:
+/// every other number is one of Modicon, and none of theirs is 0. In a list that does not say that its numbers are those,
+/// `is_modicon`, six digits do.
+pub fn assign_to_coils(rows: &mut [Row], is_modicon: bool) {
+    let number = |row: &Row| {
+        let text = first_of(row.address.as_deref()?);
+        Some(text.to_owned()).filter(|text| text.bytes().all(|byte| byte.is_ascii_digit()))
+    };
+    let is_coil = |row: &Row| row.table == Some(Table::Coil) && row.base.is_none();
+    let fits = |row: &Row| match number(row) {
+        Some(text) if is_coil(row) => text.parse::<u32>().is_ok_and(|number| (1..=65_536).contains(&number)),
+        Some(text) => {
+            of_modicon(&text).is_some_and(|(table, _)| text.len() == 6 || row.table.is_none_or(|of| of == table))
+        }
+        None => true,
+    };
+    let others = || rows.iter().filter(|row| !is_coil(row)).filter_map(number);
+    let is_proof = others().any(|text| is_modicon || text.len() == 6) && rows.iter().all(fits);
+    rows.iter_mut()
+        .filter(|row| is_proof && is_coil(row) && number(row).is_some())
+        .for_each(|row| row.base = Some(AddressBase::One));
+}
+
 /// How the plain numbers of a list count: as its reader has said, else as its own numbers prove; else it is unclear. Each is
 /// given as written, with the table that its row states.
 pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (AddressBase, Option<Unclear>) {
@@ -49,15 +72,11 @@ pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (Add
     let is_plain = |text: &str| text.len() == 5 && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_of_other =
         |text: &str, of: Option<Table>| of_modicon(text).is_some_and(|(table, _)| of.is_some_and(|of| of != table));
-    // 16299 is no Modicon number of a holding register. One of no table at all, such as 50001, proves nothing of others.
-    let is_sent = written.iter().any(|(text, of)| is_plain(text) && is_of_other(text, *of));
-    // Six digits are too many for what is sent.
-    let is_modicon = written.iter().any(|(text, _)| text.len() == 6 && of_modicon(text).is_some());
-    match (is_sent, is_modicon) {
-        (true, false) => return (AddressBase::Zero, None),
-        (false, true) => return (AddressBase::Modicon, None),
-        (true, true) | (false, false) => {}
-    }
+    // 16299 is no Modicon number of a holding register, but that of a coil without its leading 0. One of no table at all, such
+    // as 50001, proves nothing of others.
+    let is_short =
+        |(text, of): &(&str, Option<Table>)| *of == Some(Table::Coil) && is_plain(text) && is_of_other(text, *of);
+    let is_sent = written.iter().any(|one| is_plain(one.0) && is_of_other(one.0, one.1) && !is_short(one));
     let two = |bases: [AddressBase; 2], (text, of): &(&str, Option<Table>)| {
         let read = |base| {
             let place =
@@ -67,13 +86,26 @@ pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (Add
         let readings = [read(bases[0])?, read(bases[1])?];
         (readings[0].1 != readings[1].1).then(|| Unclear { written: (*text).to_owned(), readings })
     };
+    let short =
+        || written.iter().filter(|one| is_short(one)).find_map(|one| two([AddressBase::One, AddressBase::Zero], one));
+    let short = || {
+        let mut all = written.iter().filter(|one| is_short(one));
+        all.find_map(|one| two([AddressBase::One, AddressBase::Zero], one))
+    };
+    // Six digits are too many for what is sent.
+    let is_modicon = written.iter().any(|(text, _)| text.len() == 6 && of_modicon(text).is_some());
+    match (is_sent, is_modicon) {
+        (true, false) => return (AddressBase::Zero, None),
+        (false, true) => return (AddressBase::Modicon, short()),
+        (true, true) | (false, false) => {}
+    }
     let unclear = written.iter().find_map(|one| two([AddressBase::Modicon, AddressBase::Zero], one));
     // `0001` of an area is often its first register, unless there is one before it.
     let is_padded = |text: &str| text.len() == 4 && text.starts_with('0') && text.bytes().all(|b| b.is_ascii_digit());
     let has_first = written.iter().any(|(text, _)| is_padded(text) && text.parse() == Ok(0));
     let mut padded = written.iter().filter(|(text, _)| is_padded(text) && !has_first);
     let padded = padded.find_map(|one| two([AddressBase::One, AddressBase::Zero], one));
-    (AddressBase::Modicon, unclear.or(padded))
+    (AddressBase::Modicon, unclear.or_else(short).or(padded))
 }
 
 /// The rows below a heading whose addresses differ by another number than those of the others.

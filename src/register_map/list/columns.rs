@@ -199,6 +199,10 @@ fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
     }
     let words = Heading::new(heading);
     let candidates = words.candidates();
+    // Codes that are not understood say so row by row: without them each row would be of another table.
+    if words.is_of_codes() && cells.iter().any(|cell| cell.bytes().any(|byte| byte.is_ascii_digit())) {
+        return Some(Column::Table);
+    }
     if let Some(column) = candidates.iter().copied().find(|column| fits(*column, &words, cells)) {
         // What is more than 1 as a gain is what a maker has multiplied by.
         let is_gain = column == Column::Scale && words.has(&["gain"]);

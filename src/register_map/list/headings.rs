@@ -122,7 +122,7 @@ const HEADINGS: [(Column, &[&str]); 17] = [
     (Column::Offset, &["offset", "versatz", "décalage", "смещение", "偏移"]),
     (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "zugriff", "zugriffsart", "accès", "acceso", "accesso", "toegang", "dostęp", "доступ", "访问"]),
     (Column::Address, ADDRESS),
-    (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function",
+    (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function", "nickname", "tagname", "purpose", "item", "field",
         "bezeichnung", "beschreibung", "benennung", "bedeutung", "datenpunkt", "messwert", "messgröße", "titel", "parametername", "funktion", "kommentar", "désignation", "nom", "libellé", "nombre", "descripción", "nome", "descrizione", "descrição", "naam", "omschrijving", "nazwa", "opis", "namn", "benämning", "beskrivning", "название", "наименование", "описание", "параметр", "名称", "描述", "参数", "ชื่อ", "คำอธิบาย"]),
 ];
 /// A heading with one of these alone is no column of addresses: tables of codes have them too.
@@ -189,6 +189,15 @@ impl Heading {
             return Some(AddressBase::One);
         }
         (pair(&["0", "zero"]) || self.has(&["pdu", "protocol", "wire"])).then_some(AddressBase::Zero)
+    }
+
+    /// Its column says function codes, and nothing else.
+    pub fn is_of_codes(&self) -> bool {
+        self.has(&["fc", "funktionscode", "功能码"])
+            || self
+                .0
+                .windows(2)
+                .any(|two| ["function", "func", "funktions"].contains(&two[0].as_str()) && two[1].starts_with("code"))
     }
 
     fn is_strong_address(&self) -> bool {

@@ -2,6 +2,7 @@
 
 use super::{
     cells::Cells,
+    codes,
     columns::{Column, Columns, first_of, is_address, span_of},
     formula::Formula,
     reader::{More, Reader, with_unit},
@@ -52,6 +53,8 @@ pub struct Row {
     /// Unit address, as the row states it.
     pub device: Option<u8>,
     more: More,
+    /// The function codes that write it, of one register and of several.
+    writes: [Option<u8>; 2],
     /// Columns that are not used and have something in this row.
     pub unused: Vec<String>,
     /// Why it cannot be taken, whatever else it says.
@@ -173,6 +176,7 @@ impl Row {
             }
         }
         read.more = reader.more();
+        read.writes = reader.text(Column::Table).map(codes::writes_of).unwrap_or_default();
         read.unused = reader.unused();
         read.read_unit(&mut reader);
         read.wrong = reader.wrong;
@@ -227,6 +231,12 @@ impl Row {
         AddressContext { table, is_stated, base }.parse(first_of(written))
     }
 
+    /// Why its address is none.
+    fn no_place(&self, written: &str) -> String {
+        let other = self.table.filter(|of| of_modicon(first_of(written)).is_some_and(|(table, _)| table != *of));
+        other.map_or_else(|| t!("`{written}` is not an address", written), |table| differ(written, table.word()))
+    }
+
     /// Its type and, where the word says it, the order.
     fn kind(&self) -> Result<(DataType, Option<ByteOrder>), String> {
         let whole = match self.signed {
@@ -279,7 +289,7 @@ impl Row {
         let Some(written) = &self.address else { return Err(t!("no address").to_owned()) };
         let because = |why: String| format!("{written}: {why}");
         let found = self.place(written, assumed);
-        let (table, address) = found.ok_or_else(|| t!("`{written}` is not an address", written))?;
+        let (table, address) = found.ok_or_else(|| self.no_place(written))?;
         if self.name.is_empty() {
             return Err(t!("{written}: no name", written));
         }
@@ -308,7 +318,7 @@ impl Row {
         let is_plain = first.bytes().all(|byte| byte.is_ascii_digit()) && assumed.alias.is_none();
         Ok(Taken {
             named: self.with_more(named).map_err(because)?,
-            is_base_assumed: self.base.is_none() && is_plain && of_modicon(first).is_none(),
+            is_base_assumed: self.base.is_none() && is_plain && of_modicon(first).is_none_or(|(of, _)| of != table),
             is_order_assumed: stated.is_none() && !is_in_order,
             is_type_assumed: !table.is_bits() && self.kind.is_none() && self.signed.is_none(),
             is_write_lost: false,
@@ -317,9 +327,12 @@ impl Row {
 
     fn with_more(&self, mut named: Named) -> Result<Named, String> {
         let more = &self.more;
-        named.access = more.access.unwrap_or(named.access);
+        let (one, many) = (self.writes[0].filter(|_| named.count() == 1), self.writes[1]);
+        let by_code = one.or(many).map(|_| Access::ReadWrite);
+        named.access = more.access.or(by_code).unwrap_or(named.access);
+        let by_many = many.filter(|_| one.is_none() && named.count() == 1);
         if named.access != Access::Read {
-            (named.write_at, named.write_fc) = (more.write_at, more.write_with);
+            (named.write_at, named.write_fc) = (more.write_at, more.write_with.or(by_many));
         }
         (named.min, named.max) = (more.min, more.max);
         named.decimals = more.decimals.unwrap_or(named.decimals);

@@ -1,5 +1,6 @@
 //! The words of a cell: types with their byte order, tables, factors.
 
+use super::codes;
 use crate::{
     plant::{
         address::TABLES,
@@ -56,7 +57,7 @@ pub fn table_of(text: &str) -> Option<Table> {
     ];
     let named: Vec<Table> = words.into_iter().filter(|(_, is)| *is).map(|(table, _)| table).collect();
     match named.as_slice() {
-        [] => area_of(&text).or_else(|| of_codes(&text)),
+        [] => area_of(&text).or_else(|| codes::table_of(&text)),
         [table] => Some(*table),
         _ => None,
     }
@@ -75,31 +76,6 @@ fn area_of(text: &str) -> Option<Table> {
 /// The table of an area digit.
 pub fn area(digit: &str) -> Option<Table> {
     TABLES.into_iter().find(|table| table.digit().to_string() == digit.trim())
-}
-
-/// `03`, `FC04`, `0x04`, `03/06/16`: the table of all function codes in it.
-fn of_codes(text: &str) -> Option<Table> {
-    let text = text.trim().trim_start_matches("fc").trim();
-    let first = text.split(|sign: char| !sign.is_ascii_alphanumeric()).next()?;
-    let codes = text.split(|sign: char| !sign.is_ascii_alphanumeric()).map(|code| {
-        let code = code.trim_start_matches("fc");
-        match code.strip_prefix("0x") {
-            Some(digits) => u8::from_str_radix(digits, 16).ok(),
-            None => code.parse().ok(),
-        }
-    });
-    let mut found: Vec<Table> = Vec::new();
-    for code in codes.take_while(Option::is_some).flatten() {
-        found.push(match code {
-            1 | 5 | 15 => Table::Coil,
-            2 => Table::Discrete,
-            3 | 6 | 16 | 22 | 23 => Table::Holding,
-            4 => Table::Input,
-            _ => return None,
-        });
-    }
-    let table = *found.first().filter(|_| !first.is_empty())?;
-    found.iter().all(|other| *other == table).then_some(table)
 }
 
 /// The order of four letters, or in words that mean one order; "little endian" can be two.

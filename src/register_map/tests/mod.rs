@@ -1,5 +1,6 @@
 //! Small files of each form, with what is taken of them and what is not.
 
+mod codes;
 mod configurations;
 mod doubtful;
 mod exports;
