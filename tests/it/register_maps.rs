@@ -87,6 +87,26 @@ fn an_export_is_imported_again() {
 }
 
 #[test]
+fn a_plant_names_its_profile_as_the_file_is_called() {
+    let folder = folder();
+    for out in ["ME31.toml", "Eastron_SDM120.toml", "own-1.toml"] {
+        let import = ["profile", "import", "-", "--out", out, "--plant", "p.toml", "--force"];
+        let (code, said) = run(folder.path(), &import, LIST.as_bytes());
+        assert_eq!(code, Some(0), "{said}");
+        let plant = fs::read_to_string(folder.path().join("p.toml")).unwrap();
+        let stem = out.trim_end_matches(".toml");
+        assert!(plant.contains(&format!("profile = \"{stem}\"")), "{plant}");
+        assert!(said.contains(&format!("written: {out}")), "{said}");
+        let (code, said) = run(folder.path(), &["check", "p.toml"], b"");
+        assert_eq!(code, Some(0), "{out}: {said}");
+    }
+    let import = ["profile", "import", "-", "--out", "v1.2.toml", "--plant", "q.toml"];
+    let (code, said) = run(folder.path(), &import, LIST.as_bytes());
+    assert!(code == Some(2) && said.contains("v1.2.toml: no plant file can name this profile"), "{said}");
+    assert!(!folder.path().join("v1.2.toml").exists() && !folder.path().join("q.toml").exists());
+}
+
+#[test]
 fn a_column_that_may_mean_two_things_is_asked_about() {
     let folder = folder();
     let list = b"address;name;type;Ratio\n5;a;int16;10\n6;b;int16;1\n";

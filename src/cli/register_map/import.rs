@@ -106,9 +106,13 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     }
     let stem = if is_input { "imported".to_owned() } else { name_of(&args.file) };
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}.toml")));
-    let name = name_of(&path);
+    let name = profile_name(&path).unwrap_or_else(|| name_of(&path));
     check_free(&path, args)?;
     if let Some(plant) = &args.plant {
+        if profile_name(&path).is_none() {
+            let words = "no plant file can name this profile: --out with letters, digits, `_` and `-` alone";
+            return Err(CliError::Usage(format!("{}: {words}", path.display())));
+        }
         check_free(plant, args)?;
         if is_same_file(&path, plant) {
             return Err(CliError::Usage(format!("{} would be the profile and the plant file", plant.display())));
@@ -183,6 +187,14 @@ fn check_free(path: &Path, args: &Args) -> Result<(), CliError> {
         )));
     }
     Ok(())
+}
+
+/// The name by which a plant finds the profile of a file: what stands before `.toml`, letter by letter; `None` where it has
+/// signs that no such name has.
+fn profile_name(path: &Path) -> Option<String> {
+    let stem = path.file_stem()?.to_str()?;
+    let is_plain = stem.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
+    is_plain.then(|| stem.to_owned())
 }
 
 /// Would both be one file, by whatever path?
