@@ -9,8 +9,11 @@ mod columns;
 mod form;
 mod formula;
 pub mod headings;
+mod heat_pump;
+mod parts;
 mod questions;
 mod reader;
+mod register_names;
 mod row;
 mod sections;
 pub mod words;
@@ -26,8 +29,8 @@ pub use self::{
 use self::{
     calculated::Calculated,
     cells::Cells,
-    columns::{Columns, first_of, is_address, is_heading},
-    row::{Assumed, Row, Taken},
+    columns::first_of,
+    row::{Assumed, Taken},
 };
 use super::{Format, named::Named};
 use crate::{
@@ -82,6 +85,10 @@ impl Default for ListContext {
 pub struct List {
     /// In the order of the list.
     pub named: Vec<Named>,
+    /// How its plain numbers were read; `None` where it has none.
+    pub base: Option<AddressBase>,
+    /// The order of what takes several registers and names none.
+    pub order: Option<ByteOrder>,
     /// What is calculated from registers.
     pub calculated: Vec<Calculated>,
     /// `line 7: no address`.
@@ -165,6 +172,8 @@ impl List {
         self.warnings.extend(other.warnings);
         self.problems.extend(other.problems.into_iter().map(|problem| format!("{place}{problem}")));
         self.unclear = self.unclear.take().or(other.unclear);
+        self.base = self.base.or(other.base);
+        self.order = self.order.or(other.order);
         self.station = self.station.or(other.station);
         for (what, count) in other.assumed {
             *self.assumed.entry(what).or_default() += count;
@@ -241,8 +250,8 @@ pub fn conflict(old: &Named, new: &Named) -> Option<String> {
 
 /// Reads a list.
 pub fn parse(text: &str, context: &ListContext) -> List {
-    let separator = cells::separator(text);
-    of_cells(&cells::rows(text, separator), separator.is_some(), context)
+    let separator = cells::separator(text, &context.means);
+    of_cells(&cells::rows(text, separator, &context.means), separator.is_some(), context)
 }
 
 /// Reads rows of cells, which a separator or the cells of a table keep apart.
@@ -253,15 +262,9 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
     }
     let (all, sections) = sections::split(all, is_separated);
     let all = &all[..];
-    let mut rows: Vec<Row> = match all.iter().position(|row| is_heading(&row.cells)) {
-        Some(first) => {
-            let above = all[..first].iter().map(|row| Row::without_cells(row.line));
-            above.chain(below_headings(&all[first..], is_separated, context, &mut list)).collect()
-        }
-        None => match by_form(all, is_separated) {
-            Ok(rows) => rows,
-            Err(why) => return List::refused(why),
-        },
+    let mut rows = match parts::rows(all, is_separated, context, &mut list) {
+        Ok(rows) => rows,
+        Err(why) => return List::refused(why),
     };
     sections::assign(&mut rows, &sections, context.is_table_stated);
     if matches!(context.base, None | Some(AddressBase::Modicon)) {
@@ -278,7 +281,14 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
         _ => base_of(&written, context),
     };
     list.unclear = unclear;
-    let order = context.order.unwrap_or(if is_nibe(&list.columns) { ByteOrder::Cdab } else { ByteOrder::Abcd });
+    list.base = base::read_as(&written, base);
+    let order =
+        context.order.unwrap_or(if heat_pump::is_list(list.columns.iter().map(|(heading, _)| heading.as_str())) {
+            ByteOrder::Cdab
+        } else {
+            ByteOrder::Abcd
+        });
+    list.order = Some(order);
     let table = alias.filter(|_| !context.is_table_stated).map_or(context.table, |(table, _)| table);
     let alias = alias.map(|(_, first)| first);
     let assumed = Assumed { table, is_stated: context.is_table_stated, base, order, alias };
@@ -319,53 +329,6 @@ fn assumptions(taken: &Taken, context: &ListContext, is_sure: bool) -> Vec<Strin
         (is_scaled_twice && !is_sure, t!("the offset is added after the factor").to_owned()),
     ];
     all.into_iter().filter(|(is, _)| *is).map(|(_, what)| what).collect()
-}
-
-/// The lists of NIBE, whose 32-bit values have the low word first.
-fn is_nibe(columns: &[(String, Option<Column>)]) -> bool {
-    ["Title", "Register type", "Register", "Division factor", "Size of variable"]
-        .iter()
-        .all(|heading| columns.iter().any(|(known, _)| known == heading))
-}
-
-/// The rows below each heading.
-fn below_headings(all: &[Cells], is_separated: bool, context: &ListContext, list: &mut List) -> Vec<Row> {
-    let mut rows = Vec::new();
-    let starts: Vec<usize> = (0..all.len()).filter(|n| is_heading(&all[*n].cells)).collect();
-    for (n, start) in starts.iter().enumerate() {
-        let end = starts.get(n + 1).copied().unwrap_or(all.len());
-        let (heading, below) = (&all[*start].cells, &all[start + 1..end]);
-        let columns = Columns::new(heading, below, &context.means);
-        list.is_sure |= columns.is_sure;
-        let named = columns.headings.iter().cloned().zip(columns.means.iter().copied());
-        list.add_columns(named.collect(), columns.open.clone());
-        let before = rows.len();
-        for row in below {
-            // A line of a PDF with other columns than the heading is taken by its form.
-            rows.push(if is_separated || row.cells.len() == heading.len() {
-                Row::headed(&columns, row)
-            } else {
-                Row::by_form(row.line, &row.cells)
-            });
-        }
-        base::contradicting(&mut rows[before..]);
-    }
-    rows
-}
-
-/// Rows without a heading; `Err` where they are no list.
-fn by_form(all: &[Cells], is_separated: bool) -> Result<Vec<Row>, String> {
-    let Some(first) = all.first() else { return Err(t!("there is nothing in it").to_owned()) };
-    if is_separated && !first.cells.iter().any(|cell| is_address(cell)) {
-        let heading = first.cells.join(", ");
-        return Err(t!("its heading has no column of addresses: {heading}", heading));
-    }
-    let rows: Vec<Row> = all.iter().map(|row| Row::by_form(row.line, &row.cells)).collect();
-    let (found, count) = (rows.iter().filter(|row| row.address.is_some()).count(), rows.len());
-    if 2 * found < count {
-        return Err(t!("only {found} of its {count} lines have an address", found, count));
-    }
-    Ok(rows)
 }
 
 #[cfg(test)]

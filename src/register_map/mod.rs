@@ -115,7 +115,7 @@ fn of_tables(tables: Vec<Vec<cells::Cells>>, context: &ListContext) -> List {
     let mut all = List::default();
     let mut refused = None;
     for rows in tables {
-        let rows = cells::without_rules(rows);
+        let rows = cells::without_rules(rows, &context.means);
         let list = list::of_cells(&rows, true, context);
         match list.refused {
             Some(why) => refused = refused.or(Some(why)),
@@ -135,7 +135,7 @@ fn of_workbook(bytes: &[u8], context: &ListContext) -> List {
     for (name, rows) in sheets {
         // Its name may be that of a table.
         let title = list::titled(&name);
-        let rows = title.into_iter().chain(cells::without_rules(rows)).collect::<Vec<_>>();
+        let rows = title.into_iter().chain(cells::without_rules(rows, &context.means)).collect::<Vec<_>>();
         let list = list::of_cells(&rows, true, context);
         match list.refused {
             Some(why) if many => all.warnings.push(t!("sheet {name}: {why}", name, why)),

@@ -86,7 +86,7 @@ impl Tables {
             }
             b"tr" => {
                 self.end_row();
-                self.row = Some(Cells { line: self.line, cells: Vec::new(), is_unclosed: false });
+                self.row = Some(Cells { line: self.line, cells: Vec::new(), is_unclosed: false, is_ruled: false });
             }
             b"td" | b"th" => {
                 self.end_cell();

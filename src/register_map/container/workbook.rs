@@ -70,7 +70,7 @@ fn rows(book: &mut Xlsx<Cursor<&[u8]>>, name: &str) -> Result<Vec<Cells>, calami
         }
         let line = usize::try_from(row).unwrap_or(0) + 1;
         if rows.last().is_none_or(|last| last.line != line) {
-            rows.push(Cells { line, cells: Vec::new(), is_unclosed: false });
+            rows.push(Cells { line, cells: Vec::new(), is_unclosed: false, is_ruled: false });
         }
         let Some(last) = rows.last_mut() else { continue };
         let column = usize::try_from(column).unwrap_or(0);

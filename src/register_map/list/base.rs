@@ -86,8 +86,6 @@ pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (Add
         let readings = [read(bases[0])?, read(bases[1])?];
         (readings[0].1 != readings[1].1).then(|| Unclear { written: (*text).to_owned(), readings })
     };
-    let short =
-        || written.iter().filter(|one| is_short(one)).find_map(|one| two([AddressBase::One, AddressBase::Zero], one));
     let short = || {
         let mut all = written.iter().filter(|one| is_short(one));
         all.find_map(|one| two([AddressBase::One, AddressBase::Zero], one))
@@ -106,6 +104,19 @@ pub fn base_of(written: &[(&str, Option<Table>)], context: &ListContext) -> (Add
     let mut padded = written.iter().filter(|(text, _)| is_padded(text) && !has_first);
     let padded = padded.find_map(|one| two([AddressBase::One, AddressBase::Zero], one));
     (AddressBase::Modicon, unclear.or_else(short).or(padded))
+}
+
+/// How the plain numbers of a list are read: as those of Modicon only where one of them is such a number.
+pub fn read_as(written: &[(&str, Option<Table>)], base: AddressBase) -> Option<AddressBase> {
+    let is_plain = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let mut plain = written.iter().filter(|(text, _)| is_plain(text)).peekable();
+    plain.peek()?;
+    let is_modicon =
+        |(text, of): &(&str, Option<Table>)| of_modicon(text).is_some_and(|(table, _)| of.is_none_or(|of| of == table));
+    Some(match base {
+        AddressBase::Modicon if !plain.any(is_modicon) => AddressBase::Zero,
+        base => base,
+    })
 }
 
 /// The rows below a heading whose addresses differ by another number than those of the others.

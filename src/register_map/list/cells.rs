@@ -1,6 +1,6 @@
 //! A text becomes rows of cells: at one separator for the whole text where its heading has one, else line by line.
 
-use super::{headings::is_heading, sections::title_of};
+use super::{columns::Said, headings::is_heading, sections::title_of};
 
 /// Most rows of a list.
 pub const ROWS_MAX: usize = 10_000;
@@ -18,17 +18,23 @@ pub struct Cells {
     pub cells: Vec<String>,
     /// It has swallowed what follows.
     pub is_unclosed: bool,
+    /// A line is drawn below it, as below the heading of a table of Markdown.
+    pub is_ruled: bool,
 }
 
 /// The separator that the rows have in common: tab, semicolon, bar or comma; that of a heading, else as in most of its first
 /// lines.
-pub fn separator(text: &str) -> Option<char> {
+pub fn separator(text: &str, said: &Said) -> Option<char> {
     let first: Vec<&str> =
         text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')).take(20).collect();
     let all = ['\t', ';', '|', ','];
     let heads = |separator: char| {
         let headings = first.iter().filter_map(|line| separated(line, separator).into_iter().next());
-        headings.filter(|row| is_heading(&row.cells)).map(|row| row.cells.len()).max().map(|count| (count, separator))
+        headings
+            .filter(|row| is_heading(&row.cells, said))
+            .map(|row| row.cells.len())
+            .max()
+            .map(|count| (count, separator))
     };
     // Of several the one with most cells; `|` of Markdown and a tab come before what may stand within a cell.
     let heading = all.into_iter().rev().filter_map(heads).max_by_key(|(count, _)| *count);
@@ -54,30 +60,40 @@ pub fn of_text(cell: &str) -> &str {
 }
 
 /// The rows of a text with what separates its cells; blank rows and those of Markdown's rule are left out.
-pub fn rows(text: &str, separator: Option<char>) -> Vec<Cells> {
+pub fn rows(text: &str, separator: Option<char>, said: &Said) -> Vec<Cells> {
     let all = match separator {
         Some(separator) => separated(text, separator),
         None => text.lines().zip(1..).map(|(line, number)| row(number, by_blanks(line))).collect(),
     };
-    without_rules(all)
+    without_rules(all, said)
 }
 
 /// The same rows without those that only draw a line, are blank or a comment. A `#` may also head a column of numbers.
-pub fn without_rules(all: Vec<Cells>) -> Vec<Cells> {
+pub fn without_rules(mut all: Vec<Cells>, said: &Said) -> Vec<Cells> {
     let is_rule = |cells: &[String]| cells.iter().all(|cell| cell.chars().all(|sign| "-: ".contains(sign)));
+    // `|---|---|` stands below the heading of a table; a single `---` ends a part of a text.
+    let is_drawn = |pair: &[Cells]| {
+        let [row, rule] = pair else { return false };
+        2 <= row.cells.len()
+            && is_rule(&rule.cells)
+            && rule.cells.iter().any(|cell| cell.contains("--"))
+            && rule.cells.len() == row.cells.len()
+    };
+    let ruled: Vec<bool> = all.windows(2).map(is_drawn).collect();
+    all.iter_mut().zip(ruled).for_each(|(row, is_ruled)| row.is_ruled = is_ruled);
     let is_marked = |row: &Cells| row.cells.first().is_some_and(|cell| cell.starts_with('#'));
     let is_bare = |row: &Cells| row.cells.first().is_some_and(|cell| cell == "#");
-    let is_numbered = all.iter().any(|row| is_bare(row) && is_heading(&row.cells));
+    let is_numbered = all.iter().any(|row| is_bare(row) && is_heading(&row.cells, said));
     // `#address;name` heads the rows, unless another row does.
-    let is_only = !all.iter().any(|row| !is_marked(row) && is_heading(&row.cells));
-    let is_comment = |row: &Cells| is_marked(row) && !is_numbered && !(is_only && is_heading(&row.cells));
+    let is_only = !all.iter().any(|row| !is_marked(row) && is_heading(&row.cells, said));
+    let is_comment = |row: &Cells| is_marked(row) && !is_numbered && !(is_only && is_heading(&row.cells, said));
     // `## Input registers` is no comment, and the heading of the next part is none.
     let is_left_out = |row: &Cells| is_rule(&row.cells) || is_comment(row) && title_of(&row.cells).is_none();
     all.into_iter().filter(|row| !is_left_out(row)).take(ROWS_MAX).collect()
 }
 
 fn row(line: usize, cells: Vec<String>) -> Cells {
-    Cells { line, cells, is_unclosed: false }
+    Cells { line, cells, is_unclosed: false, is_ruled: false }
 }
 
 /// Stands for a bar of Markdown that is part of its cell, `\|`; no text has it.
@@ -105,7 +121,7 @@ fn separated(text: &str, separator: char) -> Vec<Cells> {
             cells.pop_if(|last| last.is_empty());
             cells.drain(..usize::from(cells.first().is_some_and(String::is_empty)));
         }
-        Cells { line, cells, is_unclosed }
+        Cells { line, cells, is_unclosed, is_ruled: false }
     });
     rows.collect()
 }
@@ -135,31 +151,32 @@ mod tests {
     #[test]
     fn a_line_of_separators_is_cut_at_the_last_column() {
         let text = format!("a{}\n5,b\n", ",x".repeat(5_000_000));
-        let lengths: Vec<usize> = rows(&text, Some(',')).iter().map(|row| row.cells.len()).collect();
+        let lengths: Vec<usize> = rows(&text, Some(','), &Said::new()).iter().map(|row| row.cells.len()).collect();
         assert_eq!(lengths, [COLUMNS_MAX, 2]);
     }
 
     #[test]
     fn a_quoted_cell_keeps_its_separators_quotes_and_lines() {
         let text = "a,b,c\n5,\"a, \"\"b\"\"\",10\" pipe\n\n6,\"two\nlines\",x\n";
-        let rows = rows(text, separator(text));
+        let rows = rows(text, separator(text, &Said::new()), &Said::new());
         let cells: Vec<(usize, Vec<String>)> = rows.into_iter().map(|row| (row.line, row.cells)).collect();
         let row = |cells: [&str; 3]| cells.map(str::to_owned).to_vec();
         let expect =
             [(1, row(["a", "b", "c"])), (2, row(["5", "a, \"b\"", "10\" pipe"])), (4, row(["6", "two lines", "x"]))];
         assert_eq!(cells, expect);
         let open = format!("a;b\n1;\"{}", "x;y\n".repeat(60));
-        assert!(super::rows(&open, separator(&open))[1].is_unclosed);
+        assert!(super::rows(&open, separator(&open, &Said::new()), &Said::new())[1].is_unclosed);
     }
 
     #[test]
     fn a_table_of_markdown_has_rows() {
         let text = "| Address | Name |\n|---|:--|\n| 5 | Run |\n";
-        let rows = rows(text, separator(text));
+        let rows = rows(text, separator(text, &Said::new()), &Said::new());
         assert_eq!(rows.iter().map(|row| row.cells.join("+")).collect::<Vec<_>>(), ["Address+Name", "5+Run"]);
         let escaped = "| Address | Name | Notes |\n|---|---|---|\n| 5 | `A\\|B` | one \\| two |\n";
-        let cells = super::rows(escaped, separator(escaped)).pop().expect("it has rows").cells;
+        let cells =
+            super::rows(escaped, separator(escaped, &Said::new()), &Said::new()).pop().expect("it has rows").cells;
         assert_eq!(cells, ["5", "`A|B`", "one | two"], "a bar that is part of its cell");
-        assert_eq!(separator("40010 Tank 0,1 cm\n40011 Flow 0,1 l\n"), None, "a decimal comma");
+        assert_eq!(separator("40010 Tank 0,1 cm\n40011 Flow 0,1 l\n", &Said::new()), None, "a decimal comma");
     }
 }

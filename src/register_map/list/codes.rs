@@ -38,6 +38,15 @@ pub fn table_of(text: &str) -> Option<Table> {
     tables.iter().all(|other| *other == table).then_some(table)
 }
 
+/// The table of the codes behind `FC` or `function code` within a title.
+pub fn table_in(title: &str) -> Option<Table> {
+    let title = title.to_lowercase().replace("function code", "fc");
+    let (before, codes) = title.split_once("fc")?;
+    let is_word = before.is_empty() || before.ends_with(|sign: char| !sign.is_alphanumeric());
+    let codes = codes.trim_start_matches(|sign: char| !sign.is_ascii_alphanumeric());
+    is_word.then(|| table_of(codes)).flatten()
+}
+
 /// The codes that write what others beside them read: of one register or coil, and of several; `None` for no such.
 pub fn writes_of(text: &str) -> [Option<u8>; 2] {
     let codes = table_of(text).map(|_| codes_of(text)).unwrap_or_default();

@@ -6,7 +6,9 @@ pub use super::headings::{Column, is_heading};
 use super::{
     cells::Cells,
     headings::{self, Heading},
+    heat_pump,
     questions::{self, Question},
+    register_names,
     words::{
         access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, table_of,
         type_of, width_of, yes_or_no,
@@ -31,10 +33,16 @@ pub struct Columns {
     pub open: Vec<Question>,
     /// Columns of addresses such as `4x0001`, in which `0x` is no mark of hexadecimal digits.
     areas: BTreeSet<usize>,
+    /// Columns of addresses such as `R72`.
+    names: BTreeSet<usize>,
+    /// Columns of types that are the codes of a heat pump.
+    codes: BTreeSet<usize>,
     /// It is a list of a known program: nothing is guessed.
     pub is_sure: bool,
     /// It is a list of ioBroker.
     pub is_iobroker: bool,
+    /// It is an export of ModbusManager, whose devices write with the function for several registers alone.
+    pub is_of_manager: bool,
 }
 
 /// Is it an address in any reading?
@@ -85,9 +93,13 @@ impl Columns {
         let headings = distinct(heading);
         let is_own = headings::is_own(heading);
         let is_iobroker = heading.first().is_some_and(|cell| cell == "_address");
+        let is_of_manager = heat_pump::is_of_manager(heading);
         let cells: Vec<Vec<&str>> = (0..heading.len()).map(|n| filled(rows, n)).collect();
         let guess = |n: usize| if is_own { Heading::exact(&heading[n]) } else { meaning(&heading[n], &cells[n]) };
-        let mut means: Vec<Option<Column>> = (0..heading.len()).map(guess).collect();
+        let mut means: Vec<Option<Column>> = match is_of_manager {
+            true => heat_pump::means_of_manager(heading),
+            false => (0..heading.len()).map(guess).collect(),
+        };
         if !is_own && !is_iobroker {
             count_bytes(&mut means, rows);
         }
@@ -96,8 +108,13 @@ impl Columns {
         let is_of_areas =
             |n: &usize| means[*n] == Some(Column::Address) && cells[*n].iter().any(|cell| is_in_area(cell));
         let areas = (0..means.len()).filter(is_of_areas).collect();
-        let mut columns =
-            Columns { headings, means, open: Vec::new(), areas, is_sure: is_own || is_iobroker, is_iobroker };
+        let is_of_names = |n: &usize| means[*n] == Some(Column::Address) && register_names::are(&cells[*n]);
+        let names = (0..means.len()).filter(is_of_names).collect();
+        let is_of_codes = |n: &usize| means[*n] == Some(Column::Type) && are_codes(&headings[*n], &cells[*n]);
+        let codes = (0..means.len()).filter(is_of_codes).collect();
+        let is_sure = is_own || is_iobroker;
+        let open = Vec::new();
+        let mut columns = Columns { headings, means, open, areas, names, codes, is_sure, is_iobroker, is_of_manager };
         if !columns.is_sure {
             columns.open = questions::of(&mut columns.means, &columns.headings, &cells, |n| said[n].is_some());
         }
@@ -114,7 +131,7 @@ impl Columns {
         let rank = |n: &usize| {
             let heading = Heading::new(&self.headings[*n]);
             if column == Column::Name {
-                return usize::from(heading.has(&["description", "meaning", "beschreibung", "bedeutung", "kommentar"]));
+                return heading.rank_of_names();
             }
             let is_sent = heading.has(&["pdu", "protocol", "wire", "hex"]);
             [is_sent, heading.has(&["address", "addr", "addr.", "adresse"])].iter().position(|is| *is).unwrap_or(2)
@@ -123,9 +140,27 @@ impl Columns {
         places
     }
 
+    /// The table that a cell of a column of addresses names.
+    pub fn table_of_address(&self, place: usize, cell: &str) -> Option<Table> {
+        register_names::number_of(cell).filter(|_| self.names.contains(&place))?.1
+    }
+
+    /// The types of a row, as written or as their codes mean them.
+    pub fn types<'a>(&self, row: &'a Cells) -> Vec<&'a str> {
+        let cell = |place: usize| {
+            let cell = row.cells.get(place)?.as_str();
+            let code = Some(cell).filter(|_| self.codes.contains(&place)).and_then(heat_pump::type_of_code);
+            Some(code.unwrap_or(cell)).filter(|cell| !matches!(*cell, "" | "-" | "–"))
+        };
+        self.places(Column::Type).into_iter().filter_map(cell).collect()
+    }
+
     /// The cell of a column of addresses, and how it counts where its heading says that.
     pub fn address(&self, place: usize, cell: &str) -> (String, Option<AddressBase>) {
         let base = self.headings.get(place).and_then(|heading| Heading::new(heading).base());
+        if let Some((digits, _)) = register_names::number_of(cell).filter(|_| self.names.contains(&place)) {
+            return (digits.to_owned(), base);
+        }
         if self.means[place] == Some(Column::HexAddress) && is_bare_hex(cell) {
             return (format!("0x{cell}"), base);
         }
@@ -137,6 +172,13 @@ impl Columns {
             None => (cell.to_owned(), base),
         }
     }
+}
+
+/// Are they the codes of sizes that a heat pump has?
+fn are_codes(heading: &str, cells: &[&str]) -> bool {
+    heat_pump::is_of_sizes(heading)
+        && !cells.is_empty()
+        && cells.iter().all(|cell| heat_pump::type_of_code(cell).is_some())
 }
 
 /// Lengths that fit the types of their rows as bytes, and none as registers, are bytes.
@@ -154,7 +196,7 @@ fn count_bytes(means: &mut [Option<Column>], rows: &[Cells]) {
 }
 
 /// What is said of a heading.
-fn said_of(said: &Said, heading: &str) -> Option<Option<Column>> {
+pub fn said_of(said: &Said, heading: &str) -> Option<Option<Column>> {
     let same = |(known, _): &(&String, &Option<Column>)| known.to_lowercase() == heading.to_lowercase();
     said.get(heading).or_else(|| said.iter().find(same).map(|(_, means)| means)).copied()
 }
@@ -178,7 +220,9 @@ fn distinct(heading: &[String]) -> Vec<String> {
 
 /// What stands in a column, but for what only says that nothing does.
 fn filled(rows: &[Cells], n: usize) -> Vec<&str> {
-    let cells = rows.iter().filter_map(|row| row.cells.get(n)).map(String::as_str);
+    // A line of prose is a row of one cell.
+    let is_prose = |row: &Cells| row.cells.len() == 1;
+    let cells = rows.iter().filter(|row| !is_prose(row)).filter_map(|row| row.cells.get(n)).map(String::as_str);
     cells.filter(|cell| !matches!(*cell, "" | "-" | "–")).collect()
 }
 
@@ -192,6 +236,14 @@ fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
     // A type with its size stands in no other column, whatever that is called.
     if !cells.is_empty() && 80 <= share(cells, is_sized_type) {
         return Some(Column::Type);
+    }
+    if are_codes(heading, cells) {
+        return Some(Column::Type);
+    }
+    // What is done with a register is no type of it.
+    let is_of_access = !cells.is_empty() && 80 <= share(cells, |cell| access_of(cell).is_some());
+    if is_of_access && Heading::new(heading).has(&["type", "typ", "tipo", "format", "function", "area"]) {
+        return Some(Column::Access);
     }
     // A cell that does not fit leaves out its row, not the column.
     if let Some(exact) = Heading::exact(heading).filter(|exact| 50 <= share(cells, |cell| fits_exactly(*exact, cell))) {
@@ -240,7 +292,7 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
     match column {
         Column::Address => {
             let is_bare = is_of_hex(heading, cells);
-            40 <= share(cells, |cell| is_address(cell) || is_bare && is_bare_hex(cell))
+            40 <= share(cells, |cell| is_address(cell) || is_bare && is_bare_hex(cell)) || register_names::are(cells)
         }
         Column::Type => 1 <= share(cells, |cell| kind_of(cell).is_some() || type_of(cell, Some(1)).is_ok()),
         Column::Signed => !cells.is_empty() && 60 <= share(cells, |cell| yes_or_no(cell).is_some()),
@@ -256,7 +308,12 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
         Column::Exponent => {
             60 <= share(cells, |cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number)))
         }
-        Column::Name | Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
+        // Numbers below `item` count rows.
+        Column::Name => {
+            let is_word = |cell: &str| cell.chars().any(char::is_alphabetic);
+            heading.rank_of_names() != 1 || 50 <= share(cells, is_word)
+        }
+        Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
         Column::HexAddress
         | Column::Bytes
         | Column::Places
@@ -298,9 +355,9 @@ mod tests {
     use super::*;
 
     fn check(text: &str, expect: &[Option<Column>]) {
-        let rows = super::super::cells::rows(text, Some(';'));
+        let rows = super::super::cells::rows(text, Some(';'), &Said::new());
         let (heading, rows) = rows.split_first().expect("a heading");
-        assert!(is_heading(&heading.cells), "{text}");
+        assert!(is_heading(&heading.cells, &Said::new()), "{text}");
         assert_eq!(Columns::new(&heading.cells, rows, &Said::new()).means, expect, "{text}");
     }
 

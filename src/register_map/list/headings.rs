@@ -1,6 +1,10 @@
 //! The words of a heading: what a column below it can be.
 
-use super::columns::is_address;
+use super::{
+    columns::{Said, is_address, said_of},
+    heat_pump, register_names,
+    words::is_sized_type,
+};
 use crate::plant::{address::AddressBase, keyword::keyword_enum};
 
 keyword_enum! {
@@ -120,13 +124,20 @@ const HEADINGS: [(Column, &[&str]); 17] = [
     (Column::Length, &["len", "length", "size", "count", "quantity", "qty", "words", "registers", "bytes", "länge", "anzahl", "wörter", "größe", "registeranzahl", "datenlänge", "longueur", "registres", "mots", "longitud", "registros", "lunghezza", "registri", "lengte", "długość", "длина", "长度", "数量", "ความยาว", "จำนวน"]),
     (Column::Formula, &["formula", "expression", "formel"]),
     (Column::Offset, &["offset", "versatz", "décalage", "смещение", "偏移"]),
-    (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "zugriff", "zugriffsart", "accès", "acceso", "accesso", "toegang", "dostęp", "доступ", "访问"]),
+    (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "attributes", "mode", "modus", "zugriff", "zugriffsart", "accès", "acceso", "accesso", "toegang", "dostęp", "доступ", "访问"]),
     (Column::Address, ADDRESS),
     (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function", "nickname", "tagname", "purpose", "item", "field",
         "bezeichnung", "beschreibung", "benennung", "bedeutung", "datenpunkt", "messwert", "messgröße", "titel", "parametername", "funktion", "kommentar", "désignation", "nom", "libellé", "nombre", "descripción", "nome", "descrizione", "descrição", "naam", "omschrijving", "nazwa", "opis", "namn", "benämning", "beskrivning", "название", "наименование", "описание", "параметр", "名称", "描述", "参数", "ชื่อ", "คำอธิบาย"]),
 ];
 /// A heading with one of these alone is no column of addresses: tables of codes have them too.
 const WEAK: [&str; 2] = ["hex", "dec"];
+/// Words of names that stand in other columns too, and those of long texts.
+const WEAK_NAMES: [&str; 10] =
+    ["function", "funktion", "signal", "variable", "point", "purpose", "item", "field", "meaning", "bedeutung"];
+const TEXTS: [&str; 7] =
+    ["description", "beschreibung", "kommentar", "descripción", "descrizione", "descrição", "描述"];
+const NAMES: [&str; 9] =
+    ["name", "title", "parameter", "tag", "label", "nickname", "tagname", "bezeichnung", "parametername"];
 /// Columns below these say nothing about how a number is read, whatever numbers they hold.
 #[rustfmt::skip]
 const HARMLESS: [&str; 42] = [
@@ -200,18 +211,38 @@ impl Heading {
                 .any(|two| ["function", "func", "funktions"].contains(&two[0].as_str()) && two[1].starts_with("code"))
     }
 
+    /// How sure it is that names stand below it, from 0: a word of names, another one, that of a text about them.
+    pub fn rank_of_names(&self) -> usize {
+        if self.has(&TEXTS) {
+            return 2;
+        }
+        usize::from(self.has(&WEAK_NAMES) && !self.has(&NAMES))
+    }
+
     fn is_strong_address(&self) -> bool {
         self.0.iter().any(|word| ADDRESS.contains(&word.as_str()) && !WEAK.contains(&word.as_str()))
     }
 }
 
-/// Is it a heading: with an address and one more, and no number?
-pub fn is_heading(cells: &[String]) -> bool {
-    let all: Vec<Heading> = cells.iter().map(|cell| Heading::new(cell)).collect();
+/// Is it a heading: with an address and one more, and no number? What its reader has said of a column counts.
+pub fn is_heading(cells: &[String], said: &Said) -> bool {
     // `rw` stands in rows as well.
-    let is_known = |heading: &&Heading| heading.candidates().iter().any(|column| *column != Column::Access);
-    let known = all.iter().filter(is_known).count();
-    all.iter().any(Heading::is_strong_address) && 2 <= known && !cells.iter().any(|cell| is_address(cell))
+    let is_known = |cell: &&String| {
+        let by_word = || Heading::new(cell).candidates().iter().any(|column| *column != Column::Access);
+        said_of(said, cell).map_or_else(by_word, |means| means.is_some())
+    };
+    heat_pump::is_of_manager(cells) || has_addresses(cells, said) && 2 <= cells.iter().filter(is_known).count()
+}
+
+/// Has it a column of addresses, and no cell that only a row has?
+pub fn has_addresses(cells: &[String], said: &Said) -> bool {
+    let is_strong = |cell: &String| match said_of(said, cell) {
+        Some(means) => matches!(means, Some(Column::Address | Column::HexAddress)),
+        None => Heading::new(cell).is_strong_address(),
+    };
+    let is_of_row =
+        |cell: &String| is_address(cell) || is_sized_type(cell) || register_names::number_of(cell).is_some();
+    cells.iter().any(is_strong) && !cells.iter().any(is_of_row)
 }
 
 /// Is it the heading of an export of this program, as that writes it or with columns taken out?

@@ -81,7 +81,7 @@ impl<'a> Reader<'a> {
 
     /// The type; of several columns that one in which it is known.
     pub fn kind(&mut self) -> Option<String> {
-        let all: Vec<&str> = self.cells(Column::Type).collect();
+        let all = self.columns.types(self.row);
         let known = || all.iter().copied().filter(|cell| type_of(cell, None).is_ok());
         if let Some(other) =
             known().find(|cell| type_of(cell, None).ok() != known().next().and_then(|first| type_of(first, None).ok()))

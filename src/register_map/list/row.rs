@@ -57,6 +57,8 @@ pub struct Row {
     writes: [Option<u8>; 2],
     /// Columns that are not used and have something in this row.
     pub unused: Vec<String>,
+    /// Why it is no row of registers.
+    refused: Option<String>,
     /// Why it cannot be taken, whatever else it says.
     pub(super) wrong: Option<String>,
 }
@@ -117,6 +119,11 @@ impl Row {
         Row { line, ..Row::default() }
     }
 
+    /// It is no row of registers.
+    pub fn refused(line: usize, why: String) -> Row {
+        Row { refused: Some(why), ..Row::without_cells(line) }
+    }
+
     /// Below a heading.
     pub fn headed(columns: &Columns, row: &Cells) -> Row {
         let mut read = Row { line: row.line, ..Row::default() };
@@ -161,6 +168,7 @@ impl Row {
         read.width = reader.read(Column::Width, width_of);
         read.is_tabled = columns.means.iter().flatten().any(|means| matches!(means, Column::Table | Column::Area));
         read.table = reader.read(Column::Table, table_of).or_else(|| reader.read(Column::Area, area));
+        read.take_table_of_address(&mut reader);
         read.device = reader.read(Column::Device, |cell| cell.parse().ok());
         read.order = reader.read(Column::Order, order_of);
         read.scale = reader.factor();
@@ -176,11 +184,24 @@ impl Row {
             }
         }
         read.more = reader.more();
+        read.more.write_with = read.more.write_with.or(Some(16).filter(|_| columns.is_of_manager));
         read.writes = reader.text(Column::Table).map(codes::writes_of).unwrap_or_default();
         read.unused = reader.unused();
         read.read_unit(&mut reader);
         read.wrong = reader.wrong;
         read
+    }
+
+    /// The table that an address such as `HR5` states.
+    fn take_table_of_address(&mut self, reader: &mut Reader<'_>) {
+        let cell = |place: usize| Some((reader.row.cells.get(place)?.as_str(), place));
+        let mut all = reader.columns.places(Column::Address).into_iter().filter_map(cell);
+        let found = all.find_map(|(cell, place)| Some((cell, reader.columns.table_of_address(place, cell)?)));
+        let Some((cell, table)) = found else { return };
+        match self.table.filter(|of| *of != table) {
+            Some(other) => reader.refuse(differ(cell, other.word())),
+            None => self.table = Some(table),
+        }
     }
 
     /// The length that a span of addresses states.
@@ -286,7 +307,9 @@ impl Row {
 
     /// Takes it; else why not.
     pub fn named(&self, assumed: Assumed) -> Result<Taken, String> {
-        let Some(written) = &self.address else { return Err(t!("no address").to_owned()) };
+        let Some(written) = &self.address else {
+            return Err(self.refused.clone().unwrap_or_else(|| t!("no address").to_owned()));
+        };
         let because = |why: String| format!("{written}: {why}");
         let found = self.place(written, assumed);
         let (table, address) = found.ok_or_else(|| self.no_place(written))?;

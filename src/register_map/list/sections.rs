@@ -3,6 +3,7 @@
 
 use super::{
     cells::Cells,
+    codes,
     columns::{first_of, is_address},
     row::{Row, unfit},
     words::table_of,
@@ -30,7 +31,11 @@ fn table_below(cells: &[String]) -> Option<Table> {
     let plain = first.trim_start_matches(|sign: char| !sign.is_alphabetic());
     let plain = plain.trim_end_matches(|sign: char| !sign.is_alphanumeric());
     // One that spans several columns stands in each.
-    if is_title(plain) && filled.all(|cell| cell == first) { table_of(plain) } else { None }
+    if is_title(plain) && filled.all(|cell| cell == first) {
+        table_of(plain).or_else(|| codes::table_in(plain))
+    } else {
+        None
+    }
 }
 
 /// A line between rows: how many `#` stand before it, and the table that it names. One `#` alone may as well be a comment.
@@ -45,7 +50,7 @@ pub fn title_of(cells: &[String]) -> Option<(usize, Option<Table>)> {
 /// A title above rows, such as the name of their sheet, as a line of its own where it names a table.
 pub fn titled(title: &str) -> Option<Cells> {
     let cells = vec![title.to_owned()];
-    table_below(&cells).map(|_| Cells { line: 0, cells, is_unclosed: false })
+    table_below(&cells).map(|_| Cells { line: 0, cells, is_unclosed: false, is_ruled: false })
 }
 
 /// The rows without such lines, and of each its number with the table, if one holds from there on.

@@ -4,6 +4,7 @@ mod codes;
 mod configurations;
 mod doubtful;
 mod exports;
+mod headings;
 mod iobroker;
 mod meanings;
 mod misread;

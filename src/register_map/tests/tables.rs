@@ -3,7 +3,16 @@
 use rust_xlsxwriter::Workbook;
 
 use super::{list_of, read, shown};
-use crate::register_map::list::ListContext;
+use crate::{
+    plant::{
+        address::AddressBase,
+        tag::{Access, ByteOrder, Table},
+    },
+    register_map::{
+        self,
+        list::{Column, ListContext, Said},
+    },
+};
 
 #[test]
 fn a_list_of_a_heat_pump_divides_and_has_its_types() {
@@ -14,6 +23,51 @@ fn a_list_of_a_heat_pump_divides_and_has_its_types() {
     let expect =
         ["30002 Outdoor (BT1) int16 ABCD x0.1 °C", "40012 Degree minutes int16 ABCD x0.1", "32196 Alarm uint8 ABCD x1"];
     assert_eq!(read(text), (expect.map(str::to_owned).to_vec(), Vec::new()));
+}
+
+#[test]
+fn sizes_of_a_heat_pump_may_be_the_codes_of_its_types() {
+    let head = "Title\tRegister type\tRegister\tDivision factor\tUnit\tSize of variable\tMin value\tMax value\tDefault value\t";
+    let rows: String =
+        (1..=6).map(|code| format!("T{code}\tMODBUS_INPUT_REGISTER\t{}\t10\t\t{code}\t0\t0\t0\n", 2 * code)).collect();
+    let kinds = ["int8 ABCD", "int16 ABCD", "int32 CDAB", "uint8 ABCD", "uint16 ABCD", "uint32 CDAB"];
+    let expect: Vec<String> =
+        kinds.iter().zip(1..).map(|(kind, code)| format!("{:05} T{code} {kind} x0.1", 30_001 + 2 * code)).collect();
+    let text = format!("{head}\n{rows}");
+    assert_eq!(read(&text), (expect.clone(), Vec::new()));
+    let said = |means: Column| {
+        let means = Said::from([("size of variable".to_owned(), Some(means))]);
+        register_map::read(text.as_bytes(), &ListContext { means, ..ListContext::default() })
+    };
+    assert_eq!(said(Column::Type).named.iter().map(shown).collect::<Vec<_>>(), expect);
+    assert_eq!(said(Column::Length).named.len(), 1, "registers, where its reader says so");
+    let other = text.replacen("\t1\t0\t0\t0", "\t7\t0\t0\t0", 1);
+    assert_eq!(read(&other).0.len(), 0, "7 is no code: nothing shows that the others are");
+    for heading in ["Size (registers)", "Words", "Length", "Size"] {
+        let list = format!("Register;Name;{heading}\n1;a;1\n2;b;2\n");
+        assert_eq!(read(&list).0, ["40002 a uint16 ABCD x1"], "{heading}");
+    }
+}
+
+#[test]
+fn an_export_of_modbusmanager_is_asked_for_its_base_alone() {
+    let rows = "\"BT1 Outdoor\";\"outdoor temperature\";40004;\"°C\";s16;10;0;0;0;R;\n\
+                \"Total hours\";\"all of them\";43416;\"h\";u32;1;0;9999999;0;R;\n\
+                \"Offset S1\";\"of the \n curve\";47011;\"\";s16;1;-10;10;0;R/W;\n";
+    let plain = format!("Title;Info;ID;Unit;Size;Factor;Min;Max;Default;Mode\n{rows}");
+    let above = format!("ModbusManager 1.0.9\n20200624\nProduct: F1\nDatabase: 1R2\n{plain}");
+    for (text, left_out) in [(plain, 0), (above, 4)] {
+        let asked = list_of(&text);
+        assert_eq!((asked.refused, asked.questions.len()), (None, 0), "{text}");
+        assert_eq!(asked.unclear.map(|unclear| unclear.written).as_deref(), Some("40004"));
+        let context = ListContext { base: Some(AddressBase::Zero), ..ListContext::default() };
+        let list = register_map::read(text.as_bytes(), &context);
+        let shown: Vec<String> = list.named.iter().map(shown).collect();
+        let first = format!("{} BT1 Outdoor int16 ABCD x0.1 °C", Table::Holding.modicon(40_004));
+        assert_eq!((shown.len(), &shown[0], list.problems.len()), (3, &first, left_out), "{:?}", list.problems);
+        assert_eq!((list.named[1].order, list.named[1].count()), (ByteOrder::Cdab, 2));
+        assert_eq!((list.named[2].access, list.named[2].write_fc), (Access::ReadWrite, Some(16)));
+    }
 }
 
 #[test]

@@ -1,0 +1,90 @@
+//! What stands below each heading of a list, or in a list without one.
+
+use super::{
+    List, ListContext, base,
+    cells::Cells,
+    columns::{Columns, Said, is_address, is_heading},
+    headings::has_addresses,
+    row::Row,
+};
+use crate::t;
+
+/// The rows of a list; `Err` where it is none.
+pub fn rows(all: &[Cells], is_separated: bool, context: &ListContext, list: &mut List) -> Result<Vec<Row>, String> {
+    let parts = parts(all, &context.means);
+    let Some((first, _)) = parts.iter().find(|(_, is_list)| *is_list) else {
+        return by_form(all, is_separated, &context.means);
+    };
+    let mut rows: Vec<Row> = all[..*first].iter().map(|row| Row::without_cells(row.line)).collect();
+    for (n, (start, is_list)) in parts.iter().enumerate().filter(|(_, (start, _))| first <= start) {
+        let end = parts.get(n + 1).map_or(all.len(), |(next, _)| *next);
+        let (heading, below) = (&all[*start], &all[start + 1..end]);
+        if *is_list {
+            rows.extend(below_heading(&heading.cells, below, is_separated, context, list));
+        } else {
+            let why = no_addresses(&heading.cells);
+            rows.extend(below.iter().map(|row| Row::refused(row.line, why.clone())));
+        }
+    }
+    Ok(rows)
+}
+
+/// Where a table begins, and whether it is one of registers. Where lines are drawn below headings, no other row is one.
+fn parts(all: &[Cells], said: &Said) -> Vec<(usize, bool)> {
+    let is_list = |row: &Cells| is_heading(&row.cells, said);
+    let is_drawn = all.iter().any(|row| row.is_ruled && is_list(row));
+    let part = |(n, row): (usize, &Cells)| {
+        let is_part = if is_drawn { row.is_ruled } else { is_list(row) };
+        is_part.then(|| (n, is_list(row)))
+    };
+    all.iter().enumerate().filter_map(part).collect()
+}
+
+fn below_heading(
+    heading: &[String],
+    below: &[Cells],
+    is_separated: bool,
+    context: &ListContext,
+    list: &mut List,
+) -> Vec<Row> {
+    let columns = Columns::new(heading, below, &context.means);
+    list.is_sure |= columns.is_sure;
+    let named = columns.headings.iter().cloned().zip(columns.means.iter().copied());
+    list.add_columns(named.collect(), columns.open.clone());
+    let row = |row: &Cells| {
+        // A line of a PDF with other columns than the heading is taken by its form.
+        if is_separated || row.cells.len() == heading.len() {
+            Row::headed(&columns, row)
+        } else {
+            Row::by_form(row.line, &row.cells)
+        }
+    };
+    let mut rows: Vec<Row> = below.iter().map(row).collect();
+    base::contradicting(&mut rows);
+    rows
+}
+
+/// Rows without a heading; `Err` where they are no list.
+fn by_form(all: &[Cells], is_separated: bool, said: &Said) -> Result<Vec<Row>, String> {
+    let Some(first) = all.first() else { return Err(t!("there is nothing in it").to_owned()) };
+    if is_separated && !first.cells.iter().any(|cell| is_address(cell)) {
+        // Prose above a table is no heading of it.
+        let count = |row: &Cells| row.cells.iter().filter(|cell| !cell.is_empty()).count();
+        let with_addresses = all.iter().find(|row| 2 <= count(row) && has_addresses(&row.cells, said));
+        if let Some(row) = with_addresses {
+            return Err(t!("its heading has no column of names: {heading}", heading = row.cells.join(", ")));
+        }
+        let ruled = all.iter().find(|row| row.is_ruled && 2 <= count(row));
+        return Err(no_addresses(&ruled.unwrap_or(first).cells));
+    }
+    let rows: Vec<Row> = all.iter().map(|row| Row::by_form(row.line, &row.cells)).collect();
+    let (found, count) = (rows.iter().filter(|row| row.address.is_some()).count(), rows.len());
+    if 2 * found < count {
+        return Err(t!("only {found} of its {count} lines have an address", found, count));
+    }
+    Ok(rows)
+}
+
+fn no_addresses(heading: &[String]) -> String {
+    t!("its heading has no column of addresses: {heading}", heading = heading.join(", "))
+}
