@@ -53,7 +53,8 @@ const LIST: &[Key] = &[
     }),
     Key::change(char('o'), "order", "byte order of the rows that name none", |registers, _| {
         registers.change_list(|preview| {
-            preview.context.order = Some(next(&ByteOrder::ALL, preview.context.order.unwrap_or_default()))
+            let order = preview.context.order.or(preview.list.order);
+            preview.context.order = Some(next(&ByteOrder::ALL, order.unwrap_or_default()))
         })
     }),
 ];
@@ -197,10 +198,11 @@ fn place((table, address): (Table, u16)) -> String {
     format!("{} {address}", translate(table.word()))
 }
 
-fn base_words(context: &ListContext) -> &'static str {
-    match context.base {
-        None | Some(AddressBase::Modicon) => t!("Modicon numbers"),
-        Some(AddressBase::Zero) => t!("as sent, from 0"),
+/// How plain numbers are read: as its reader has said, else as they were.
+fn base_words(context: &ListContext, list: &List) -> &'static str {
+    match context.base.or(list.base) {
+        Some(AddressBase::Modicon) => t!("Modicon numbers"),
+        None | Some(AddressBase::Zero) => t!("as sent, from 0"),
         Some(AddressBase::One) => t!("counted from 1"),
     }
 }
@@ -226,8 +228,8 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
             (t!("{question} m says what the column means", question = question.words()), theme.trouble())
         }
         (None, None) => {
-            let (base, table) = (base_words(context), translate(context.table.word()));
-            let order = context.order.unwrap_or_default().word();
+            let (base, table) = (base_words(context, list), translate(context.table.word()));
+            let order = context.order.or(list.order).unwrap_or_default().word();
             (t!("plain numbers: {base}; where nothing is said: {table}, {order}", base, table, order), theme.normal())
         }
     };

@@ -188,3 +188,25 @@ fn the_file_of_a_log_is_asked_for() {
     });
     assert_eq!(path.as_deref().and_then(std::path::Path::to_str), Some("mine.csv"));
 }
+
+#[test]
+fn a_preview_says_how_plain_numbers_were_read() {
+    let mut bench = Bench::new();
+    let first = |bench: &mut Bench, list: &str| {
+        bench.send(Msg::Loaded(Tab::Registers, Ok(list.as_bytes().to_vec())));
+        let shown = bench.screen(110, 24);
+        let line = shown.lines().find(|row| row.contains("plain numbers:")).unwrap_or_default().to_owned();
+        assert!(!line.is_empty(), "{shown}");
+        line
+    };
+    let sent = first(&mut bench, "address;name;type\n5;a;int16\n");
+    assert!(sent.contains("as sent, from 0; where nothing is said: holding, ABCD"), "{sent}");
+    let modicon = first(&mut bench, "address;name;type\n400005;a;int16\n");
+    assert!(modicon.contains("Modicon numbers; where"), "{modicon}");
+    let heat_pump = "Title;Register type;Register;Division factor;Size of variable\na;MODBUS_INPUT_REGISTER;5;1;6\n";
+    let swapped = first(&mut bench, heat_pump);
+    assert!(swapped.contains("as sent, from 0; where nothing is said: holding, CDAB"), "{swapped}");
+    bench.keys("b");
+    let changed = bench.screen(110, 24);
+    assert!(changed.contains("plain numbers: Modicon numbers"), "what is said counts: {changed}");
+}
