@@ -132,8 +132,7 @@ const HEADINGS: [(Column, &[&str]); 17] = [
 /// A heading with one of these alone is no column of addresses: tables of codes have them too.
 const WEAK: [&str; 2] = ["hex", "dec"];
 /// Words of names that stand in other columns too, and those of long texts.
-const WEAK_NAMES: [&str; 10] =
-    ["function", "funktion", "signal", "variable", "point", "purpose", "item", "field", "meaning", "bedeutung"];
+const WEAK_NAMES: [&str; 8] = ["function", "funktion", "signal", "variable", "point", "purpose", "item", "field"];
 const TEXTS: [&str; 7] =
     ["description", "beschreibung", "kommentar", "descripción", "descrizione", "descrição", "描述"];
 const NAMES: [&str; 9] =
@@ -214,6 +213,9 @@ impl Heading {
     /// How sure it is that names stand below it, from 0: a word of names, another one, that of a text about them.
     pub fn rank_of_names(&self) -> usize {
         if self.has(&TEXTS) {
+            return 3;
+        }
+        if self.has(&["meaning", "bedeutung"]) {
             return 2;
         }
         usize::from(self.has(&WEAK_NAMES) && !self.has(&NAMES))

@@ -40,9 +40,14 @@ fn names_stand_below_the_word_that_says_so_most() {
     for heading in ["Purpose", "Meaning", "Function", "Signal", "Item", "Field", "Nickname"] {
         assert_eq!(read(&markdown(&["Register", heading, "Nr"], &rows)).0, expect, "{heading}");
     }
-    for (first, second) in
-        [("Field", "Description"), ("Purpose", "Beschreibung"), ("Name", "Function"), ("Tag", "Item")]
-    {
+    for (first, second) in [
+        ("Field", "Description"),
+        ("Purpose", "Beschreibung"),
+        ("Name", "Function"),
+        ("Tag", "Item"),
+        ("Signal", "Meaning"),
+        ("Meaning", "Description"),
+    ] {
         let text = format!("Address;{second};{first}\n500;long words;Version\n504;more of them;Volts\n");
         assert_eq!(read(&text).0, expect, "{first} {second}");
     }
