@@ -49,7 +49,8 @@ pub struct Args {
     /// How plain numbers count: modicon (40001 is the first), 0 (as sent), 1 (from 1) [default: as the file shows; else it is asked]
     #[arg(long, value_parser = base_of)]
     base: Option<AddressBase>,
-    /// Byte order of the rows that name none: ABCD, CDAB, BADC, DCBA [default: ABCD; of a list of NIBE CDAB]
+    /// Byte order of the rows that name none: ABCD, CDAB, BADC, DCBA; the last two swap the bytes of a single register as well
+    /// [default: ABCD; of a list of NIBE CDAB]
     #[arg(long, value_parser = super::words::<ByteOrder>)]
     order: Option<ByteOrder>,
     /// What a column of a list means, such as `Ratio=divisor`; `none`: it is not used. May be given several times
