@@ -1,12 +1,12 @@
 //! Every problem of a profile, and every warning: where it stands, what was found, what was expected, and what was probably meant.
 
+mod drawn_text;
+
 use std::{collections::BTreeSet, fmt};
 
-use miette::{
-    GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, MietteError, MietteSpanContents, Report,
-    Severity, SourceCode, SourceSpan, SpanContents,
-};
+use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, Report, Severity};
 
+use self::drawn_text::DrawnText;
 use crate::plant::visible::{same_length, visible};
 
 /// Most problems that are drawn at once; the rest are counted.
@@ -234,28 +234,6 @@ impl Problem {
             .chain(second.map(|(span, text)| LabeledSpan::at(span.start..span.end, shown(text))));
         Report::new(diagnostic.with_labels(labels))
             .with_source_code(DrawnText { file: shown(&source.file), text: same_length(&source.text).to_string() })
-    }
-}
-
-/// A text for drawing, whose columns count characters as an editor does: miette counts bytes.
-struct DrawnText {
-    file: String,
-    text: String,
-}
-
-impl SourceCode for DrawnText {
-    fn read_span<'a>(
-        &'a self,
-        span: &SourceSpan,
-        before: usize,
-        after: usize,
-    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
-        let inner = self.text.read_span(span, before, after)?;
-        let start = self.text.get(..span.offset()).unwrap_or("");
-        let line = start.rsplit('\n').next().unwrap_or("").chars().count();
-        let column = if inner.column() == 0 { 0 } else { line };
-        let (data, span, rows) = (inner.data(), *inner.span(), inner.line_count());
-        Ok(Box::new(MietteSpanContents::new_named(self.file.clone(), data, span, inner.line(), column, rows)))
     }
 }
 

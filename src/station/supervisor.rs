@@ -129,6 +129,7 @@ mod tests {
             unlock: None,
             verify: true,
             urgent: false,
+            over: None,
         });
         for _ in 0..3 {
             let (ours, _theirs) = tokio::io::duplex(64);

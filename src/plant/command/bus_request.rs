@@ -29,6 +29,8 @@ pub struct WriteJob {
     pub verify: bool,
     /// It switches something off and goes before all that waits, see `crate::plant::interlock::is_stop`.
     pub urgent: bool,
+    /// What its author saw, where that was read long ago: it is read first, and nothing is written over anything else.
+    pub over: Option<TagValue>,
 }
 
 /// The result of a write on the wire. The plant compares it and decides the outcome.
@@ -44,6 +46,9 @@ pub enum WriteResult {
     Accepted,
     /// A broadcast has left: no unit answers it.
     Sent,
+    /// Nothing was sent: read before it, the tag held this raw number, or this text, and not what its author saw, or already
+    /// what was to be written.
+    Held(TagValue),
     /// The device refused with an exception.
     Refused(ExceptionCode),
     /// No valid answer: it is not known whether the write took effect.

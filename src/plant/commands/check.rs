@@ -20,7 +20,7 @@ use crate::plant::{
     time::elapsed,
 };
 
-/// What was read longer ago may have been changed at the device: it is written, not called unchanged.
+/// What was read longer ago may have been changed at the device: it is read again before it is called unchanged, or written over.
 const FRESH: Duration = Duration::from_secs(5);
 
 fn is_fresh(image: &ProcessImage, tag: TagId, at: Timestamp) -> bool {
@@ -116,7 +116,9 @@ impl CommandTracker {
         {
             return Err(Outcome::Unchanged);
         }
-        Ok(self.job(image, tag, raw.into(), urgent))
+        let job = self.job(image, tag, raw.into(), urgent);
+        let seen = image.good_raw(tag).filter(|_| !urgent && !is_fresh(image, tag, at));
+        Ok(WriteJob { over: seen.filter(|_| job.verify).map(TagValue::Number), ..job })
     }
 
     /// Checks a write of a text against access, what is under way, and the text that the operator saw.
@@ -141,7 +143,11 @@ impl CommandTracker {
             Some(now) if seen.is_none() => refuse(Refusal::NotSeen(now.to_owned())),
             Some(now) if seen != Some(now) => refuse(Refusal::ChangedTo(now.to_owned())),
             Some(now) if now == held && is_fresh(image, tag, at) => Err(Outcome::Unchanged),
-            _ => Ok(self.job(image, tag, TagValue::Text(held.into()), false)),
+            seen => {
+                let job = self.job(image, tag, TagValue::Text(held.into()), false);
+                let seen = seen.filter(|_| job.verify && !is_fresh(image, tag, at));
+                Ok(WriteJob { over: seen.map(|seen| TagValue::Text(seen.into())), ..job })
+            }
         }
     }
 
@@ -156,6 +162,6 @@ impl CommandTracker {
             now.is_none_or(|now| !scale::same_raw(self.def.tag(*unlock_tag), now, *unlock_value))
         });
         let verify = def.access != Access::Write;
-        WriteJob { id: WriteId(self.last_write + 1), tag, raw, unlock, verify, urgent }
+        WriteJob { id: WriteId(self.last_write + 1), tag, raw, unlock, verify, urgent, over: None }
     }
 }

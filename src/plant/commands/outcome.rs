@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::plant::{
     command::{NotConfirmed, Outcome, Refusal, WriteResult},
+    commands::value_text,
     process_image::ProcessImage,
     scale,
     tag::TagDef,
@@ -30,6 +31,11 @@ pub(super) fn of_write(
     };
     match result {
         WriteResult::ReadBack(back) | WriteResult::ReadBackAfterFault(_, back) if is_held(&back) => Outcome::Verified,
+        WriteResult::Held(back) if is_held(&back) => Outcome::Unchanged,
+        WriteResult::Held(back) => Outcome::Refused(Refusal::ChangedTo(match value(back) {
+            TagValue::Number(value) => value_text(image, def, value),
+            TagValue::Text(text) => text_value::quoted(&text),
+        })),
         WriteResult::ReadBack(back) => Outcome::NotConfirmed(NotConfirmed::Different(value(back))),
         WriteResult::ReadBackAfterFault(fault, back) => {
             Outcome::NotConfirmed(NotConfirmed::NotApplied(fault, value(back)))
@@ -47,6 +53,7 @@ pub(super) fn without_read_back(result: &WriteResult) -> Outcome {
         WriteResult::NoValidResponse(fault) => Outcome::NotConfirmed(NotConfirmed::NotAnswered(*fault)),
         WriteResult::NotRead(fault) => Outcome::NotConfirmed(NotConfirmed::NotRead(*fault)),
         WriteResult::Sent => Outcome::Sent,
+        WriteResult::Held(_) => Outcome::Refused(Refusal::Changed),
         WriteResult::Accepted | WriteResult::ReadBack(_) | WriteResult::ReadBackAfterFault(..) => {
             Outcome::NotConfirmed(NotConfirmed::NoReadBack)
         }

@@ -44,6 +44,7 @@ impl Plant {
             }
             WriteResult::ReadBack(_)
             | WriteResult::ReadBackAfterFault(..)
+            | WriteResult::Held(_)
             | WriteResult::Refused(_)
             | WriteResult::NotSent(_)
             | WriteResult::Superseded => {}

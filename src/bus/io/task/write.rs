@@ -3,6 +3,7 @@
 use super::{
     LinkExit, Task,
     read::{held_by, read_alone},
+    read_before::ReadBefore,
 };
 use crate::{
     bus::{
@@ -53,6 +54,17 @@ impl Task<'_> {
         let (id, tag) = (job.id, def.tag(job.tag));
         if job.urgent {
             link.shorten_hold_off();
+        }
+        if let Some(seen) = job.over.as_ref().filter(|_| !schedule.is_down(tag.device)) {
+            match self.read_before(link, tag, &job.raw, seen).await? {
+                Some(ReadBefore::AsSeen) => {}
+                Some(ReadBefore::Ended(result)) => return self.publish_write_result(id, result).await,
+                // A stop goes first.
+                None => {
+                    self.requests.defer(BusRequest::Write(job.clone()));
+                    return Ok(());
+                }
+            }
         }
         let unlocked = match job.unlock {
             Some((unlock_tag, raw)) => self.unlock(link, schedule, def.tag(unlock_tag), raw, job).await?,
@@ -113,6 +125,7 @@ impl Task<'_> {
             // The unlock register may have changed since it was read.
             WriteResult::Refused(_) if tag.write_unlock.is_some() => schedule.refresh(tag.device, self.clock.now()),
             WriteResult::Refused(_)
+            | WriteResult::Held(_)
             | WriteResult::NotSent(_)
             | WriteResult::Superseded
             | WriteResult::ReadBackAfterFault(..) => {}
@@ -301,7 +314,10 @@ impl Task<'_> {
 
 /// May a write with this result have changed its tag?
 fn may_have_effect(result: &WriteResult) -> bool {
-    !matches!(result, WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Superseded)
+    !matches!(
+        result,
+        WriteResult::Refused(_) | WriteResult::Held(_) | WriteResult::NotSent(_) | WriteResult::Superseded
+    )
 }
 
 /// Can no outstanding reply be taken for the next one?

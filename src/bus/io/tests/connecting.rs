@@ -96,7 +96,15 @@ async fn other_settings_do_not_wait_for_an_unreachable_host() {
 async fn a_write_is_refused_when_its_host_is_unreachable() {
     let host = Unreachable::new();
     let (def, mut line) = host.line(false).await;
-    let job = WriteJob { id: WriteId(1), tag: TagId(0), raw: 1.0.into(), unlock: None, verify: true, urgent: false };
+    let job = WriteJob {
+        id: WriteId(1),
+        tag: TagId(0),
+        raw: 1.0.into(),
+        unlock: None,
+        verify: true,
+        urgent: false,
+        over: None,
+    };
     line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
     let ended = |event: &Event| match event {
         Event::Wrote { id: WriteId(1), result, .. } => Some(result.clone()),

@@ -115,6 +115,7 @@ async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, Diagn
         unlock: None,
         verify: true,
         urgent: true,
+        over: None,
     });
     line.requests.send(stop).await.expect("the line runs");
     let (mut state, mut result) = (None, None);
@@ -178,6 +179,7 @@ async fn a_usual_write_waits_for_the_step_of_a_test() {
         unlock: None,
         verify: true,
         urgent: false,
+        over: None,
     });
     line.requests.send(write).await.expect("the line runs");
     let mut done = None;

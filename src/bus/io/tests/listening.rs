@@ -108,6 +108,7 @@ async fn what_is_heard_is_a_value_and_nothing_is_ever_sent() {
                 unlock: None,
                 verify: true,
                 urgent: true,
+                over: None,
             }),
         ] {
             bench.line.requests.send(request).await.expect("the line runs");

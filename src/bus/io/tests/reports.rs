@@ -61,7 +61,15 @@ async fn written(
         _ => SlaveAction::Answer,
     });
     line.read(&def).await;
-    let job = WriteJob { id: WriteId(7), tag: TagId(0), raw: raw.into(), unlock: None, verify: true, urgent: false };
+    let job = WriteJob {
+        id: WriteId(7),
+        tag: TagId(0),
+        raw: raw.into(),
+        unlock: None,
+        verify: true,
+        urgent: false,
+        over: None,
+    };
     line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
     let ended = |event: &Event| match event {
         Event::Wrote { id: WriteId(7), result, .. } => Some(result.clone()),
@@ -332,7 +340,7 @@ async fn a_lost_write_to_a_refusing_host_is_not_called_done() {
         });
         line.read(&def).await;
         let (id, raw) = (WriteId(7), 10.0.into());
-        let job = WriteJob { id, tag: TagId(0), raw, unlock: None, verify: true, urgent: false };
+        let job = WriteJob { id, tag: TagId(0), raw, unlock: None, verify: true, urgent: false, over: None };
         line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
         let ended = |event: &Event| match event {
             Event::Wrote { id: WriteId(7), result, .. } => Some(result.clone()),

@@ -334,8 +334,19 @@ impl Line {
 
     /// Writes a raw number or a text to the first tag, and gives the result.
     pub async fn write(&mut self, def: &PlantDef, raw: impl Into<TagValue>, verify: bool) -> WriteResult {
+        self.write_over(def, raw, verify, None).await
+    }
+
+    /// The same over what its author saw, which was read long ago.
+    pub async fn write_over(
+        &mut self,
+        def: &PlantDef,
+        raw: impl Into<TagValue>,
+        verify: bool,
+        over: Option<TagValue>,
+    ) -> WriteResult {
         let (id, tag) = (WriteId(7), TagId(0));
-        let job = WriteJob { id, tag, raw: raw.into(), unlock: None, verify, urgent: false };
+        let job = WriteJob { id, tag, raw: raw.into(), unlock: None, verify, urgent: false, over };
         self.requests.send(BusRequest::Write(job)).await.expect("the line runs");
         let wrote = |event: &Event| match event {
             Event::Wrote { id: WriteId(7), result, .. } => Some(result.clone()),

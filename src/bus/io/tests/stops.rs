@@ -22,7 +22,15 @@ use crate::plant::{
 const FIRST_OF: [TagId; 2] = [TagId(0), TagId(10)];
 
 fn write(id: u64, tag: TagId, urgent: bool) -> BusRequest {
-    BusRequest::Write(WriteJob { id: WriteId(id), tag, raw: 10.0.into(), unlock: None, verify: true, urgent })
+    BusRequest::Write(WriteJob {
+        id: WriteId(id),
+        tag,
+        raw: 10.0.into(),
+        unlock: None,
+        verify: true,
+        urgent,
+        over: None,
+    })
 }
 
 async fn end_of(line: &mut Line, def: &crate::plant::PlantDef, id: u64) -> WriteResult {

@@ -47,6 +47,33 @@ async fn a_write_is_sent_once_whatever_happens() {
     }
 }
 
+/// The register holds 10.
+#[tokio::test(start_paused = true)]
+async fn what_was_seen_long_ago_is_read_before_it_is_written_over() {
+    for mode in Mode::ALL {
+        for (seen, raw, is_silent, expect) in [
+            (10.0, 11.0, false, (WriteResult::ReadBack(10.0.into()), 1)),
+            (12.0, 11.0, false, (WriteResult::Held(10.0.into()), 0)),
+            (10.0, 10.0, false, (WriteResult::Held(10.0.into()), 0)),
+            (12.0, 10.0, false, (WriteResult::Held(10.0.into()), 0)),
+            (10.0, 11.0, true, (WriteResult::NotSent(Fault::Timeout), 0)),
+        ] {
+            let def = plant(mode);
+            let mut line = line(def.clone());
+            let writes = Arc::new(AtomicUsize::new(0));
+            let count = writes.clone();
+            line.plug(mode, move |_, message| {
+                count.fetch_add(usize::from(message[1] == 6), Ordering::Relaxed);
+                let is_before = message[2..6] == [0, 10, 0, 1] && is_silent;
+                if is_before { SlaveAction::Silent } else { SlaveAction::Answer }
+            });
+            line.read(&def).await;
+            let result = line.write_over(&def, raw, true, Some(seen.into())).await;
+            assert_eq!((result, writes.load(Ordering::Relaxed)), expect, "{mode:?}: {raw} over {seen}");
+        }
+    }
+}
+
 /// A broadcast is sent once, without waiting for a response, by each function that writes. Modbus TCP has none: there unit 0
 /// answers as any other does.
 #[tokio::test(start_paused = true)]
@@ -114,6 +141,7 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
             unlock: None,
             verify: true,
             urgent: false,
+            over: None,
         });
         line.requests.send(request).await.expect("the line runs");
     }
@@ -146,7 +174,15 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
     });
     line.read(&def).await;
     let write = |id, tag, raw, urgent| {
-        BusRequest::Write(WriteJob { id: WriteId(id), tag: TagId(tag), raw, unlock: None, verify: true, urgent })
+        BusRequest::Write(WriteJob {
+            id: WriteId(id),
+            tag: TagId(tag),
+            raw,
+            unlock: None,
+            verify: true,
+            urgent,
+            over: None,
+        })
     };
     for tag in 0..4u16 {
         line.requests.send(write(u64::from(tag), tag, 1.0.into(), false)).await.expect("the line runs");
@@ -187,7 +223,15 @@ async fn an_unlock_is_reported_and_read_again_after_a_refusal() {
     };
     line.until(&def, holds).await;
     let (id, unlock) = (WriteId(1), Some((unlock_tag, 1.0.into())));
-    let request = BusRequest::Write(WriteJob { id, tag: value, raw: 7.0.into(), unlock, verify: true, urgent: false });
+    let request = BusRequest::Write(WriteJob {
+        id,
+        tag: value,
+        raw: 7.0.into(),
+        unlock,
+        verify: true,
+        urgent: false,
+        over: None,
+    });
     line.requests.send(request).await.expect("the line runs");
     let is_result = |event: &Event| match event {
         Event::Unlocked { unlock_tag, result, .. } => Some((Some(*unlock_tag), result.clone())),
@@ -213,7 +257,15 @@ async fn a_write_that_loses_the_port_counts_no_other_exchange() {
     });
     line.read(&def).await;
     let (id, tag) = (WriteId(1), TagId(10));
-    let request = BusRequest::Write(WriteJob { id, tag, raw: 10.0.into(), unlock: None, verify: true, urgent: false });
+    let request = BusRequest::Write(WriteJob {
+        id,
+        tag,
+        raw: 10.0.into(),
+        unlock: None,
+        verify: true,
+        urgent: false,
+        over: None,
+    });
     line.requests.send(request).await.expect("the line runs");
     let mut lost = false;
     loop {

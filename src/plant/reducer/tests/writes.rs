@@ -260,11 +260,23 @@ fn a_broadcast_is_sent_and_its_device_never_silent() {
 }
 
 #[test]
-fn what_was_read_long_ago_is_written_not_called_unchanged() {
-    for (second, expect) in [(1, Outcome::Unchanged), (5, Outcome::Unchanged), (6, Outcome::Pending)] {
+fn what_was_read_long_ago_is_read_again_before_it_is_written() {
+    for (second, value, seen) in [(5, 65.0, None), (6, 65.0, Some(700.0)), (6, 70.0, Some(700.0))] {
         let mut plant = running();
-        let status = CommandStatus { at: at(second), ..shown(&plant, 1, SV, 70.0) };
-        plant.on_command(status, at(second));
-        assert_eq!(plant.snapshot().commands[0].outcome, expect, "{second} s after it was read");
+        let status = CommandStatus { at: at(second), ..shown(&plant, 1, SV, value) };
+        let effects = plant.on_command(status, at(second));
+        let BusRequest::Write(job) = &effects.bus[0].1 else { panic!("a write was requested") };
+        assert_eq!(job.over, seen.map(Into::into), "{value} at {second} s");
+        for (held, expect) in
+            [(705.0, Outcome::Refused(Refusal::ChangedTo("70.5 °C".into()))), (value * 10.0, Outcome::Unchanged)]
+        {
+            let mut plant = plant.clone();
+            plant.on_event(Event::Wrote { at: at(second), id: job.id, result: WriteResult::Held(held.into()) });
+            assert_eq!(plant.snapshot().commands[0].outcome, expect, "{value}, {held} is held");
+        }
     }
+    let mut plant = running();
+    let status = CommandStatus { at: at(5), ..shown(&plant, 1, SV, 70.0) };
+    plant.on_command(status, at(5));
+    assert_eq!(plant.snapshot().commands[0].outcome, Outcome::Unchanged, "it was read a moment ago");
 }
