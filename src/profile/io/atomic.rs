@@ -85,9 +85,20 @@ pub fn write_all_new(files: &[(PathBuf, Vec<u8>)]) -> Result<(), (PathBuf, io::E
 
 /// Where a file is written before it takes the place of `path`. What killed processes have left there is removed.
 pub fn beside(path: &Path) -> PathBuf {
+    remove_left_over(path);
+    path.with_file_name(format!("{}{}", start_of(path), std::process::id()))
+}
+
+/// What the name of a file begins with that is written before it takes the place of `path`; then comes the process.
+fn start_of(path: &Path) -> String {
     let mut start = path.file_name().map(OsString::from).unwrap_or_default();
     start.push(".new-");
-    let (start, own) = (start.to_string_lossy().into_owned(), std::process::id());
+    start.to_string_lossy().into_owned()
+}
+
+/// Removes what killed processes have left beside a file.
+pub fn remove_left_over(path: &Path) {
+    let (start, own) = (start_of(path), std::process::id());
     for entry in fs::read_dir(folder(path)).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let process = name.to_str().and_then(|name| name.strip_prefix(&start)?.parse::<i32>().ok());
@@ -95,7 +106,6 @@ pub fn beside(path: &Path) -> PathBuf {
             let _ = fs::remove_file(entry.path());
         }
     }
-    path.with_file_name(format!("{start}{own}"))
 }
 
 /// Whether no process has this number.

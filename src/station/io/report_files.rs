@@ -9,7 +9,7 @@ use crate::{
     access::audit_log::sha256,
     history::io::disk::step,
     profile::io::{
-        atomic::{sync_folder, with_suffix, write_for_user, write_new},
+        atomic::{remove_left_over, sync_folder, with_suffix, write_for_user, write_new},
         regular,
     },
 };
@@ -75,6 +75,8 @@ pub fn place(folder: &Path, stem: &str, ending: &str, bytes: &[u8]) -> io::Resul
         if found.1 == There::Nothing && !put(&checksum, line.as_bytes())? {
             continue;
         }
+        // A station that was killed just after it had put them there has left them beside it, too.
+        [&path, &checksum].into_iter().for_each(|path| remove_left_over(path));
         return Ok((path, found.0 == There::Nothing));
     }
     Err(io::Error::new(io::ErrorKind::AlreadyExists, format!("{stem}{ending} and {NAMES_MAX} more names are taken")))
@@ -124,6 +126,19 @@ mod tests {
         let mut names: Vec<String> = names.map(|name| name.into_string().unwrap()).collect();
         names.sort();
         names
+    }
+
+    #[test]
+    fn what_a_killed_station_left_beside_a_whole_report_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let placed = || place(folder.path(), "day", ".csv", b"1").unwrap().1;
+        assert!(placed());
+        // No process has this number.
+        for name in ["day.csv.new-2147483647", "day.csv.sha256.new-2147483647"] {
+            fs::write(folder.path().join(name), b"1").unwrap();
+        }
+        assert!(!placed(), "it is there already");
+        assert_eq!(names(folder.path()), ["day.csv", "day.csv.sha256"]);
     }
 
     /// Fails at the step of this number, from 0; gives the result.
