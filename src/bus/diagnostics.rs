@@ -172,7 +172,9 @@ impl Job {
     /// A write that is not at its end: what is known of it.
     fn end_write(&mut self, state: &DiagnosticState) {
         let Diagnostic::Write(_) = self.run.diagnostic else { return };
-        let lost = if let DiagnosticState::Failed(_) = state { Fault::NotConnected } else { Fault::Timeout };
+        // A test that is cut short does not wait for its response.
+        let is_cut = matches!(state, DiagnosticState::Cancelled | DiagnosticState::Failed(LineTrouble::UrgentStop));
+        let lost = if is_cut { Fault::Timeout } else { Fault::NotConnected };
         self.found(Finding::Written(write::unfinished(self.made, self.written, lost)));
     }
 

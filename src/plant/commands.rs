@@ -33,13 +33,16 @@ const SHOWN: usize = 32;
 /// A command without a result for so long is given up: a write may or may not have taken effect.
 const PENDING_MAX: Duration = Duration::from_secs(120);
 
-/// Which limits of a tag a write must keep.
+/// Where a write comes from: what it may be written over, and which limits of its tag it must keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Limits {
-    /// All: while one is not known nothing is written.
-    All,
-    /// Those that are known. What makes safe is not held back by what cannot be read.
-    Known,
+pub enum WriteOrigin {
+    /// A person, or a request from outside: over what was seen alone. While a limit is not known nothing is written.
+    Person,
+    /// A step of a procedure: confirmed with it, whatever the value is that it replaces. The same limits.
+    Procedure,
+    /// The safe state of a procedure: over anything, within the limits that are known. What makes safe is not held back by what
+    /// cannot be read.
+    SafeState,
 }
 
 /// Tracks commands from acceptance to outcome.
@@ -77,9 +80,9 @@ impl CommandTracker {
         image: &ProcessImage,
         status: &CommandStatus,
         (tag, value): (TagId, Exact),
-        limits: Limits,
+        origin: WriteOrigin,
     ) -> Result<WriteJob, Box<ActionRecord>> {
-        let checked = self.check(image, status, (tag, value), limits);
+        let checked = self.check(image, status, (tag, value), origin);
         // What is shown and recorded is what the device will hold, not what was typed.
         let def = self.def.tag(tag);
         let rounded = image.scaling_decimals(def).and_then(|decimals| scale::rounded_to_device(def, value, decimals));

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use jiff::Timestamp;
 
-use super::{CommandTracker, Limits};
+use super::{CommandTracker, WriteOrigin};
 use crate::plant::{
     command::{CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::record::value_text,
@@ -34,9 +34,9 @@ impl CommandTracker {
         image: &ProcessImage,
         status: &CommandStatus,
         written: (TagId, Exact),
-        limits: Limits,
+        origin: WriteOrigin,
     ) -> Result<WriteJob, Outcome> {
-        let job = self.check_value(image, written, limits, status.at)?;
+        let job = self.check_value(image, written, origin, status.at)?;
         self.check_expected(image, status, &job)?;
         Ok(job)
     }
@@ -59,7 +59,7 @@ impl CommandTracker {
         &self,
         image: &ProcessImage,
         (tag, value): (TagId, Exact),
-        limits: Limits,
+        origin: WriteOrigin,
         at: Timestamp,
     ) -> Result<WriteJob, Outcome> {
         let refuse = |refusal| Err(Outcome::Refused(refusal));
@@ -91,9 +91,9 @@ impl CommandTracker {
         }
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
         let known = |tag: TagId| image.sample(tag).good_exact();
-        let bounds = match limits {
-            Limits::All if !urgent => def.limits(known).map_err(unknown)?,
-            Limits::All | Limits::Known => {
+        let bounds = match origin {
+            WriteOrigin::Person | WriteOrigin::Procedure if !urgent => def.limits(known).map_err(unknown)?,
+            WriteOrigin::Person | WriteOrigin::Procedure | WriteOrigin::SafeState => {
                 let now = |bound: Option<Bound>| bound?.now(known).ok();
                 (now(def.min), now(def.max))
             }
@@ -108,7 +108,7 @@ impl CommandTracker {
         };
         // What makes safe is written as near as it can be; else only what was asked for is written.
         let held = scale::to_value(def, raw, decimals);
-        if limits == Limits::All && !urgent && !scale::is_held(value, held) {
+        if origin != WriteOrigin::SafeState && !urgent && !scale::is_held(value, held) {
             return refuse(Refusal::Resolution(value_text(image, def, held)));
         }
         // What was read before the write under way says nothing about the time after it.
@@ -117,7 +117,8 @@ impl CommandTracker {
             return Err(Outcome::Unchanged);
         }
         let job = self.job(image, tag, raw.into(), urgent);
-        let seen = image.good_raw(tag).filter(|_| !urgent && !is_fresh(image, tag, at));
+        let is_old = origin == WriteOrigin::Person && !urgent && !is_fresh(image, tag, at);
+        let seen = image.good_raw(tag).filter(|_| is_old);
         Ok(WriteJob { over: seen.filter(|_| job.verify).map(TagValue::Number), ..job })
     }
 

@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use super::{Effects, Plant, restore::PLANT};
 use crate::plant::{
     command::{Command, CommandId, CommandKind, CommandStatus, Outcome, Refusal},
-    commands::Limits,
+    commands::WriteOrigin,
     control_run::RunState,
     def::{DeviceId, ProcedureId, TagId},
     exact::Exact,
@@ -242,8 +242,8 @@ impl Plant {
         let note = Some(format!("procedure {}", self.def.procedure(id).name).into());
         let request = Command { expected_value, note, ..Command::new(self.run, command, kind) };
         let status = CommandStatus { from: run.from.clone(), ..CommandStatus::new(request, run.actor().clone(), at) };
-        let limits = if is_safe { Limits::Known } else { Limits::All };
-        effects.write(self.line_of(tag), self.commands.write(&self.image, &status, (tag, value), limits));
+        let origin = if is_safe { WriteOrigin::SafeState } else { WriteOrigin::Procedure };
+        effects.write(self.line_of(tag), self.commands.write(&self.image, &status, (tag, value), origin));
         command
     }
 

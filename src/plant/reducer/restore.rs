@@ -10,7 +10,7 @@ use jiff::Timestamp;
 use super::{Effects, Plant};
 use crate::plant::{
     command::{BusRequest, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, Refusal},
-    commands::Limits,
+    commands::WriteOrigin,
     def::{DeviceId, LineId, TagId},
     exact::Exact,
     parameter_set::{self, StoredSet},
@@ -199,7 +199,8 @@ impl Plant {
                 effects.records.push(Record::Action(refused));
                 continue;
             }
-            effects.write(self.line_of(tag), self.commands.write(&self.image, &status, (tag, value), Limits::All));
+            effects
+                .write(self.line_of(tag), self.commands.write(&self.image, &status, (tag, value), WriteOrigin::Person));
             self.leave_safe_state(tag, value, at, effects);
         }
         if let Some(outcome) = run.outcome(&self.def) {

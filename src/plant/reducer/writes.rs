@@ -5,7 +5,7 @@ use jiff::Timestamp;
 use super::{Effects, Plant};
 use crate::plant::{
     command::{CommandKind, CommandStatus, Outcome, WriteId, WriteResult},
-    commands::Limits,
+    commands::WriteOrigin,
     def::TagId,
     record::ActionRecord,
 };
@@ -19,7 +19,7 @@ impl Plant {
             effects.write(self.line_of(*tag), written);
         }
         let Some((tag, value)) = status.command.kind.written() else { return };
-        let written = self.commands.write(&self.image, status, (tag, value), Limits::All);
+        let written = self.commands.write(&self.image, status, (tag, value), WriteOrigin::Person);
         effects.write(self.line_of(tag), written);
         let outcome = self.commands.outcome_of(status.command.id);
         if matches!(outcome, Some(Outcome::Pending | Outcome::Unchanged)) {

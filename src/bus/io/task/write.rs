@@ -55,7 +55,9 @@ impl Task<'_> {
         if job.urgent {
             link.shorten_hold_off();
         }
-        if let Some(seen) = job.over.as_ref().filter(|_| !schedule.is_down(tag.device)) {
+        // One that is left alone now is not read either, and its write not sent.
+        let is_left_alone = schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now());
+        if let Some(seen) = job.over.as_ref().filter(|_| !is_left_alone) {
             match self.read_before(link, tag, &job.raw, seen).await? {
                 Some(ReadBefore::AsSeen) => {}
                 Some(ReadBefore::Ended(result)) => return self.publish_write_result(id, result).await,

@@ -249,3 +249,26 @@ fn what_the_device_would_round_is_no_step_but_is_safe() {
     assert_eq!(actions(&started)[1], "anna write TIC-1.SV refused: the device would store 50.0 °C");
     assert_eq!(written(&started), [(SV, 100.0)], "the safe state at once");
 }
+
+#[test]
+fn a_procedure_and_its_safe_state_are_written_over_whatever_is_there() {
+    let over = |effects: &Effects| -> Vec<(TagId, Option<TagValue>)> {
+        let job = |(_, request): &(_, BusRequest)| match request {
+            BusRequest::Write(job) => Some((job.tag, job.over.clone())),
+            _ => None,
+        };
+        effects.bus.iter().filter_map(job).collect()
+    };
+    // A minute after all of it was read.
+    let mut plant = plant();
+    let started = command(&mut plant, 1, CommandKind::StartProcedure(HEAT), 60);
+    assert_eq!(over(&started), [(SV, None)]);
+    let failed = end(&mut plant, &started, 61, |_| WriteResult::NoValidResponse(Fault::Timeout));
+    assert_eq!(over(&failed), [(RUN, None), (SV, None)]);
+    // A person has seen what was there.
+    let mut plant = self::plant();
+    let by_hand = CommandKind::Write { tag: SV, value: 65.0.into() };
+    let by_hand = plant.snapshot().command(CommandId { terminal: 1, number: 1 }, by_hand);
+    let by_hand = plant.on_command(CommandStatus::new(by_hand, "anna", at(60)), at(60));
+    assert!(matches!(&over(&by_hand)[..], [(SV, Some(_))]), "{:?}", over(&by_hand));
+}
