@@ -105,7 +105,9 @@ impl PassOn {
         // No one can be asked what was meant; a value that the device would round is refused by the plant.
         entry::check_decimals(entry::decimals_of(value), snapshot.decimals[tag.index()]).map_err(MqttRefusal::Value)?;
         let command = snapshot.command(CommandId { terminal, number }, CommandKind::Write { tag, value });
-        Ok(Command { expected_value: expected.or(command.expected_value), note: Some(note.into()), ..command })
+        let is_unconditional = expected.is_none();
+        let expected_value = expected.or(command.expected_value);
+        Ok(Command { expected_value, is_unconditional, note: Some(note.into()), ..command })
     }
 }
 

@@ -34,6 +34,8 @@ pub struct Command {
     pub kind: CommandKind,
     /// The value that the operator saw when confirming a write. A write over another value is refused.
     pub expected_value: Option<Exact>,
+    /// Its author, a program, named no value that must be there: it is written over whatever is.
+    pub is_unconditional: bool,
     /// The operator's reason.
     pub note: Option<Arc<str>>,
 }
@@ -41,7 +43,7 @@ pub struct Command {
 impl Command {
     /// A command without expected value and note.
     pub fn new(run: u64, id: CommandId, kind: CommandKind) -> Command {
-        Command { id, run, kind, expected_value: None, note: None }
+        Command { id, run, kind, expected_value: None, is_unconditional: false, note: None }
     }
 }
 

@@ -36,10 +36,11 @@ const PENDING_MAX: Duration = Duration::from_secs(120);
 /// Where a write comes from: what it may be written over, and which limits of its tag it must keep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WriteOrigin {
-    /// A person, or a request from outside: over what was seen alone. While a limit is not known nothing is written.
+    /// A person, or a request from outside that names a value: over what was seen alone. While a limit is not known nothing is written.
     Person,
-    /// A step of a procedure: confirmed with it, whatever the value is that it replaces. The same limits.
-    Procedure,
+    /// A step of a procedure, confirmed with it whatever the value is that it replaces, or a request from outside that names
+    /// none. The same limits.
+    Unconditional,
     /// The safe state of a procedure: over anything, within the limits that are known. What makes safe is not held back by what
     /// cannot be read.
     SafeState,

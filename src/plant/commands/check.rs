@@ -92,8 +92,8 @@ impl CommandTracker {
         let unknown = |tag: TagId| Outcome::Refused(Refusal::Unknown(self.def.tag(tag).name.clone()));
         let known = |tag: TagId| image.sample(tag).good_exact();
         let bounds = match origin {
-            WriteOrigin::Person | WriteOrigin::Procedure if !urgent => def.limits(known).map_err(unknown)?,
-            WriteOrigin::Person | WriteOrigin::Procedure | WriteOrigin::SafeState => {
+            WriteOrigin::Person | WriteOrigin::Unconditional if !urgent => def.limits(known).map_err(unknown)?,
+            WriteOrigin::Person | WriteOrigin::Unconditional | WriteOrigin::SafeState => {
                 let now = |bound: Option<Bound>| bound?.now(known).ok();
                 (now(def.min), now(def.max))
             }

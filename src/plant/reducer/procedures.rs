@@ -242,7 +242,7 @@ impl Plant {
         let note = Some(format!("procedure {}", self.def.procedure(id).name).into());
         let request = Command { expected_value, note, ..Command::new(self.run, command, kind) };
         let status = CommandStatus { from: run.from.clone(), ..CommandStatus::new(request, run.actor().clone(), at) };
-        let origin = if is_safe { WriteOrigin::SafeState } else { WriteOrigin::Procedure };
+        let origin = if is_safe { WriteOrigin::SafeState } else { WriteOrigin::Unconditional };
         effects.write(self.line_of(tag), self.commands.write(&self.image, &status, (tag, value), origin));
         command
     }

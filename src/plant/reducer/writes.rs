@@ -19,7 +19,8 @@ impl Plant {
             effects.write(self.line_of(*tag), written);
         }
         let Some((tag, value)) = status.command.kind.written() else { return };
-        let written = self.commands.write(&self.image, status, (tag, value), WriteOrigin::Person);
+        let origin = if status.command.is_unconditional { WriteOrigin::Unconditional } else { WriteOrigin::Person };
+        let written = self.commands.write(&self.image, status, (tag, value), origin);
         effects.write(self.line_of(tag), written);
         let outcome = self.commands.outcome_of(status.command.id);
         if matches!(outcome, Some(Outcome::Pending | Outcome::Unchanged)) {
