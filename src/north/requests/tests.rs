@@ -50,6 +50,23 @@ fn results(answers: &[Message]) -> Vec<String> {
 }
 
 #[test]
+fn only_a_request_that_names_a_value_minds_what_is_there() {
+    let snapshot = Snapshot::blank(fixture::shared());
+    for (expected, is_unconditional) in [(None, true), (Some(70.0.into()), false)] {
+        let request = PassOn {
+            number: 1,
+            tag: fixture::SV,
+            value: 50.0.into(),
+            expected,
+            expires: at(60),
+            note: "recipe".to_owned(),
+        };
+        let command = request.command(&snapshot, TERMINAL, now(0)).expect("it is in time");
+        assert_eq!((command.is_unconditional, command.expected_value), (is_unconditional, expected));
+    }
+}
+
+#[test]
 fn a_request_is_accepted_once_and_its_outcome_answered_once() {
     let mut requests = requests(Ok(RequestLog::default()));
     let received = message(&json("a", "50"));

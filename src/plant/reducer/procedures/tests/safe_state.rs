@@ -265,10 +265,13 @@ fn a_procedure_and_its_safe_state_are_written_over_whatever_is_there() {
     assert_eq!(over(&started), [(SV, None)]);
     let failed = end(&mut plant, &started, 61, |_| WriteResult::NoValidResponse(Fault::Timeout));
     assert_eq!(over(&failed), [(RUN, None), (SV, None)]);
-    // A person has seen what was there.
-    let mut plant = self::plant();
-    let by_hand = CommandKind::Write { tag: SV, value: 65.0.into() };
-    let by_hand = plant.snapshot().command(CommandId { terminal: 1, number: 1 }, by_hand);
-    let by_hand = plant.on_command(CommandStatus::new(by_hand, "anna", at(60)), at(60));
-    assert!(matches!(&over(&by_hand)[..], [(SV, Some(_))]), "{:?}", over(&by_hand));
+    // A person has seen what was there, a program that names no value has not.
+    for (is_unconditional, has_seen) in [(false, true), (true, false)] {
+        let mut plant = self::plant();
+        let write = CommandKind::Write { tag: SV, value: 65.0.into() };
+        let write = plant.snapshot().command(CommandId { terminal: 1, number: 1 }, write);
+        let status = CommandStatus::new(Command { is_unconditional, ..write }, "anna", at(60));
+        let asked = over(&plant.on_command(status, at(60)));
+        assert!(matches!(&asked[..], [(SV, seen)] if seen.is_some() == has_seen), "{asked:?}");
+    }
 }
