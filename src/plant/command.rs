@@ -27,8 +27,8 @@ pub use refusal::{NotConfirmed, Refusal};
 pub struct Command {
     /// Chosen by the terminal, which finds the outcome by it in a later snapshot.
     pub id: CommandId,
-    /// The run of the station whose snapshot it was made on, see [`Snapshot::run`](super::snapshot::Snapshot::run). The ids in `kind` mean nothing in
-    /// another run: the plant file may have changed.
+    /// The run of the station whose snapshot it was made on, see [`Snapshot::run`](super::snapshot::Snapshot::run). The ids in
+    /// `kind` mean nothing in another run: the plant file may have changed.
     pub run: u64,
     /// What to do, to what and with which value.
     pub kind: CommandKind,

@@ -241,6 +241,11 @@ impl ActionRecord {
         self.known_action().is_none_or(RecordedAction::changes_plant)
     }
 
+    /// Was it on the process? See [`RecordedAction::is_on_process`].
+    pub fn is_on_process(&self) -> bool {
+        RecordedAction::words_beside_process().all(|word| *word != *self.action)
+    }
+
     /// Is it this action?
     pub fn is(&self, action: RecordedAction) -> bool {
         &*self.action == action.word()

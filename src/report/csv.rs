@@ -2,7 +2,10 @@
 
 use jiff::{Timestamp, tz::TimeZone};
 
-use crate::plant::{def::CsvDialect, exact::Exact, exact::digits};
+use crate::plant::{
+    def::CsvDialect,
+    exact::{Exact, digits},
+};
 
 impl CsvDialect {
     /// The dialect of a plant with other settings from the command line. The decimal mark follows the separator.

@@ -8,7 +8,10 @@ use jiff::{SignedDuration, Timestamp, tz::TimeZone};
 
 use super::chart::Chart;
 use crate::{
-    plant::{def::Section as Kind, exact::Exact, exact::digits},
+    plant::{
+        def::Section as Kind,
+        exact::{Exact, digits},
+    },
     t,
     text::{Locale, translate},
 };

@@ -6,7 +6,7 @@ use super::{
     ReportFormat, Style, TagFigures,
     document::{Cell, ColumnKind, Content, Document, Fact, Section, Table},
 };
-use crate::plant::{exact::Exact, exact::digits};
+use crate::plant::exact::{Exact, digits};
 
 /// Columns of a page.
 const WIDTH: usize = 80;

@@ -8,7 +8,6 @@ use crate::{
         alarm::{ActiveAlarm, AlarmState, manager::subject_name},
         def::{AlarmDef, Pen, Subject},
         record::{ActionRecord, AlarmEvent, AlarmRecord},
-        recorded_action::RecordedAction,
     },
     ui::{layout::Size, tabs::trends::span::View, widgets::chart},
 };
@@ -148,7 +147,7 @@ impl Recent {
         let is_process = |action: &&ActionRecord| {
             let rest = action.target.strip_prefix(device);
             let is_of_device = rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-            action.known_action().is_none_or(RecordedAction::is_on_process) && action.new.is_some() && is_of_device
+            action.is_on_process() && action.new.is_some() && is_of_device
         };
         let of_device: Vec<&ActionRecord> = actions.iter().filter(is_process).collect();
         Some(occurrences(&of_alarm.collect::<Vec<_>>(), &of_device, just_before(now)))
@@ -271,6 +270,7 @@ fn occurrences(records: &[&AlarmRecord], actions: &[&ActionRecord], now: Timesta
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::recorded_action::RecordedAction;
     use crate::{
         plant::def::Priority,
         ui::fixture::{Fixture, now, with_cx},
