@@ -251,7 +251,7 @@ fn what_the_device_would_round_is_no_step_but_is_safe() {
 }
 
 #[test]
-fn a_procedure_and_its_safe_state_are_written_over_whatever_is_there() {
+fn a_safe_state_is_written_over_whatever_the_device_holds() {
     let over = |effects: &Effects| -> Vec<(TagId, Option<TagValue>)> {
         let job = |(_, request): &(_, BusRequest)| match request {
             BusRequest::Write(job) => Some((job.tag, job.over.clone())),
