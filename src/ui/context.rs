@@ -77,6 +77,10 @@ impl<'a> ViewContext<'a> {
     pub fn is_past(&self) -> bool {
         self.present.is_some()
     }
+    /// A local time of the plant in this form of `strftime`.
+    pub fn local(&self, at: Timestamp, form: &str) -> String {
+        at.to_zoned(self.def().time_zone.clone()).strftime(form).to_string()
+    }
     /// Age of a tag's sample now.
     pub fn age(&self, tag: crate::plant::def::TagId) -> Duration {
         elapsed(self.snapshot.sample(tag).at, self.now)

@@ -38,27 +38,7 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         return actions;
     }
     if let Some(modal) = model.modal.take_if(|_| !past) {
-        let Model { snapshot, theme, preferences, clock, extension, session, numbers, screen, tabs, replay, .. } =
-            model;
-        let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, (session, numbers));
-        let cx = past_context(present, replay);
-        let before = cx.is_past().then(|| modal.clone());
-        let (rest, actions) = match modal.on_key(&cx, tabs, event) {
-            Next::Stay(modal) => (Some(modal), Vec::new()),
-            Next::Close => (None, Vec::new()),
-            Next::Do(actions) => (None, actions),
-            Next::Both(modal, actions) => (Some(modal), actions),
-            Next::Go(target) => return go(model, target),
-        };
-        model.modal = rest;
-        if let (Some(before), Some(rest)) = (before, &model.modal)
-            && replay::gives_command(rest)
-        {
-            // A form for a command is not opened in the past, from a window neither.
-            (model.modal, model.note) = (Some(before), Some(replay::refused().into()));
-            return Vec::new();
-        }
-        return actions;
+        return on_window_key(model, modal, event);
     }
     if model.tabs.shown == Tab::Login && model.tabs.login.is_typing() && !model.small() {
         return session_lock::on_typed(model, event);
@@ -76,6 +56,31 @@ pub(super) fn on_key(model: &mut Model, event: KeyEvent) -> Vec<UiAction> {
         None if !model.may_act(event) => Vec::new(),
         None => on_tab_key(model, event),
     }
+}
+
+/// A key of the open window.
+fn on_window_key(model: &mut Model, modal: Modal, event: KeyEvent) -> Vec<UiAction> {
+    let before = model.cx().is_past().then(|| modal.clone());
+    let next = match modal.on_key(&model.cx(), event) {
+        Next::Ask(asked) => with_tabs(model, |tabs, cx| tabs.on_asked(cx, asked)),
+        next => next,
+    };
+    let (rest, actions) = match next {
+        Next::Stay(modal) => (Some(modal), Vec::new()),
+        Next::Close | Next::Ask(_) => (None, Vec::new()),
+        Next::Do(actions) => (None, actions),
+        Next::Both(modal, actions) => (Some(modal), actions),
+        Next::Go(target) => return go(model, target),
+    };
+    model.modal = rest;
+    if let (Some(before), Some(rest)) = (before, &model.modal)
+        && replay::gives_command(rest)
+    {
+        // A form for a command is not opened in the past, from a window neither.
+        (model.modal, model.note) = (Some(before), Some(replay::refused().into()));
+        return Vec::new();
+    }
+    actions
 }
 
 /// Keys that mean the same in every window and while something is typed.

@@ -3,7 +3,6 @@
 use jiff::Timestamp;
 
 use super::*;
-use crate::plant::def::ProcedureId;
 use preferences::{Bookmark, Kept};
 
 /// Bookmarks of one user; the oldest make room for new ones.
@@ -16,37 +15,26 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
             UiAction::Open(modal) => model.modal = Some(modal),
             UiAction::Show(tab) => effects.extend(show(model, tab)),
             UiAction::ShowOverview => {
-                model.tabs.mimic.show_overview();
-                effects.extend(show(model, Tab::Mimic));
+                effects.extend(show_with(model, Tab::Mimic, |tabs, _| tabs.mimic.show_overview()))
             }
             UiAction::ShowDevice(device) => {
-                model.tabs.controllers.show(device);
-                effects.extend(show(model, Tab::Controllers));
+                effects.extend(show_with(model, Tab::Controllers, |tabs, _| tabs.controllers.show(device)));
             }
-            UiAction::ShowProcedure(id) => effects.extend(show_procedure(model, id)),
+            UiAction::ShowProcedure(id) => {
+                effects.extend(show_with(model, Tab::Controllers, |tabs, _| tabs.controllers.show_procedure(id)));
+            }
             UiAction::ShowParameter(tag) => {
-                with_tabs(model, |tabs, cx| {
-                    tabs.controllers.show_parameter(cx, tag);
-                    Vec::new()
-                });
-                effects.extend(show(model, Tab::Controllers));
+                let change = |tabs: &mut Tabs, cx: &ViewContext| tabs.controllers.show_parameter(cx, tag);
+                effects.extend(show_with(model, Tab::Controllers, change));
             }
             UiAction::ShowOnMimic(tags) => {
-                with_tabs(model, |tabs, cx| {
-                    tabs.mimic.select(cx, &tags);
-                    Vec::new()
-                });
-                effects.extend(show(model, Tab::Mimic));
+                effects.extend(show_with(model, Tab::Mimic, |tabs, cx| tabs.mimic.select(cx, &tags)));
             }
             UiAction::ShowOnTrends(tag, span) => {
                 if model.replay.shown().is_some() && span.0 == span.1 {
                     effects.extend(replay(model, |replay, present| replay.go_to(span.0, present)));
                 }
-                with_tabs(model, |tabs, cx| {
-                    tabs.trends.show(cx, tag, span);
-                    Vec::new()
-                });
-                effects.extend(show(model, Tab::Trends));
+                effects.extend(show_with(model, Tab::Trends, |tabs, cx| tabs.trends.show(cx, tag, span)));
             }
             UiAction::Replay(at) => effects.extend(replay(model, |replay, present| replay.go_to(at, present))),
             UiAction::EventPage(at) => effects.extend(replay(model, |replay, present| replay.open_page(at, present))),
@@ -70,6 +58,8 @@ pub(super) fn perform(model: &mut Model, actions: Vec<UiAction>) -> Vec<Effect> 
             }
             UiAction::Bookmark(at, name) => effects.push(bookmark(model, at, name)),
             UiAction::SetLocale(locale) => model.set_locale(locale),
+            UiAction::KeepTest(window) => model.tabs.bus.keep(*window),
+            UiAction::ShowTest(line) => effects.extend(show_with(model, Tab::Bus, |tabs, _| tabs.bus.show_test(line))),
             UiAction::Note(words) => model.note = Some(words.into()),
             UiAction::Leave => model.modal = Some(Modal::Confirm(Confirm::quit(model.leaving))),
             UiAction::Do(effect) => effects.push(effect),
@@ -123,7 +113,8 @@ pub(super) fn show(model: &mut Model, tab: Tab) -> Vec<Effect> {
     perform(model, asked)
 }
 
-fn show_procedure(model: &mut Model, id: ProcedureId) -> Vec<Effect> {
-    model.tabs.controllers.show_procedure(id);
-    show(model, Tab::Controllers)
+/// Shows a tab with what this changes of it.
+fn show_with(model: &mut Model, tab: Tab, change: impl FnOnce(&mut Tabs, &ViewContext)) -> Vec<Effect> {
+    with_tabs(model, change);
+    show(model, tab)
 }

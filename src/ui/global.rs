@@ -228,12 +228,7 @@ fn dismiss(model: &mut Model) -> Vec<UiAction> {
 
 /// Closes what lies on top of the first page of the tab; `false` if nothing does.
 pub(super) fn step_back(model: &mut Model) -> bool {
-    let mut closed = false;
-    with_tabs(model, |tabs, cx| {
-        closed = tabs.shown_mut().back(cx);
-        Vec::new()
-    });
-    closed
+    with_tabs(model, |tabs, cx| tabs.shown_mut().back(cx))
 }
 
 fn open_palette(model: &mut Model) -> Vec<UiAction> {

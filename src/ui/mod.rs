@@ -14,6 +14,8 @@ pub(crate) mod bell;
 pub(crate) mod line_state;
 pub(crate) mod glyph_filter;
 pub(crate) mod widgets;
+mod bus_text;
+pub(crate) mod line_view;
 pub(crate) mod interlock;
 pub(crate) mod modal;
 pub(crate) mod key_table;
@@ -42,11 +44,10 @@ pub(crate) mod fixture;
 #[cfg(test)]
 mod tests;
 
-use context::view_context;
 pub use context::{QueryNumbers, ViewContext};
 use dispatch::on_key;
 use effects::perform;
-use model_context::{past_context, with_replay, with_tabs};
+use model_context::{with_replay, with_tabs};
 use std::{borrow::Cow, sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind};

@@ -2,7 +2,7 @@
 
 use ratatui::layout::Rect;
 
-use super::{Model, UiAction, ViewContext, context::view_context, replay::Replay, tabs::Tabs};
+use super::{Model, ViewContext, context::view_context, replay::Replay, tabs::Tabs};
 
 impl Model {
     /// What the parts of the terminal may read.
@@ -48,10 +48,7 @@ pub(super) fn with_replay<T>(model: &mut Model, change: impl FnOnce(&mut Replay,
 }
 
 /// Lets the tabs change while they read the rest of the model.
-pub(super) fn with_tabs(
-    model: &mut Model,
-    change: impl FnOnce(&mut Tabs, &ViewContext) -> Vec<UiAction>,
-) -> Vec<UiAction> {
+pub(super) fn with_tabs<T>(model: &mut Model, change: impl FnOnce(&mut Tabs, &ViewContext) -> T) -> T {
     let Model { snapshot, theme, preferences, clock, extension, session, numbers, screen, tabs, replay, .. } = model;
     let present = view_context(snapshot, (theme, preferences), *clock, *screen, extension, (session, numbers));
     change(tabs, &past_context(present, replay))

@@ -98,10 +98,7 @@ pub(super) fn on_session_status(model: &mut Model, session: Arc<SessionStatus>) 
         }
     }
     let back = keep_work(model, &before, &now);
-    with_tabs(model, |tabs, cx| {
-        tabs.login.on_session_status(cx);
-        Vec::new()
-    });
+    with_tabs(model, |tabs, cx| tabs.login.on_session_status(cx));
     let shown = model.tabs.shown;
     let let_in = shown == Tab::Login && now.who.is_some() && user(&before) != user(&now);
     let opened = shown == Tab::Login && rights::is_closed(&before);
@@ -278,7 +275,6 @@ pub(super) fn on_other_plant(model: &mut Model, snapshot: Arc<Snapshot>) -> Vec<
     with_tabs(model, |tabs, cx| {
         tabs.login.on_session_status(cx);
         tabs.shown = if Tab::offered(cx).contains(&shown) { shown } else { Tab::home(cx.def()) };
-        Vec::new()
     });
     let closed = rights::is_closed(&model.session);
     model.modal = (!closed).then(|| Modal::Notice(Notice::new(t!("plant file"), words)));

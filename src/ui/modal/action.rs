@@ -2,13 +2,13 @@
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::Modal;
+use super::{Modal, bus};
 use crate::{
     access::{Credentials, SessionRequest},
     history::Query,
     plant::{
         command::{Command, CommandKind},
-        def::{DeviceId, ProcedureId, TagId},
+        def::{DeviceId, LineId, ProcedureId, TagId},
     },
     text::Locale,
     ui::{
@@ -55,6 +55,10 @@ pub enum UiAction {
     KeepPreferences(Preferences),
     /// Show all texts in this language.
     SetLocale(Locale),
+    /// Keep what is filled in for a test of a line for the next time.
+    KeepTest(Box<bus::Window>),
+    /// Show what comes of a test of this line.
+    ShowTest(LineId),
     /// Say this until the next key.
     Note(&'static str),
     /// Ask whether to leave.
@@ -106,6 +110,8 @@ impl UiAction {
             | UiAction::EventPage(_)
             | UiAction::ReplayStep(_)
             | UiAction::SetLocale(_)
+            | UiAction::KeepTest(_)
+            | UiAction::ShowTest(_)
             | UiAction::Note(_)
             | UiAction::Leave => Scope::View,
             UiAction::SessionRequest(..) | UiAction::Do(_) => Scope::Station,

@@ -1,5 +1,7 @@
 //! What to do about an alarm, whole: the tab below it has less room.
 
+pub(crate) mod text;
+
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -18,7 +20,6 @@ use crate::{
         layout::Size,
         modal::reason::subject,
         rights,
-        tabs::alarms::{guidance, suppressed_words},
         widgets::list::{Motion, Scroll},
     },
 };
@@ -99,12 +100,13 @@ impl Guidance {
     fn sheet(&self, cx: &ViewContext, body: Rect) -> Sheet {
         let listed = cx.snapshot.alarms.iter().find(|alarm| alarm.id == self.alarm);
         let suppressed = cx.snapshot.suppressed.iter().find(|suppressed| suppressed.id == self.alarm);
-        let now = suppressed.map_or(t!("no longer active").to_owned(), |suppressed| suppressed_words(cx, suppressed));
+        let now =
+            suppressed.map_or(t!("no longer active").to_owned(), |suppressed| text::suppressed_words(cx, suppressed));
         let rows = match listed {
-            Some(alarm) => guidance::rows(cx, alarm),
-            None => guidance::rows_of_any(cx, self.alarm, now, None),
+            Some(alarm) => text::rows(cx, alarm),
+            None => text::rows_of_any(cx, self.alarm, now, None),
         };
-        let respond = listed.and_then(|alarm| guidance::respond_text(cx, cx.def().alarm(self.alarm), alarm));
+        let respond = listed.and_then(|alarm| text::respond_text(cx, cx.def().alarm(self.alarm), alarm));
         let rows = respond.map(|(words, _)| (t!("time"), words)).into_iter().chain(rows).collect::<Vec<_>>();
         let first = rows.iter().position(|(label, _)| *label == t!("action")).unwrap_or(rows.len());
         let selected = self.tick(cx).map(|_| first + self.step);
@@ -118,7 +120,7 @@ impl Guidance {
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
         let sheet = self.sheet(cx, body);
         let def = cx.def().alarm(self.alarm);
-        let condition = guidance::condition_text(cx, def.id);
+        let condition = text::condition_text(cx, def.id);
         let tag = cx.theme.priority_tag(def.priority);
         let title = format!("{tag} {} {} {condition}", subject(cx, def.id), translate(&def.message));
         let mut canvas = window(cx, frame, body, title.trim_end(), (columns(body), sheet.len() + 2));

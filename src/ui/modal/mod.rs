@@ -6,6 +6,7 @@ pub(crate) mod confirm;
 pub(crate) mod correction;
 mod action;
 pub(crate) mod audit_entry;
+pub(crate) mod bus;
 pub(crate) mod entry;
 pub(crate) mod faceplate;
 pub(crate) mod form;
@@ -41,7 +42,7 @@ pub use help::Help;
 pub use line_settings::LineSettings;
 pub use notice::Notice;
 pub use palette::{Palette, Target};
-pub use prompt::Prompt;
+pub use prompt::{Asked, Prompt};
 pub use reason::Reason;
 pub use terminal_settings::TerminalSettings;
 pub use user_form::UserForm;
@@ -51,7 +52,6 @@ use super::{
     ViewContext,
     keys::{self, Hint},
     tab::Tab,
-    tabs::{Tabs, bus},
     widgets::text::{Canvas, fit, width},
 };
 use crate::plant::{
@@ -100,6 +100,8 @@ pub enum Next {
     Both(Modal, Vec<UiAction>),
     /// It is gone, and leads there.
     Go(Target),
+    /// The tab below it is asked, which says what becomes of it.
+    Ask(Asked),
 }
 
 impl Modal {
@@ -115,15 +117,12 @@ impl Modal {
         }
     }
 
-    pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
+    pub fn on_key(self, cx: &ViewContext, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Esc).is(event) {
             let back = match self {
                 Modal::Confirm(confirm) => confirm.back().map(Modal::Faceplate),
                 Modal::UserForm(form) => form.below(),
-                Modal::Prompt(prompt) => {
-                    prompt.cancel(cx, tabs);
-                    None
-                }
+                Modal::Prompt(prompt) => return prompt.cancel(),
                 Modal::Help(_)
                 | Modal::Entry(_)
                 | Modal::Choice(_)
@@ -150,7 +149,7 @@ impl Modal {
             Modal::Entry(entry) => entry.on_key(cx, event),
             Modal::Choice(choice) => choice.on_key(cx, event),
             Modal::Palette(palette) => palette.on_key(cx, event),
-            Modal::Prompt(prompt) => prompt.on_key(cx, tabs, event),
+            Modal::Prompt(prompt) => prompt.on_key(cx, event),
             Modal::Reason(reason) => reason.on_key(cx, event),
             Modal::Correction(window) => window.on_key(cx, event),
             Modal::Faceplate(faceplate) => faceplate.on_key(cx, event),
@@ -158,7 +157,7 @@ impl Modal {
             Modal::Guidance(guidance) => guidance.on_key(cx, event),
             Modal::Why(why) => why.on_key(event),
             Modal::LineSettings(settings) => settings.on_key(cx, event),
-            Modal::Bus(window) => window.on_key(cx, tabs, event),
+            Modal::Bus(window) => window.on_key(cx, event),
             Modal::UserForm(form) => form.on_key(cx, event),
             Modal::AuditEntry(dialog) => dialog.on_key(event),
             Modal::TerminalSettings(window) => window.on_key(event),

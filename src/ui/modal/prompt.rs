@@ -7,8 +7,7 @@ use ratatui::{Frame, layout::Rect};
 use super::{Modal, Next, instant, line::Line, window};
 use crate::plant::number::to_u16;
 use crate::ui::{
-    UiAction, ViewContext, keys,
-    tabs::{ListPage, Tabs},
+    ViewContext, keys,
     widgets::{
         list::Motion,
         text::{Canvas, width, wrap},
@@ -25,6 +24,17 @@ pub struct Prompt {
     /// Why the last Enter was not taken.
     pub problem: Option<String>,
     taker: Taker,
+}
+
+/// What the tab below is asked to do.
+#[derive(Debug)]
+pub enum Asked {
+    /// To take the text of this prompt, which stays where that cannot be used.
+    Take(Prompt),
+    /// To show the rows of its list with this text; the prompt stays, if there is one.
+    Filter(Option<Prompt>, String),
+    /// To move the selection of its list below this prompt.
+    Step(Prompt, Motion),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -58,35 +68,40 @@ impl Prompt {
     }
 
     /// Esc: a filter is again what it was.
-    pub(super) fn cancel(&self, cx: &ViewContext, tabs: &mut Tabs) {
-        if let (Taker::Filter(before), Some(list)) = (&self.taker, tabs.shown_mut().list_mut(cx)) {
-            list.set_filter(cx, before);
+    pub(super) fn cancel(self) -> Next {
+        match self.taker {
+            Taker::Filter(before) => Next::Ask(Asked::Filter(None, before)),
+            Taker::Tab | Taker::Replay(_) => Next::Close,
         }
     }
 
-    pub(super) fn on_key(mut self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Enter).is(event) {
             let text = self.line.text();
-            let taken = match self.taker {
-                Taker::Replay(asked) => instant::typed(cx, &text, asked),
-                Taker::Tab => tabs.shown_mut().on_text(cx, &text),
-                Taker::Filter(_) => Ok(filter(cx, tabs, |list| list.set_filter(cx, &text))),
+            return match self.taker {
+                Taker::Tab => Next::Ask(Asked::Take(self)),
+                Taker::Filter(_) => Next::Ask(Asked::Filter(None, text)),
+                Taker::Replay(asked) => match instant::typed(cx, &text, asked) {
+                    Ok(actions) => Next::Do(actions),
+                    Err(problem) => self.refused(problem),
+                },
             };
-            match taken {
-                Ok(acts) => return Next::Do(acts),
-                Err(problem) => self.problem = Some(problem),
-            }
-        } else if self.line.on_key(event) {
+        }
+        if self.line.on_key(event) {
             self.problem = None;
             if self.is_filter() {
-                let actions = filter(cx, tabs, |list| list.set_filter(cx, &self.line.text()));
-                return Next::Both(Modal::Prompt(self), actions);
+                let text = self.line.text();
+                return Next::Ask(Asked::Filter(Some(self), text));
             }
         } else if let Some(motion) = Motion::from_key(event).filter(|_| self.is_filter()) {
-            let actions = filter(cx, tabs, |list| list.step(cx, motion));
-            return Next::Both(Modal::Prompt(self), actions);
+            return Next::Ask(Asked::Step(self, motion));
         }
         Next::Stay(Modal::Prompt(self))
+    }
+
+    /// It stays, and says why the text was not taken.
+    pub fn refused(self, problem: String) -> Next {
+        Next::Stay(Modal::Prompt(Prompt { problem: Some(problem), ..self }))
     }
 
     pub(super) fn view(&self, cx: &ViewContext, frame: &mut Frame, body: Rect) {
@@ -120,12 +135,4 @@ impl Prompt {
         }
         canvas.text(0, above + below + 2, &cx.theme.enter(t!("⏎ OK   Esc cancel")), cx.theme.strong());
     }
-}
-
-/// Changes the list of the tab, which then asks for what it shows.
-fn filter(cx: &ViewContext, tabs: &mut Tabs, change: impl FnOnce(&mut dyn ListPage)) -> Vec<UiAction> {
-    if let Some(list) = tabs.shown_mut().list_mut(cx) {
-        change(list);
-    }
-    tabs.shown_mut().on_snapshot(cx)
 }

@@ -21,7 +21,6 @@ use crate::{
         tabs::{
             Answered, Queries,
             alarms::{action_text, event_text},
-            draw::local,
             trends::span::View,
         },
         widgets::{chart, list::Motion},
@@ -145,7 +144,7 @@ impl EventPage {
 
     /// The journal around the instant, to be copied.
     pub fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        self.entries(cx).iter().map(|entry| format!("{}\t{}", local(cx, entry.at, "%F %T%.3f"), entry.text)).collect()
+        self.entries(cx).iter().map(|entry| format!("{}\t{}", cx.local(entry.at, "%F %T%.3f"), entry.text)).collect()
     }
 
     /// The window of the curves, in columns of a chart of this width.

@@ -31,7 +31,6 @@ use crate::{
 };
 use filter::{Filter, Sort};
 use handover::Handover;
-pub use handover::suppressed_words;
 use journal::{Events, Journal};
 pub use journal::{action_text, event_text};
 use metrics::Metrics;

@@ -7,11 +7,8 @@ mod line;
 mod lines;
 mod plan;
 mod registers;
-mod request;
 mod results;
-mod rows;
 mod test;
-mod window;
 
 #[cfg(test)]
 mod tests;
@@ -19,23 +16,23 @@ mod tests;
 use std::path::PathBuf;
 
 pub use frames::around as frames_around;
-pub use request::ask_sweep;
-pub use window::Window;
 
 use super::{line_switch, registers::Registers};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{
-        line_minute::LineMinute, line_report::LineReport, line_state::LineState, request_refusal::RequestRefusal,
-        snapshot::LineStatus,
-    },
+    plant::{line_minute::LineMinute, line_state::LineState, request_refusal::RequestRefusal},
     ui::{
+        bus_text::{broken, bytes_text, ms, short_ms},
         layout::Size,
-        widgets::line_trend::{self, line_trend},
+        line_view::LineView,
+        modal::bus::{Shown, TextWindow, Window, start::TestKind},
+        widgets::{
+            line_trend::{self, line_trend},
+            rows,
+        },
     },
 };
 use registers::below;
-use test::TestKind;
 
 /// The day of a line grows by the minute.
 const ASK_EVERY: SignedDuration = SignedDuration::from_secs(60);
@@ -228,6 +225,16 @@ impl TabView for Bus {
 }
 
 impl Bus {
+    /// What was filled in for a test, for the next time.
+    pub fn keep(&mut self, window: Window) {
+        self.test.keep(window);
+    }
+
+    /// What comes of a test of this line.
+    pub fn show_test(&mut self, line: LineId) {
+        (self.line, self.page, self.test.first) = (line, Page::Test, None);
+    }
+
     /// The page that is shown: of the past there is one.
     fn page(&self, cx: &ViewContext) -> Page {
         if cx.is_past() { Page::Line } else { self.page }
@@ -292,31 +299,6 @@ impl Bus {
         );
         let style = if at.status.state == LineState::Connected { cx.theme.normal() } else { cx.theme.trouble() };
         canvas.text(end.saturating_sub(width(&words)), 0, &words, style);
-    }
-}
-
-/// A line and all that is known of it.
-#[derive(Debug, Clone, Copy)]
-pub struct LineView<'a> {
-    id: LineId,
-    status: &'a LineStatus,
-    /// In use now.
-    settings: &'a LineDef,
-    /// `None` until the line has reported.
-    report: Option<&'a LineReport>,
-}
-
-impl<'a> LineView<'a> {
-    fn new(cx: &ViewContext<'a>, id: LineId) -> Option<LineView<'a>> {
-        let def = cx.def().lines.get(id.index())?;
-        let status = cx.snapshot.lines.get(id.index())?;
-        let report = status.report.as_deref();
-        Some(LineView { id, status, settings: report.map_or(def, |report| &report.settings), report })
-    }
-
-    fn is_testing(&self) -> bool {
-        use crate::plant::diagnostics::DiagnosticState;
-        self.status.test.as_ref().is_some_and(|run| run.state == DiagnosticState::Running)
     }
 }
 

@@ -90,15 +90,10 @@ pub fn curves(
     let curves = pens.iter().zip(&traces).enumerate().map(curve).collect();
     let zone = Some(&cx.def().time_zone);
     let now = if cursor.is_some() { cx.present() } else { cx.now };
-    let cursors = cursor.map(|at| (at, local(cx, at, "%T").into())).into_iter().collect();
+    let cursors = cursor.map(|at| (at, cx.local(at, "%T").into())).into_iter().collect();
     let chart = Chart { zone, cursors, ..Chart::new(theme, (view.from, view.to, now), curves) };
     let area = canvas.part(0, 1, canvas.width(), canvas.height().saturating_sub(1)).area();
     chart.render(area, canvas.buffer());
-}
-
-/// A local time in this form of `strftime`.
-pub fn local(cx: &ViewContext, at: Timestamp, form: &str) -> String {
-    at.to_zoned(cx.def().time_zone.clone()).strftime(form).to_string()
 }
 
 /// Draws lines from the scrolled one on; returns how many more there are below.

@@ -34,7 +34,12 @@ pub use listing::ListPage;
 pub use periodic_query::{Answered, Queries};
 pub use rows::Rows;
 
-use super::{Effect, UiAction, ViewContext, key_table::Keys, keys::Hint};
+use super::{
+    Effect, UiAction, ViewContext,
+    key_table::Keys,
+    keys::Hint,
+    modal::{Asked, Modal, Next},
+};
 use crate::{
     access::{SessionRequest, audit_log::sha256},
     history::{Answer, HistoryError},
@@ -256,6 +261,25 @@ impl Tabs {
         let logging = self.shown != Tab::Registers && self.registers.is_logging();
         let logged = if logging { self.registers.on_snapshot(cx) } else { Vec::new() };
         logged.into_iter().chain(self.shown_mut().on_snapshot(cx)).collect()
+    }
+    /// What a window asks of the tab below it, which then asks for what it shows.
+    pub fn on_asked(&mut self, cx: &ViewContext, asked: Asked) -> Next {
+        let (prompt, change): (_, Box<dyn FnOnce(&mut dyn ListPage)>) = match asked {
+            Asked::Take(prompt) => match self.shown_mut().on_text(cx, &prompt.line.text()) {
+                Ok(actions) => return Next::Do(actions),
+                Err(problem) => return prompt.refused(problem),
+            },
+            Asked::Filter(prompt, text) => (prompt, Box::new(move |list| list.set_filter(cx, &text))),
+            Asked::Step(prompt, motion) => (Some(prompt), Box::new(move |list| list.step(cx, motion))),
+        };
+        if let Some(list) = self.shown_mut().list_mut(cx) {
+            change(list);
+        }
+        let actions = self.shown_mut().on_snapshot(cx);
+        match prompt {
+            Some(prompt) => Next::Both(Modal::Prompt(prompt), actions),
+            None => Next::Do(actions),
+        }
     }
     /// Does a tab still wait for the answer to its query?
     pub fn awaits(&mut self, tab: Tab, number: u32) -> bool {

@@ -212,7 +212,7 @@ impl Overlay {
     fn row(&self, cx: &ViewContext, tag: TagId, laid: &Laid, curve: &Answered<Vec<Series>>) -> String {
         let begin = match self.kind {
             Kind::Batches | Kind::Runs => moment(laid.from, cx.now, &cx.def().time_zone),
-            Kind::Periods => draw::local(cx, laid.from, "%Y-%m-%d %H:%M:%S"),
+            Kind::Periods => cx.local(laid.from, "%Y-%m-%d %H:%M:%S"),
         };
         if let Some([a, b, c, d, e]) = &laid.figures {
             return self.columns([&laid.label, &begin, a, b, c, d, e]);

@@ -35,7 +35,7 @@ pub(super) use crate::{
         UiAction, ViewContext,
         key_table::{self, Below, Keys, Offer, motions},
         keys::{self, Hint, char, code},
-        modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why},
+        modal::{Confirm, Faceplate, Modal, Notice, Prompt, Why, guidance::text as guidance_text},
         widgets::{
             list::{self, Motion, Scroll, Selected, Words, first, on_screen},
             text::{self, Canvas, clock, fit, fit_words, moment, pad, pad_left, running, width, wrap},

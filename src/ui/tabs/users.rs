@@ -162,7 +162,7 @@ impl Listing for UserList {
             left(12, t!("role"), |_, row| rights::title(row.role).to_owned()),
             left(26, t!("state"), state),
             left(16, t!("last login"), |cx, row| {
-                row.last_login.map_or(t!("never").to_owned(), |at| draw::local(cx, at, "%Y-%m-%d %H:%M"))
+                row.last_login.map_or(t!("never").to_owned(), |at| cx.local(at, "%Y-%m-%d %H:%M"))
             }),
         ]
     }

@@ -6,6 +6,7 @@ pub(crate) mod chart;
 pub(crate) mod line_trend;
 pub(crate) mod list;
 pub(crate) mod mimic;
+pub(crate) mod rows;
 pub(crate) mod spark;
 pub(crate) mod text;
 pub(crate) mod value;

@@ -166,7 +166,7 @@ impl EventPage {
         for (y, row) in (first..count).take(room).enumerate() {
             if row == here {
                 let mark = cx.theme.pick("▶", ">");
-                let text = t!("{mark} {time}  here", mark, time = draw::local(cx, cx.now, "%T%.3f"));
+                let text = t!("{mark} {time}  here", mark, time = cx.local(cx.now, "%T%.3f"));
                 canvas.text(1, y + 1, &pad(&text, canvas.width().saturating_sub(2)), cx.theme.focus());
                 continue;
             }

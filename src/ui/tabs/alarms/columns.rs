@@ -1,6 +1,6 @@
 //! The columns of the list of alarms: on a narrow screen what counts most, on a wide one also the last hour of each.
 
-use super::{Alarms, guidance, list::AlarmRow};
+use super::{Alarms, list::AlarmRow};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{alarm::ActiveAlarm, def::Subject},
@@ -94,8 +94,10 @@ impl AlarmColumns {
         let alarm: &ActiveAlarm = row.alarm;
         let def = cx.def().alarm(alarm.id);
         let now = value_text(cx, alarm).map_or("–".to_owned(), |shown| shown.within(self.value));
-        let left = guidance::response(def, alarm, cx.now);
-        let respond = left.map(|left| format!("{} {}", left.bar(cx, RESPOND), left.short())).unwrap_or_default();
+        let left = guidance_text::response(def, alarm, cx.now);
+        let respond = left
+            .map(|left| format!("{} {}", draw::bar(cx, left.share(), usize::from(RESPOND)), left.short()))
+            .unwrap_or_default();
         let cells = [
             cx.theme.state_mark(alarm.state).to_owned(),
             moment(alarm.raised_at, cx.now, &cx.def().time_zone),
@@ -138,7 +140,7 @@ fn what_text(cx: &ViewContext, row: &AlarmRow, room: u16) -> String {
     let unrecorded = if unrecorded { t!(" NOT RECORDED") } else { "" };
     let (long, short) = (long + unrecorded, short + unrecorded);
     let name = format!("{mark}{}", translate(&cx.def().alarm(row.alarm.id).message));
-    let text = format!("{name} {}", guidance::condition_text(cx, row.alarm.id));
+    let text = format!("{name} {}", guidance_text::condition_text(cx, row.alarm.id));
     let text = text.trim_end();
     let choices = [(text, &long), (text, &short), (&name, &short)];
     let whole = choices.iter().find(|(text, more)| width(text) + width(more) <= room);

@@ -3,7 +3,7 @@
 use super::{journal::action_text, metrics::stale, span};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{alarm::SuppressedAlarm, line_state::LineState, record::ActionRecord, recorded_action::RecordedAction},
+    plant::{line_state::LineState, record::ActionRecord, recorded_action::RecordedAction},
     report::Period,
     ui::modal::{faceplate::device_text, reason::subject},
 };
@@ -89,7 +89,7 @@ impl Handover {
         };
         section(
             t!("suppressed"),
-            cx.snapshot.suppressed.iter().map(|suppressed| suppressed_words(cx, suppressed)).collect(),
+            cx.snapshot.suppressed.iter().map(|suppressed| guidance_text::suppressed_words(cx, suppressed)).collect(),
             true,
         );
         section(t!("abnormal: manual, disabled, under test"), unusual(cx), true);
@@ -164,33 +164,6 @@ fn folded(cx: &ViewContext, rows: impl Iterator<Item = (Timestamp, String)>) -> 
         format!("{at} {times} {}", words.trim_start_matches(dot).trim_start())
     };
     kinds.into_iter().map(row).collect()
-}
-
-/// `shelved ‹2›! TIC-1.PV temperature high, 41:00 left, by anna: sensor is cleaned, since 13:20:00`.
-pub fn suppressed_words(cx: &ViewContext, suppressed: &SuppressedAlarm) -> String {
-    let def = cx.def().alarm(suppressed.id);
-    let mark = cx.theme.priority_tag(def.priority);
-    let left = suppressed
-        .until
-        .map(|until| t!(", {running} left", running = running(elapsed(cx.now, until))))
-        .unwrap_or_default();
-    let since = moment(suppressed.note.at, cx.now, &cx.def().time_zone);
-    let by = suppressed.note.by.as_ref().map(|by| t!(", by {by}", by)).unwrap_or_default();
-    let reason = suppressed.note.reason.as_ref().map(|reason| format!(": {reason}")).unwrap_or_default();
-    let active = if suppressed.active { t!(" ACTIVE") } else { "" };
-    let name = subject(cx, suppressed.id);
-    t!(
-        "{state} {mark} {name} {message}{active}{left}{by}{reason}, since {since}",
-        state = translate(suppressed.state.word()),
-        mark,
-        name,
-        message = translate(&def.message),
-        active,
-        left,
-        by,
-        reason,
-        since
-    )
 }
 
 /// Disconnected lines and devices, sequences in manual, actuators that do not follow their command.

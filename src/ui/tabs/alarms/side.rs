@@ -42,7 +42,7 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
     let (width, indent) = (canvas.width(), guidance::names());
     let may = rights::missing(cx, &alarm.acknowledge()).is_none();
     let ack = if alarm.state.needs_acknowledgement() && may && !cx.is_past() { t!("a ack ") } else { "" };
-    let condition = guidance::condition_text(cx, def.id);
+    let condition = guidance_text::condition_text(cx, def.id);
     let tag = theme.priority_tag(def.priority);
     let title = format!("{ack}{tag} {} {} {condition}", subject(cx, def.id), translate(&def.message));
     let mut y = 0;
@@ -50,19 +50,19 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
         canvas.text(0, y, &line, theme.strong());
         y += 1;
     }
-    if let Some((words, over)) = guidance::respond_text(cx, def, alarm) {
+    if let Some((words, over)) = guidance_text::respond_text(cx, def, alarm) {
         let style = if over { theme.trouble() } else { theme.strong() };
         for line in wrap(&words, width) {
             canvas.text(0, y, &line, style);
             y += 1;
         }
-        if let Some(response) = guidance::response(def, alarm, cx.now) {
-            canvas.text(0, y, &response.bar(cx, BAR.max(width / 2)), style);
+        if let Some(response) = guidance_text::response(def, alarm, cx.now) {
+            canvas.text(0, y, &draw::bar(cx, response.share(), usize::from(BAR.max(width / 2))), style);
             y += 1;
         }
     }
     y += 1;
-    let guide = guidance::rows(cx, alarm).into_iter().map(|(label, text)| {
+    let guide = guidance_text::rows(cx, alarm).into_iter().map(|(label, text)| {
         let style = if guidance::is_of_action(label) { theme.strong() } else { theme.normal() };
         (label, text, style)
     });
@@ -93,7 +93,7 @@ fn selected(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm, canvas: &mut Ca
 /// How often it was raised before, and what was done the last times.
 fn before(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<LabelledRow> {
     let (def, normal) = (cx.def().alarm(alarm.id), cx.theme.normal());
-    let since = |at| draw::local(cx, at, "%m-%d %H:%M");
+    let since = |at| cx.local(at, "%m-%d %H:%M");
     let [searched, actions] = tab.recent.searched_since();
     let Some((times, all)) = tab.recent.before(cx, def, alarm.raised_at) else {
         return vec![(t!("before"), t!("collecting data").to_owned(), cx.theme.dim())];

@@ -1,6 +1,6 @@
 //! What is evaluated and journaled, but not annunciated: shelved, out of service, suppressed by design.
 
-use super::{handover::suppressed_words, view};
+use super::view;
 use crate::{
     plant::{alarm::SuppressedAlarm, def::AlarmId},
     ui::tabs::prelude::*,
@@ -33,7 +33,7 @@ impl Listing for SuppressedAlarms {
 
     fn columns(&self, _cx: &ViewContext, _room: u16) -> Vec<Column<SuppressedAlarm>> {
         vec![rest(0, "", |cx, alarm: &SuppressedAlarm, room| {
-            let text = format!("{} {}", cx.theme.state_mark(alarm.state), suppressed_words(cx, alarm));
+            let text = format!("{} {}", cx.theme.state_mark(alarm.state), guidance_text::suppressed_words(cx, alarm));
             fit_words(&text, room.saturating_sub(1))
         })]
     }

@@ -2,7 +2,7 @@
 
 use ratatui::style::Modifier;
 
-use super::{Alarms, Page, columns::AlarmColumns, guidance, handover::suppressed_words, list::AlarmRow, on_page, side};
+use super::{Alarms, Page, columns::AlarmColumns, guidance, list::AlarmRow, on_page, side};
 use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{alarm::ActiveAlarm, def::AlarmId},
@@ -166,7 +166,7 @@ fn list_alone(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     }
     if below > 1 {
         let (used, selected) = (2 + to_u16(rows.len().min(room)), rows[place].alarm);
-        let now = guidance::now_text(cx, selected);
+        let now = guidance_text::now_text(cx, selected);
         guidance_below(cx, canvas, (used, below), selected.id, Some(selected), now);
     }
 }
@@ -181,7 +181,7 @@ fn guidance_below(
     now: String,
 ) {
     let (width, height) = (canvas.width(), canvas.height());
-    let needs = guidance::height(&guidance::rows_of_any(cx, alarm, now.clone(), listed), width);
+    let needs = guidance::height(&guidance_text::rows_of_any(cx, alarm, now.clone(), listed), width);
     let rows = least.max(needs.min(height.saturating_sub(used)));
     guidance::view(cx, alarm, listed, now, &mut canvas.part(0, height.saturating_sub(rows), width, rows));
 }
@@ -233,7 +233,7 @@ fn suppressed(tab: &Alarms, cx: &ViewContext, canvas: &mut Canvas) {
     tab.suppressed.view(cx, canvas);
     let Some(alarm) = tab.suppressed.selected(cx) else { return };
     let (used, least) = (tab.suppressed.used(cx), guide_of_suppressed(cx));
-    guidance_below(cx, canvas, (used, least), alarm.id, None, suppressed_words(cx, &alarm));
+    guidance_below(cx, canvas, (used, least), alarm.id, None, guidance_text::suppressed_words(cx, &alarm));
 }
 
 /// Rows below the views.

@@ -2,15 +2,12 @@
 
 use std::{collections::VecDeque, path::PathBuf};
 
-use super::{
-    LineView, Window,
-    window::{Shown, TextWindow},
-};
+use super::{LineView, Shown, TextWindow, Window, bytes_text};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    bus::{capture, dissect, filter::Filter, frame::hex, wide_addresses::WideAddresses},
+    bus::{capture, dissect, filter::Filter, wide_addresses::WideAddresses},
     plant::{
-        def::{Framing, LineId},
+        def::LineId,
         request_refusal::RequestRefusal,
         traffic::{Frame, Frames},
     },
@@ -126,7 +123,7 @@ impl Ring {
             self.saved.push(Err(t!("no frames to save").to_owned()));
             return Vec::new();
         }
-        let stamp = draw::local(cx, cx.now, "%Y-%m-%d-%H%M%S");
+        let stamp = cx.local(cx.now, "%Y-%m-%d-%H%M%S");
         let name = |end: &str| cx.def().report.folder.join(format!("{}-{stamp}.{end}", at.settings.name));
         let outgoing = |path, bytes| Outgoing { tab: Tab::Bus, path, bytes, new: false };
         let text = outgoing(name("txt"), file(|| capture::text(&frames)).into_bytes());
@@ -228,7 +225,7 @@ impl Ring {
     fn row(&self, cx: &ViewContext, wide: &WideAddresses, frame: &Frame, selected: bool, canvas: &mut Canvas) {
         let theme = cx.theme;
         let has_room = 100 <= canvas.width();
-        let time = draw::local(cx, frame.at, if has_room { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
+        let time = cx.local(frame.at, if has_room { "%H:%M:%S%.3f" } else { "%M:%S%.3f" });
         let dissection = dissect::in_traffic(wide, frame, self.before(frame.number));
         let good = !frame.result.is_wrong();
         let refused = !frame.sent && dissection.message.get(1).is_some_and(|code| 0x80 <= *code);
@@ -286,24 +283,7 @@ fn short(what: &str) -> String {
     words.into_iter().fold(what.to_owned(), |text, (long, short)| text.replacen(long, short, 1))
 }
 
-/// The bytes as they are written: hex, or the characters of an ASCII frame.
-pub fn bytes_text(framing: Framing, bytes: &[u8]) -> String {
-    match framing {
-        Framing::Ascii => bytes.escape_ascii().to_string(),
-        Framing::Rtu | Framing::Mbap => hex(bytes),
-    }
-}
-
 /// Whole bytes only: `01 03 14 00 …`.
 fn cut_bytes(text: &str, room: u16) -> String {
     if text.contains(' ') { fit_words(text, room) } else { fit(text, room) }
-}
-
-/// How wide hex bytes are, for windows that break them into rows.
-pub fn broken(text: &str, room: u16) -> Vec<String> {
-    if text.contains(' ') || width(text) <= room {
-        return wrap(text, room);
-    }
-    let letters: Vec<char> = text.chars().collect();
-    letters.chunks(usize::from(room.max(1))).map(|part| part.iter().collect()).collect()
 }

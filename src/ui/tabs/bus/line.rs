@@ -5,8 +5,9 @@ mod worries;
 use worries::worries;
 
 use super::{
-    LineView, lines,
+    LineView, lines, ms,
     rows::{self, Spans, flow, number, plain, words},
+    short_ms,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -316,25 +317,6 @@ pub fn grouped(count: u64) -> String {
     parts.join(" ")
 }
 
-/// `45.8 ms`, `300 ms`, `2.5 s`.
-pub fn ms(span: Duration) -> String {
-    match span.as_secs_f64() {
-        seconds @ 120.0.. => t!("{seconds} min", seconds = format!("{:.0}", seconds / 60.0)),
-        seconds @ 10.0.. => format!("{seconds:.0} s"),
-        seconds @ 1.0.. => format!("{seconds:.1} s"),
-        seconds => t!("{tenths} ms", tenths = tenths(seconds * 1e3)),
-    }
-}
-
-/// Milliseconds without the unit, for tables.
-pub fn short_ms(span: Duration) -> String {
-    tenths(span.as_secs_f64() * 1e3)
-}
-
-fn tenths(ms: f64) -> String {
-    if 99.95 <= ms || ms.fract() == 0.0 { format!("{ms:.0}") } else { format!("{ms:.1}") }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -380,12 +362,5 @@ mod tests {
     #[test]
     fn numbers_read_easily() {
         assert_eq!([0, 12, 1_234, 1_234_567].map(grouped), ["0", "12", "1 234", "1 234 567"]);
-        let check = |micros, expect: &str| assert_eq!(ms(Duration::from_micros(micros)), expect);
-        check(4_010, "4.0 ms");
-        check(300_000, "300 ms");
-        check(99_960, "100 ms");
-        check(2_500_000, "2.5 s");
-        check(70_000_000, "70 s");
-        check(1_580_800_000, "26 min");
     }
 }

@@ -1,10 +1,6 @@
 //! Page Plan: every block of the read plan with its addresses, its cost and how its reads end.
 
-use super::{
-    LineView, Window,
-    line::{grouped, ms, short_ms},
-    window::{Shown, TextWindow},
-};
+use super::{LineView, Shown, TextWindow, Window, line::grouped, ms, short_ms};
 use crate::ui::tabs::prelude::*;
 use crate::{
     bus::pdu,

@@ -1,13 +1,15 @@
 //! What came of a test, in words.
 
 use super::{
-    LineView,
-    frames::{broken, bytes_text},
-    line::{ms, short_ms},
+    LineView, broken, bytes_text, ms,
     rows::{Spans, plain},
-    window::{dissection_rows, exchange_rows},
+    short_ms,
 };
-use crate::ui::{command_text::outcome_words, tabs::prelude::*};
+use crate::ui::{
+    command_text::outcome_words,
+    modal::bus::{dissection_rows, exchange_rows},
+    tabs::prelude::*,
+};
 use crate::{
     bus::{
         diagnostics::tally,

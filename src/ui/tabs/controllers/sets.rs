@@ -187,7 +187,7 @@ pub fn replace_text(cx: &ViewContext, there: &StoredSet) -> String {
     let name = &there.name;
     match &there.set {
         Ok(set) => {
-            let saved = draw::local(cx, set.saved, "%Y-%m-%d %H:%M");
+            let saved = cx.local(set.saved, "%Y-%m-%d %H:%M");
             let (device, profile, by) = (&set.device, &set.profile, &set.by);
             t!(
                 "The set {name} exists already: of {device}, profile {profile}, saved {saved} by {by}. Replace it?",

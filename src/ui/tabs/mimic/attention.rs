@@ -1,6 +1,6 @@
 //! What an operator must look at: what needs an action, and what is not as it usually is.
 
-use crate::ui::tabs::{alarms::suppressed_words, prelude::*};
+use crate::ui::tabs::prelude::*;
 use crate::{
     plant::{
         alarm::{ActiveAlarm, AlarmState},
@@ -110,7 +110,7 @@ pub fn not_normal(cx: &ViewContext) -> Vec<AttentionRow> {
     });
     let lines = lines.map(|line| (format!("{}  {}", line.name, line_state_text(cx, line.id)), cx.theme.strong()));
     let suppressed = snapshot.suppressed.iter().filter(|alarm| alarm.state != AlarmState::SuppressedByDesign);
-    let suppressed = suppressed.map(|alarm| (suppressed_words(cx, alarm), normal));
+    let suppressed = suppressed.map(|alarm| (guidance_text::suppressed_words(cx, alarm), normal));
     values.chain(outside).chain(manual).chain(lines).chain(suppressed).collect()
 }
 

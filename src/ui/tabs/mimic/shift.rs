@@ -223,7 +223,7 @@ fn hours(cx: &ViewContext, canvas: &mut Canvas, axis: Axis) {
         };
         let hour = |at: Timestamp| i64::from(at.to_zoned(cx.def().time_zone.clone()).hour());
         let begins = x == 0 || hour(at) != hour(before);
-        let label = draw::local(cx, at, "%H:00");
+        let label = cx.local(at, "%H:00");
         let covers_now = (x..=x + width(&label)).contains(&now);
         if begins && hour(at) % each == 0 && free <= x && !covers_now {
             free = canvas.text(x, 0, &label, cx.theme.dim()) + 1;
@@ -267,5 +267,5 @@ fn steps(cx: &ViewContext, canvas: &mut Canvas, axis: Axis, lane: Lane, series: 
 pub fn end(cx: &ViewContext) -> Option<AttentionRow> {
     let (_, to) = span(cx).filter(|_| !cx.def().shifts.is_empty())?;
     let left = running(elapsed(cx.now, to));
-    Some((t!("{left}  shift ends {at}", left, at = draw::local(cx, to, "%H:%M")), cx.theme.normal()))
+    Some((t!("{left}  shift ends {at}", left, at = cx.local(to, "%H:%M")), cx.theme.normal()))
 }

@@ -1,7 +1,7 @@
 //! The keys of the registers tab, and of the graph of what is watched.
 
 use super::*;
-use crate::ui::tabs::bus;
+use crate::ui::modal;
 #[cfg(test)]
 use crate::ui::tabs::trends;
 
@@ -98,7 +98,7 @@ const UNIT: &[Key] = &[
         |registers, _| registers.toggle_comparison(),
     ),
     Key::new(char('m'), "map", "map of the addresses that answer, 0 to 65535", |registers, cx| {
-        bus::ask_sweep(cx, registers.line, registers.unit, registers.table)
+        modal::bus::ask_sweep(cx, registers.line, registers.unit, registers.table)
     })
     .needs(Role::Technician),
     Key::change(char('r'), "", "ask again for what the unit has refused", |registers, _| registers.relearn = true),

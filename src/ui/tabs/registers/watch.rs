@@ -242,7 +242,7 @@ impl Registers {
             return notice(t!("Nothing is watched yet: p puts the selected register on the list.").to_owned());
         }
         self.asking = Asking::Log;
-        let usual = draw::local(cx, cx.now, "registers-%Y%m%d-%H%M%S.csv");
+        let usual = cx.local(cx.now, "registers-%Y%m%d-%H%M%S.csv");
         let hint = t!("a new CSV file; an existing file is never overwritten");
         vec![UiAction::Open(Modal::Prompt(Prompt::new(t!("log what is watched"), hint, &usual)))]
     }

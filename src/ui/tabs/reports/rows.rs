@@ -158,7 +158,7 @@ impl RecordRows {
         let number = |value: Option<Exact>| value.map_or("----".to_owned(), |value| digits(value, decimals));
         let first = self.scroll.first(rows.len(), room);
         for (y, _, row) in on_screen(&rows, first, room) {
-            let [date, time] = ["%Y-%m-%d", "%H:%M:%S"].map(|format| draw::local(cx, row.at, format));
+            let [date, time] = ["%Y-%m-%d", "%H:%M:%S"].map(|format| cx.local(row.at, format));
             let [sv, pv, er] = [row.sv, row.pv, row.er].map(number);
             let line = draw::columns(WIDTHS, [&date, &time, &sv, &pv, &er, ""]);
             let known = row.sv.is_some() && row.pv.is_some();

@@ -114,9 +114,9 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
     let running = reports.is_running(cx.now);
     let until = reports.report.value.as_ref().map_or(cx.now, |report| report.until);
     let state = match (running, &reports.report.value) {
-        (true, _) => t!("RUNNING, until now {local}", local = draw::local(cx, until, "%H:%M:%S")),
+        (true, _) => t!("RUNNING, until now {local}", local = cx.local(until, "%H:%M:%S")),
         (false, Some(report)) if report.until < report.period.to => {
-            t!("figures until {local} only", local = draw::local(cx, until, "%H:%M:%S"))
+            t!("figures until {local} only", local = cx.local(until, "%H:%M:%S"))
         }
         (false, _) => t!("closed").to_owned(),
     };
@@ -233,7 +233,7 @@ pub fn lines(
         lines.push(Line::styled(t!("  records not stored yet are missing here"), theme.trouble()));
     }
     for gap in &report.unreadable {
-        let time = |at: Timestamp| draw::local(cx, at, "%m-%d %H:%M");
+        let time = |at: Timestamp| cx.local(at, "%m-%d %H:%M");
         let words = t!("  not readable, not counted: {time} to {time2}", time = time(gap.from), time2 = time(gap.to));
         lines.push(Line::styled(words, theme.trouble()));
     }
@@ -244,7 +244,7 @@ pub fn lines(
     // The name of a shift has its day; only a longer period needs the date in every line.
     let short = report.until.duration_since(report.period.from) <= SignedDuration::from_hours(24);
     let form = if short { "%H:%M:%S" } else { "%m-%d %H:%M:%S" };
-    let time = |at: Timestamp| format!("  {}  ", draw::local(cx, at, form));
+    let time = |at: Timestamp| format!("  {}  ", cx.local(at, form));
     let listed: Vec<_> = report.alarms.iter().filter(|alarm| quiet || !alarm.event.is_quiet()).collect();
     let alarms_title = match report.alarms.len() - listed.len() {
         0 => t!("alarms").to_owned(),

@@ -154,8 +154,8 @@ impl Trends {
     fn path(&self, cx: &ViewContext, extension: &str) -> PathBuf {
         let plain = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '-' };
         let name: String = self.name(cx).chars().map(plain).collect();
-        let begin = draw::local(cx, self.span(cx).from, "%Y-%m-%dT%H%M%S");
-        let exported = draw::local(cx, cx.present(), "%Y-%m-%dT%H%M%S");
+        let begin = cx.local(self.span(cx).from, "%Y-%m-%dT%H%M%S");
+        let exported = cx.local(cx.present(), "%Y-%m-%dT%H%M%S");
         cx.def().report.folder.join(format!("{begin}-{name}-{exported}.{extension}"))
     }
 }

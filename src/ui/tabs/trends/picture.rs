@@ -95,8 +95,8 @@ pub(super) fn picture(trends: &Trends, cx: &ViewContext) -> Drawing {
         "{}   {}   {} – {}",
         cx.def().name,
         trends.name(cx),
-        draw::local(cx, view.from, "%Y-%m-%d %H:%M:%S"),
-        draw::local(cx, view.to, "%Y-%m-%d %H:%M:%S %:z")
+        cx.local(view.from, "%Y-%m-%d %H:%M:%S"),
+        cx.local(view.to, "%Y-%m-%d %H:%M:%S %:z")
     );
     page.text((PLOT.0, 20.0), Anchor::Start, head, Ink::Text);
     let scales = chart.plan(Rect::new(0, 0, 120, 40)).scales;

@@ -110,7 +110,6 @@ fn a_trend_that_is_opened_leaves_the_marked_pens() {
     let model = &mut stand.model;
     crate::ui::model_context::with_tabs(model, |tabs, cx| {
         tabs.trends.open_tag(cx, other);
-        Vec::new()
     });
     let pens = |stand: &Stand| {
         let pens = stand.model.tabs.trends.pens(&stand.model.cx());

@@ -7,17 +7,21 @@ mod sweep;
 
 use fields::{all_settings, number};
 use functions::FUNCTIONS;
-use std::ops::RangeInclusive;
+use std::{ops::RangeInclusive, time::Duration};
 pub use sweep::ask_sweep;
 
-use ratatui::Frame as Screen;
+use crossterm::event::KeyEvent;
+use ratatui::{Frame as Screen, layout::Rect, style::Style};
 
 use super::{
-    Bus, LineView, Page, Window,
-    line::ms,
-    test::{self, TRANSACTION, TestKind},
+    super::{
+        Modal, Next, Notice, UiAction,
+        form::{self, Field, Form, KeyOutcome},
+        window,
+    },
+    Window,
+    start::{self, TRANSACTION, TestKind},
 };
-use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{
         dissect::{self, Direction},
@@ -25,15 +29,22 @@ use crate::{
         meaning, names, request_lint,
     },
     plant::{
-        def::{Framing, Parity, Serial},
+        command::CommandKind,
+        def::{Framing, LineDef, LineId, Parity, Serial},
         diagnostics::{Diagnostic, PATTERNS_MAX, Scan},
-        number::{to_u8, to_u32, to_u64},
+        number::{to_u8, to_u16, to_u32, to_u64},
         tag::Table,
     },
-    ui::modal::{
-        Next,
-        form::{self, Field, Form, KeyOutcome},
-        window,
+    t,
+    text::translate,
+    ui::{
+        ViewContext,
+        bus_text::ms,
+        line_view::LineView,
+        widgets::{
+            list::on_screen,
+            text::{pad, width, wrap},
+        },
     },
 };
 
@@ -95,17 +106,15 @@ impl RequestForm {
     }
 
     /// A key; what is filled in is kept for the next time.
-    pub fn on_key(mut self, cx: &ViewContext, bus: &mut Bus, event: KeyEvent) -> Next {
-        let bench = &mut bus.test;
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         let function = self.form.chosen(FUNCTION);
         if self.form.on_key(event) == KeyOutcome::Submitted {
             self.problem = match self.start(cx) {
-                Ok(mut acts) => {
+                Ok(act) => {
                     // It may have been opened on another tab.
-                    acts.push(UiAction::Show(Tab::Bus));
-                    (bus.line, bus.page) = (self.line, Page::Test);
-                    (bench.form, bench.first) = (Some(self), None);
-                    return Next::Do(acts);
+                    let shown = UiAction::ShowTest(self.line);
+                    let kept = UiAction::KeepTest(Box::new(Window::Form(self)));
+                    return Next::Do(vec![act, shown, kept]);
                 }
                 Err(problem) => Some(problem),
             };
@@ -118,21 +127,20 @@ impl RequestForm {
             let before = |label: &str| filled.iter().find(|(of, _)| *of == label).map(|(_, text)| text.clone());
             self.form.replace_from(2, functions::fields(FUNCTIONS[self.form.chosen(FUNCTION)], &before));
         }
-        bench.form = Some(self.clone());
-        Window::Form(self).stay()
+        Window::Form(self).stay_and_keep()
     }
 
     pub fn on_paste(&mut self, text: &str) {
         self.form.paste(text);
     }
 
-    fn start(&self, cx: &ViewContext) -> Result<Vec<UiAction>, String> {
+    fn start(&self, cx: &ViewContext) -> Result<UiAction, String> {
         let at = LineView::new(cx, self.line).ok_or(t!("this line no longer exists"))?;
         if self.form.is_cut() {
             return Err(form::cut());
         }
         let diagnostic = self.build(at.settings)?.0;
-        Ok(vec![test::start(cx, &at, diagnostic)?])
+        start::start(cx, &at, diagnostic)
     }
 
     /// What a function takes of a field: of a choice its number.
@@ -207,7 +215,7 @@ impl RequestForm {
             }
             Err(why) => wrapped(&format!("! {why}"), theme.trouble()).collect(),
         };
-        let problem = self.problem.clone().or_else(|| test::closed(&at));
+        let problem = self.problem.clone().or_else(|| start::closed(&at));
         if let Some(why) = problem.filter(|why| !notes.iter().any(|(line, _)| line.ends_with(why.as_str()))) {
             notes.extend(wrapped(&format!("! {why}"), theme.trouble()));
         }

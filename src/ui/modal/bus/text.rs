@@ -1,87 +1,33 @@
-//! Windows of this tab: sheets to read, and entries for tests.
+//! A sheet to read: one frame, byte by byte, or the tags of a block; and what a request and its answer say.
 
-use ratatui::Frame as Screen;
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame as Screen, layout::Rect};
 
 use super::{
-    frames::{broken, bytes_text},
-    line::short_ms,
-    request::RequestForm,
-    rows::{self, Spans, plain},
-    test::Send,
+    super::{Next, window},
+    Window,
 };
-use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{dissect, frame::hex, meaning, pdu, wide_addresses::WideAddresses},
     plant::{
+        def::{DeviceId, LineId},
+        number::to_u16,
         tag::Table,
         traffic::{Exchange, Frame},
     },
+    t,
+    text::translate,
     ui::{
-        modal::{Next, window},
-        tabs::Tabs,
-        widgets::text::age,
+        ViewContext,
+        bus_text::{broken, bytes_text, short_ms},
+        widgets::{
+            list::Motion,
+            rows::{self, Spans, plain},
+            text::{age, fit, pad, width, wrap},
+            value,
+        },
     },
 };
-
-#[derive(Debug, Clone, PartialEq)]
-pub enum Window {
-    /// Something to read.
-    Text(TextWindow),
-    /// Bytes or words to be sent.
-    Send(Send),
-    Form(RequestForm),
-}
-
-impl Window {
-    pub fn only_shows(&self) -> bool {
-        matches!(self, Window::Text(_))
-    }
-
-    pub fn on_key(self, cx: &ViewContext, tabs: &mut Tabs, event: KeyEvent) -> Next {
-        match self {
-            Window::Text(text) => text.on_key(event),
-            Window::Send(send) => send.on_key(cx, &mut tabs.bus.test, event),
-            Window::Form(form) => form.on_key(cx, &mut tabs.bus, event),
-        }
-    }
-
-    pub fn stay(self) -> Next {
-        Next::Stay(Modal::Bus(Box::new(self)))
-    }
-
-    pub fn open(self) -> UiAction {
-        UiAction::Open(Modal::Bus(Box::new(self)))
-    }
-
-    /// Pasted text goes into the entry.
-    pub fn on_paste(&mut self, text: &str) {
-        match self {
-            Window::Send(send) => send.on_paste(text),
-            Window::Form(form) => form.on_paste(text),
-            Window::Text(_) => {}
-        }
-    }
-
-    pub fn hints(&self) -> Vec<Hint> {
-        let hint = |key: &str, label: &str| Hint::new(key, label, "");
-        let close = hint(t!("Esc"), t!("close"));
-        match self {
-            Window::Text(_) => vec![hint("↑↓", t!("scroll")), close],
-            Window::Send(_) => vec![hint("⏎", t!("send")), hint(t!("Tab"), t!("check on or off")), close],
-            Window::Form(_) => {
-                vec![hint("↑↓", t!("field")), hint("←→", t!("choose")), hint("⏎", t!("start")), close]
-            }
-        }
-    }
-
-    pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
-        match self {
-            Window::Text(text) => text.view(cx, screen, body),
-            Window::Send(send) => send.view(cx, screen, body),
-            Window::Form(form) => form.view(cx, screen, body),
-        }
-    }
-}
 
 /// No text has more rows; the view stops at its last one.
 const ROWS_MAX: usize = 400;
@@ -117,7 +63,7 @@ impl TextWindow {
         TextWindow { shown, first: 0 }
     }
 
-    fn on_key(mut self, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, event: KeyEvent) -> Next {
         if matches!(event.code, KeyCode::Enter | KeyCode::Char('q')) {
             return Next::Close;
         }
@@ -127,7 +73,7 @@ impl TextWindow {
         Window::Text(self).stay()
     }
 
-    fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
+    pub(super) fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         let room = body.width.saturating_sub(6);
         let (title, rows) = match &self.shown {
             Shown::Frame { line, frame, before } => {
@@ -172,7 +118,7 @@ fn means(cx: &ViewContext, line: &str, frame: &Frame, before: &[Frame], message:
 /// Every byte of a frame with its name and meaning.
 fn frame_rows(cx: &ViewContext, frame: &Frame, dissection: &dissect::Dissection, room: u16) -> Vec<Spans> {
     let theme = cx.theme;
-    let at = draw::local(cx, frame.at, "%H:%M:%S%.6f");
+    let at = cx.local(frame.at, "%H:%M:%S%.6f");
     let direction = if frame.sent { t!("TX sent") } else { t!("RX received") };
     let count = frame.bytes.len();
     let mut rows = vec![plain(t!("{at}  {direction}, {count} bytes", at, direction, count), theme.normal())];

@@ -1,6 +1,9 @@
 //! Rows of styled words that scroll, words that flow into rows, and tables that leave out columns where there is no room.
 
-use crate::ui::tabs::prelude::*;
+use ratatui::style::Style;
+
+use super::text::{Canvas, fit_words, pad, pad_left, width};
+use crate::{plant::number::to_u16, t, text::translate, ui::ViewContext};
 
 /// A row of the screen: words with their looks, one behind the other.
 pub type Spans = Vec<(String, Style)>;

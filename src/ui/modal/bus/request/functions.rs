@@ -5,10 +5,13 @@ use super::{
     fields::{address, bit, number, register},
     typed,
 };
-use crate::ui::tabs::prelude::*;
 use crate::{
     bus::{names, pdu},
-    plant::{number::to_u8, tag::Table},
+    plant::{
+        number::{to_u8, to_u16},
+        tag::Table,
+    },
+    t,
 };
 
 /// Functions that the form offers, the most used first.

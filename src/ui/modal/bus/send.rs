@@ -1,15 +1,51 @@
 //! The window that sends bytes as they are typed.
 
-use super::*;
+use crossterm::event::{KeyCode, KeyEvent};
+use ratatui::{Frame as Screen, layout::Rect};
+
+use super::{
+    super::{Next, UiAction, line::Line},
+    Window,
+    start::{self, ENTRY_MAX, TRANSACTION, TestKind},
+};
+use crate::{
+    bus::{
+        ascii,
+        dissect::{self, Direction, Dissection},
+        frame::hex,
+        hex_input::{self, FramedRequest},
+        meaning, request_lint,
+    },
+    plant::{
+        def::{Framing, LineId},
+        diagnostics::Diagnostic,
+        fault::Fault,
+        number::to_u16,
+    },
+    t,
+    ui::{
+        ViewContext,
+        bus_text::{broken, bytes_text},
+        keys,
+        line_view::LineView,
+        widgets::{
+            rows::{Spans, plain},
+            text::{Canvas, fit, fit_words, wrap},
+        },
+    },
+};
+
+/// Rows of the list of tests with the line below it, which the window covers.
+const ROWS: usize = TestKind::ALL.len() + 2;
 
 /// Bytes on their way onto a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Send {
-    pub(super) line: LineId,
-    pub(super) text: Line,
+    line: LineId,
+    text: Line,
     /// As typed, without a check.
-    pub(super) bare: bool,
-    pub(super) problem: Option<String>,
+    bare: bool,
+    problem: Option<String>,
 }
 
 /// What was typed, as it would go over the line.
@@ -23,16 +59,26 @@ struct Ready {
 }
 
 impl Send {
+    /// With a text to start from.
+    pub fn new(line: LineId, text: &str, bare: bool) -> Send {
+        Send { line, text: Line::long(text, ENTRY_MAX), bare, problem: None }
+    }
+
+    /// What is typed, and whether its check is left out.
+    pub fn typed(&self) -> (String, bool) {
+        (self.text.text(), self.bare)
+    }
+
     /// A key; what is typed is kept for the next time.
-    pub fn on_key(mut self, cx: &ViewContext, bench: &mut Bench, event: KeyEvent) -> Next {
+    pub(super) fn on_key(mut self, cx: &ViewContext, event: KeyEvent) -> Next {
         if keys::code(KeyCode::Tab).is(event) {
             self.bare = !self.bare;
             self.problem = None;
         } else if keys::code(KeyCode::Enter).is(event) {
             match self.send(cx) {
                 Ok(UiAction::Command(kind)) => {
-                    bench.first = None;
-                    return Next::Do(vec![UiAction::Command(kind), Window::Send(self).open()]);
+                    let shown = UiAction::ShowTest(self.line);
+                    return Next::Do(vec![UiAction::Command(kind), shown, Window::Send(self).open()]);
                 }
                 Ok(act) => return Next::Do(vec![act]),
                 Err(problem) => self.problem = Some(problem),
@@ -40,8 +86,7 @@ impl Send {
         } else if self.text.on_key(event) {
             self.problem = None;
         }
-        (bench.text, bench.bare) = (self.text.text(), self.bare);
-        Window::Send(self).stay()
+        Window::Send(self).stay_and_keep()
     }
 
     pub fn on_paste(&mut self, text: &str) {
@@ -53,7 +98,7 @@ impl Send {
         if self.text.missed() {
             return Err(t!("the text was cut; Ctrl-U clears the line").to_owned());
         }
-        start(cx, &at, Diagnostic::Send(self.ready(at.settings.transport.framing())?.frame))
+        start::start(cx, &at, Diagnostic::Send(self.ready(at.settings.transport.framing())?.frame))
     }
 
     fn ready(&self, framing: Framing) -> Result<Ready, String> {
@@ -75,7 +120,7 @@ impl Send {
     pub fn view(&self, cx: &ViewContext, screen: &mut Screen, body: Rect) {
         let Some(at) = LineView::new(cx, self.line) else { return };
         let theme = cx.theme;
-        let area = Rect { height: (TOP + 1).min(body.height), ..body };
+        let area = Rect { height: to_u16(ROWS + 1).min(body.height), ..body };
         let mut outer = Canvas::new(screen.buffer_mut(), area);
         outer.clear();
         outer.frame(
@@ -98,7 +143,7 @@ impl Send {
                 Err(why) => wrap(&why, width).into_iter().map(|line| plain(line, theme.trouble())).collect(),
             }
         };
-        let problem = self.problem.clone().or_else(|| closed(&at));
+        let problem = self.problem.clone().or_else(|| start::closed(&at));
         let room = height.saturating_sub(2 + u16::from(problem.is_some()));
         if usize::from(room) < rows.len() {
             let more = t!(" {count} more lines: enlarge", count = rows.len() - usize::from(room));

@@ -1,10 +1,7 @@
 //! Fields of a request: numbers, registers, bits and addresses as they are typed.
 
 use super::*;
-use crate::{
-    plant::address::{AddressBase, AddressContext},
-    ui::tabs::prelude::*,
-};
+use crate::plant::address::{AddressBase, AddressContext};
 
 /// `123`, `-5`, `0x3EA`.
 pub(super) fn number(text: &str, what: &str, range: RangeInclusive<i64>) -> Result<i64, String> {
