@@ -7,11 +7,13 @@
 
 mod answers;
 mod date;
+mod plant;
 
 use std::{cell::Cell, collections::HashMap, fmt::Display, sync::LazyLock};
 
 pub use answers::recorded;
 pub use date::{date, weekday};
+pub use plant::{ByLanguage, PlantTexts, of_plant};
 
 thread_local! {
     static LOCALE: Cell<Locale> = const { Cell::new(Locale::ENGLISH) };
@@ -153,9 +155,10 @@ pub fn translate(english: &str) -> &str {
     translation(english).unwrap_or(english)
 }
 
-/// The text in the language of this thread, unless that is English.
+/// The text in the language of this thread, that of its plant first; `None` where neither has one.
 pub fn translation(english: &str) -> Option<&'static str> {
-    CATALOGUES[LOCALE.get().language.0].get(english).map(String::as_str)
+    let language = LOCALE.get().language;
+    plant::find(language, english).or_else(|| CATALOGUES[language.0].get(english).map(String::as_str))
 }
 
 /// The texts with places in the language of this thread.

@@ -6,6 +6,7 @@ use jiff::{civil::Time, tz::TimeZone};
 use serde::{Deserialize, Serialize};
 
 use super::tag::{Table, TagDef};
+use crate::text::PlantTexts;
 
 pub use super::{
     alarm_def::Priority,
@@ -72,6 +73,8 @@ pub struct PlantDef {
     pub history: HistoryDef,
     /// Where values are sent to.
     pub north: NorthDef,
+    /// Its texts in other languages.
+    pub texts: PlantTexts,
     /// The simulated process that `demo` and `sim` serve for this plant, by name (`tank`).
     pub simulation: Option<String>,
     /// SHA-256 of the plant file in hexadecimal; empty for a plant without one.
@@ -101,6 +104,7 @@ impl Default for PlantDef {
             report: ReportDef::default(),
             history: HistoryDef::default(),
             north: NorthDef::default(),
+            texts: PlantTexts::NONE,
             simulation: None,
             file_sha256: String::new(),
         }

@@ -104,6 +104,7 @@ pub fn plant() -> PlantDef {
         shifts: Vec::new(),
         history: Default::default(),
         north: Default::default(),
+        texts: Default::default(),
         report: ReportDef::default(),
         simulation: None,
         file_sha256: String::new(),

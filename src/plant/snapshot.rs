@@ -3,6 +3,7 @@
 mod encoding;
 
 use crate::t;
+use crate::text::of_plant;
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use jiff::{SignedDuration, Timestamp};
@@ -155,7 +156,7 @@ impl Snapshot {
     pub fn format(&self, tag: TagId, value: impl Into<Exact>) -> String {
         let value = value.into();
         match self.def.tag(tag).label_of(value) {
-            Some(label) => label.to_owned(),
+            Some(label) => of_plant(label).to_owned(),
             None => digits(value, Some(self.decimals[tag.index()])),
         }
     }

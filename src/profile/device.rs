@@ -53,6 +53,8 @@ pub(super) fn inline_profile(table: &DeviceTable, problems: &mut Problems) -> Op
         faceplate: table.faceplate.clone(),
         program: table.program.clone(),
         signature: table.signature.clone(),
+        // A plant file has them for all of its devices.
+        texts: None,
     }))
 }
 

@@ -21,6 +21,7 @@ mod raw_pattern;
 mod address;
 pub(crate) mod names;
 mod schema;
+mod texts;
 mod signature;
 pub(crate) mod tag_text;
 mod units;

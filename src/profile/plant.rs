@@ -16,7 +16,7 @@ use super::{
     history, interlock, line, lint, mimic,
     names::{Defs, Names, Scope, Unique, check_name},
     north, procedure, program, reader,
-    reader::{At, OptionalKey, text},
+    reader::{At, OptionalKey, Raw, text},
     report, rows, run,
     schema::{AlarmTable, DeviceTable, PlantFile, ProfileFile},
     sets,
@@ -24,6 +24,7 @@ use super::{
     size::{TAGS_MAX, is_of_size},
     tag::{self, DeviceContext},
     tag_keys::period,
+    texts,
 };
 use crate::plant::{
     classification,
@@ -70,7 +71,8 @@ pub(super) fn build(name: &str, plant: &Text, library: &Library) -> Result<(Plan
 fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Problems) -> Option<PlantDef> {
     let lines = line::lines(&file.lines, problems);
     line::warn_of_limits(&file.devices, &lines, problems);
-    let Devices { devices, mut tags, names, classes, exprs, alarms } = devices(file, &lines, library, problems)?;
+    let Devices { devices, mut tags, names, classes, exprs, alarms, texts: device_texts } =
+        devices(file, &lines, library, problems)?;
     calculated::calculate(
         exprs,
         &mut tags,
@@ -92,9 +94,11 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
     let report = report::report(file.report.as_ref().map(|report| &report.value), &defs, &trends, &rules, problems);
     let history = history::history(file.history.as_ref().map(|history| &history.value), problems);
     let north = north::north(name, file.north.as_ref().map(|north| &north.value), &defs, problems);
+    let tables = file.texts.iter().chain(&device_texts);
+    let (texts, translated) = texts::texts(tables, problems);
     let classes = classification::classes(&tags, &alarms, &classes);
     tags.iter_mut().zip(classes).for_each(|(tag, class)| tag.class = class);
-    Some(PlantDef {
+    let def = PlantDef {
         name: name.to_owned(),
         title: text(&file.title),
         time_zone: time_zone(&file.time_zone, problems),
@@ -115,8 +119,11 @@ fn assemble(name: &str, file: &PlantFile, library: &Library, problems: &mut Prob
         simulation: file.simulation.as_ref().map(|simulation| simulation.value.clone()),
         devices,
         tags,
+        texts,
         file_sha256: String::new(),
-    })
+    };
+    texts::warn_unused(&def, &translated, problems);
+    Some(def)
 }
 
 fn time_zone(name: &Option<At<String>>, problems: &mut Problems) -> TimeZone {
@@ -149,6 +156,8 @@ struct Devices {
     exprs: calculated::Exprs,
     /// Those of their profiles.
     alarms: Vec<At<AlarmTable>>,
+    /// The texts of their profiles in other languages.
+    texts: Vec<At<Raw>>,
 }
 
 /// `None` where they have too many tags together.
@@ -219,7 +228,8 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     }
     stated.into_iter().for_each(|(tag, value)| tags[tag.index()].stated = Some(value));
     sets::mark(&devices, &mut tags, &written, problems);
-    Some(Devices { devices, tags, names, classes, exprs, alarms })
+    let texts = known.iter().filter_map(|device| device.profile.texts.clone()).collect();
+    Some(Devices { devices, tags, names, classes, exprs, alarms, texts })
 }
 
 fn known_devices<'a>(

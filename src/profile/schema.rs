@@ -51,6 +51,8 @@ toml_tables! {
         opt "report" report: ReportTable,
         opt "history" history: HistoryTable,
         opt "north" north: NorthTable,
+        /// Its texts in other languages.
+        opt "texts" texts: Raw,
     }
 
     /// A `[[device]]` of a plant file.

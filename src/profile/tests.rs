@@ -14,6 +14,7 @@ mod north;
 mod pictures;
 mod reports;
 mod text_tags;
+mod texts;
 
 use proptest::prelude::*;
 

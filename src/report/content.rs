@@ -30,7 +30,7 @@ use crate::{
 
 /// The report as a document: the sections that the plant file asks for, without those that would be empty.
 pub fn document(report: &ShiftReport, def: &PlantDef, locale: Locale) -> Document {
-    locale.within(|| {
+    let in_words = || {
         let section = |kind: &Kind| {
             let content = content(*kind, report, def)?;
             Some(Section { kind: *kind, title: title(*kind, report), content })
@@ -44,7 +44,7 @@ pub fn document(report: &ShiftReport, def: &PlantDef, locale: Locale) -> Documen
         let times = Times::of(&zone, report.period.from, report.until);
         Document {
             logo: def.report.logo.clone(),
-            title: def.title.clone(),
+            title: text::of_plant(&def.title).to_owned(),
             heading: plain(&format!("{what}: {}", name(&report.period, &zone))),
             locale,
             zone,
@@ -53,7 +53,8 @@ pub fn document(report: &ShiftReport, def: &PlantDef, locale: Locale) -> Documen
             until: report.until,
             sections: def.report.sections.iter().filter_map(section).collect(),
         }
-    })
+    };
+    def.texts.within(|| locale.within(in_words))
 }
 
 /// The name of a period, its date in words; of a free one its times.
@@ -124,7 +125,7 @@ fn fact(name: &'static str, cell: Cell) -> Fact {
 
 fn summary(report: &ShiftReport, def: &PlantDef) -> Vec<Fact> {
     let mut facts = vec![
-        fact("plant", Cell::text(&def.title)),
+        fact("plant", Cell::text(text::of_plant(&def.title))),
         fact("period", Cell::text(name(&report.period, &def.time_zone))),
         fact("from", Cell::Time(report.period.from)),
         fact("to", Cell::Time(report.period.to)),
@@ -180,7 +181,7 @@ fn mean(tag: &TagFigures) -> Cell {
 /// What a tag is: on pages beside its name, in files behind all other columns, so that who counts them counts as before.
 fn label(def: &PlantDef, tag: &str) -> Cell {
     let tag = def.tag_named(tag).map(|tag| def.tag(tag)).filter(|tag| tag.label != tag.short);
-    Cell::text(tag.map_or("", |tag| &tag.label))
+    Cell::text(tag.map_or("", |tag| text::of_plant(&tag.label)))
 }
 
 fn values(tags: &[TagFigures], def: &PlantDef) -> Table {

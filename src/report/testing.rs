@@ -108,6 +108,7 @@ pub fn plant(zone_name: &str, shifts: &[(&str, i8, i8)]) -> PlantDef {
             .collect(),
         history: Default::default(),
         north: Default::default(),
+        texts: Default::default(),
         report: ReportDef { record: Some((device, Duration::from_secs(10))), ..ReportDef::default() },
         simulation: None,
         file_sha256: String::new(),

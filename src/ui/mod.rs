@@ -58,7 +58,7 @@ use crate::{
     history::{Answer, HistoryError},
     plant::{sample::Cause, snapshot::Snapshot},
     t,
-    text::Locale,
+    text::{Locale, PlantTexts},
 };
 use extension::Extension;
 use graphics::Picture;
@@ -237,10 +237,15 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
-    let effects = model.locale().within(|| on_msg(model, msg));
+    let effects = in_words(model.locale(), model.snapshot.def.texts, || on_msg(model, msg));
     // In the language that the message may have chosen.
-    model.locale().within(|| dispatch::list_keys(model));
+    in_words(model.locale(), model.snapshot.def.texts, || dispatch::list_keys(model));
     effects
+}
+
+/// With the texts of the program and of the plant in this language.
+fn in_words<R>(locale: Locale, of_plant: PlantTexts, body: impl FnOnce() -> R) -> R {
+    of_plant.within(|| locale.within(body))
 }
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
@@ -321,14 +326,14 @@ fn on_input(model: &mut Model, act: impl FnOnce(&mut Model) -> Vec<UiAction>) ->
 
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
-    model.locale().within(|| chrome::view(model, frame));
+    in_words(model.locale(), model.snapshot.def.texts, || chrome::view(model, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
     model.theme.paint_ground(frame.buffer_mut());
 }
 
 /// The terminal's own picture over the cells, while one is wanted.
 pub fn picture(model: &Model) -> Option<Picture> {
-    model.locale().within(|| model.tabs.trends.picture(&model.cx()))
+    in_words(model.locale(), model.snapshot.def.texts, || model.tabs.trends.picture(&model.cx()))
 }
 
 fn on_paste(model: &mut Model, text: &str) {

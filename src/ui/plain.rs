@@ -25,7 +25,7 @@ use crate::{
         tag::{Access, TagDef},
     },
     t,
-    text::translate,
+    text::{of_plant, translate},
 };
 
 /// What a line is about, in the order in which the first lines stand.
@@ -99,9 +99,9 @@ fn facts(cx: &ViewContext) -> BTreeMap<Fact, (String, Option<Quality>)> {
     let station = match &cx.session.gone {
         Some(why) => t!("station lost: {why}", why),
         None if snapshot.samples.iter().any(|sample| sample.quality == Quality::Bad(Cause::NotAuthorised)) => {
-            t!("station of {title}, values are shown after a login (--user)", title = def.title)
+            t!("station of {title}, values are shown after a login (--user)", title = of_plant(&def.title))
         }
-        None => t!("station of {title}", title = def.title),
+        None => t!("station of {title}", title = of_plant(&def.title)),
     };
     // While a lost line is tried again nothing is new.
     let is_retry = |line: LineId| {
@@ -136,7 +136,7 @@ fn facts(cx: &ViewContext) -> BTreeMap<Fact, (String, Option<Quality>)> {
     let tags = def.tags.iter().filter(is_shown).map(|tag| {
         let (quality, shown) = (snapshot.sample(tag.id).quality, value::show(cx, tag.id));
         let value = if quality.is_bad() { t!("no value").to_owned() } else { shown.with_unit() };
-        let label = if tag.label.is_empty() { String::new() } else { format!(" ({})", tag.label) };
+        let label = if tag.label.is_empty() { String::new() } else { format!(" ({})", of_plant(&tag.label)) };
         (Fact::Tag(tag.id), (format!("{}{label}: {value}, {quality}", tag.name), Some(quality)))
     });
     plain.map(|(fact, text)| (fact, (text, None))).chain(tags).collect()

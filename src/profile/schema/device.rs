@@ -52,6 +52,8 @@ toml_tables! {
         opt "faceplate" faceplate: FaceplateTable,
         opt "program" program: ProgramTable,
         opt "signature" signature: SignatureTable,
+        /// Its texts in other languages.
+        opt "texts" texts: Raw,
     }
 
     /// A `[[repeat]]` of a profile, or a `[[device.repeat]]` of a plant file.

@@ -1,5 +1,6 @@
 //! The header: plant, lines, simulation, user and clock.
 
+use crate::text::of_plant;
 use std::sync::Arc;
 
 use super::*;
@@ -16,7 +17,7 @@ pub(super) fn header(model: &Model, cx: &ViewContext, canvas: &mut Canvas) {
     let theme = cx.theme;
     // On a narrow screen the plant and its lines count for more than the name of the program.
     let x = if cx.size < Size::Normal { 1 } else { canvas.text(1, 0, "sightglass", theme.dim()) + 2 };
-    let start = canvas.text(x, 0, &fit(&cx.def().title, canvas.width() / 3), theme.strong()) + 2;
+    let start = canvas.text(x, 0, &fit(of_plant(&cx.def().title), canvas.width() / 3), theme.strong()) + 2;
     let mut end = canvas.width().saturating_sub(1);
     let fits = |parts: &[(usize, String, Style)]| {
         parts.iter().map(|(_, text, _)| width(text) + 2).sum::<u16>() <= end.saturating_sub(start) + 2

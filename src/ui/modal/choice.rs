@@ -1,6 +1,7 @@
 //! One of a few: the values of an enumeration, or the actions of a device.
 
 use crate::t;
+use crate::text::of_plant;
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -48,11 +49,15 @@ impl Choice {
         let choices = || def.enum_labels.iter().filter(|(number, _)| may(Exact::whole(*number)));
         let rows = choices().map(|(number, label)| {
             let next = Confirm::write(cx, tag, Exact::whole(*number));
-            ChoiceRow { text: format!("{number}  {label}"), tag, next }
+            ChoiceRow { text: format!("{number}  {}", of_plant(label)), tag, next }
         });
         let now = cx.snapshot.sample(tag).exact();
         let selected = choices().position(|(number, _)| Some(Exact::whole(*number)) == now).unwrap_or(0);
-        Choice { title: t!("write {name} {label}", name = def.name, label = def.label), rows: rows.collect(), selected }
+        Choice {
+            title: t!("write {name} {label}", name = def.name, label = of_plant(&def.label)),
+            rows: rows.collect(),
+            selected,
+        }
     }
 
     /// The actions of a device; `None` if it has none.
@@ -60,7 +65,11 @@ impl Choice {
         let def = cx.def().device(device);
         let rows = def.actions.iter().map(|action| {
             let next = Confirm::action(cx, action.tag, action.value, &action.name, &action.confirm);
-            ChoiceRow { text: format!("{}  {}", action.name, cx.def().tag(action.tag).label), tag: action.tag, next }
+            ChoiceRow {
+                text: format!("{}  {}", of_plant(&action.name), of_plant(&cx.def().tag(action.tag).label)),
+                tag: action.tag,
+                next,
+            }
         });
         let rows: Vec<ChoiceRow> = rows.collect();
         (!rows.is_empty()).then(|| Choice { title: t!("actions of {name}", name = def.name), rows, selected: 0 })

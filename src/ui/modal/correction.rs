@@ -1,6 +1,7 @@
 //! Asks for the correction of a counter: which one, by how much, and why.
 
 use crate::t;
+use crate::text::of_plant;
 use std::sync::Arc;
 
 use crossterm::event::KeyEvent;
@@ -132,7 +133,12 @@ impl Correction {
                 COUNTER => {
                     let shown = value::show(cx, tag);
                     let x = canvas.text(x, drawn.y, &shown.whole(), shown.style) + 2;
-                    canvas.text(x, drawn.y, &fit(&cx.def().tag(tag).label, room.saturating_sub(x)), theme.dim());
+                    canvas.text(
+                        x,
+                        drawn.y,
+                        &fit(of_plant(&cx.def().tag(tag).label), room.saturating_sub(x)),
+                        theme.dim(),
+                    );
                 }
                 AMOUNT => drop(canvas.text(x, drawn.y, cx.snapshot.unit(tag), theme.normal())),
                 _ => {}

@@ -1,5 +1,6 @@
 //! A number or a text for a tag: old value, new value, range, address, and what the profile wants said.
 
+use crate::text::of_plant;
 use std::sync::Arc;
 
 use crate::t;
@@ -174,7 +175,8 @@ impl Entry {
             rows.push((wire_text(def), theme.dim()));
             rows.push((entry::help(cx.snapshot, self.tag), theme.dim()));
         }
-        let notes = Some(&def.meaning).filter(|text| !text.is_empty()).cloned().into_iter().chain(write_notes(def));
+        let notes =
+            Some(of_plant(&def.meaning).to_owned()).filter(|text| !text.is_empty()).into_iter().chain(write_notes(def));
         let notes = notes.chain(interlock::unlock_text(cx, self.tag));
         rows.extend(notes.flat_map(|note| wrap(&note, room)).map(|line| (line, theme.normal())));
         let missing = rights::lacks(cx, rights::to_write(cx, [self.tag]));
@@ -187,7 +189,7 @@ impl Entry {
             .max()
             .unwrap_or(0)
             .max(46);
-        let title = t!("write {name} {label}", name = def.name, label = def.label);
+        let title = t!("write {name} {label}", name = def.name, label = of_plant(&def.label));
         let notes = to_u16(problem.len().max(1));
         let mut canvas = window(cx, frame, body, &title, (inner, to_u16(rows.len()) + 3 + notes));
         let old = value::show(cx, self.tag);

@@ -1,7 +1,7 @@
 //! What there is to know about an item of the mimic: its tags with value, quality, age, range, alarms and device.
 
 use crate::t;
-use crate::text::translate;
+use crate::text::{of_plant, translate};
 use crossterm::event::{KeyCode, KeyEvent};
 use ratatui::{Frame, layout::Rect};
 
@@ -143,7 +143,7 @@ impl Faceplate {
         let room = body.width.saturating_sub(8).min(64);
         let details = Sheet::new(details(cx, self.tag()), room, 9);
         let list = self.tags.len();
-        let mut canvas = window(cx, frame, body, &self.title, (room, list + 1 + details.len()));
+        let mut canvas = window(cx, frame, body, of_plant(&self.title), (room, list + 1 + details.len()));
         for (y, tag) in self.tags.iter().enumerate() {
             let def = cx.def().tag(*tag);
             let shown = value::show(cx, *tag);
@@ -152,7 +152,7 @@ impl Faceplate {
             let room = canvas.width().saturating_sub(x + 2);
             let x = canvas.text(x + 2, y, &shown.within(room), shown.style);
             let left = canvas.width().saturating_sub(x + 2);
-            let x = canvas.text(x + 2, y, &fit(&def.label, left), cx.theme.dim());
+            let x = canvas.text(x + 2, y, &fit(of_plant(&def.label), left), cx.theme.dim());
             if let Some((words, style)) = actuator_mark::mark(cx, *tag).filter(|_| 1 < self.tags.len()) {
                 let left = canvas.width().saturating_sub(x + 2);
                 canvas.text(x + 2, y, &fit(&words, left), style);
@@ -230,7 +230,7 @@ fn details(cx: &ViewContext, tag: TagId) -> Vec<Fact> {
         rows.push((t!("alarm"), text, theme.alarm(def.priority, alarm.state, cx.flash())));
     }
     if !def.meaning.is_empty() {
-        rows.push((t!("meaning"), def.meaning.clone(), theme.normal()));
+        rows.push((t!("meaning"), of_plant(&def.meaning).to_owned(), theme.normal()));
     }
     rows.into_iter().map(|(label, text, style)| Fact::new(label, text, style)).collect()
 }

@@ -1,5 +1,6 @@
 //! The palette: go to any tab, device, tag, alarm, key or past time by typing a part of its name.
 
+use crate::text::of_plant;
 use std::cmp::Reverse;
 
 use crossterm::event::{KeyCode, KeyEvent};
@@ -283,16 +284,16 @@ fn rows(cx: &ViewContext, keys: Vec<Hint>) -> Vec<Found> {
         Some(Found::new(Target::Key(hint.chord?), t!("key"), &hint.key, help))
     });
     let devices = def.devices.iter().filter(|_| !def.is_bench());
-    let devices =
-        devices.map(|device| Found::new(Target::Device(device.id), t!("device"), &device.name, &device.title));
-    let tags = def.tags.iter().map(|tag| Found::new(Target::Tag(tag.id), t!("tag"), &tag.name, &tag.label));
+    let devices = devices
+        .map(|device| Found::new(Target::Device(device.id), t!("device"), &device.name, of_plant(&device.title)));
+    let tags = def.tags.iter().map(|tag| Found::new(Target::Tag(tag.id), t!("tag"), &tag.name, of_plant(&tag.label)));
     let stored = def.tags.iter().filter(|tag| tag.is_stored());
-    let trends = stored.map(|tag| Found::new(Target::Trend(tag.id), t!("trend"), &tag.name, &tag.label));
+    let trends = stored.map(|tag| Found::new(Target::Trend(tag.id), t!("trend"), &tag.name, of_plant(&tag.label)));
     let overview = Found::new(Target::Overview, t!("page"), t!("overview"), t!("all devices at a glance"));
     let overview = Some(overview).filter(|_| !def.is_bench());
     let procedures = def.procedures.iter().enumerate().filter(|_| !cx.is_past());
     let procedures = procedures.map(|(place, def)| {
-        Found::new(Target::Procedure(ProcedureId(to_u16(place))), t!("procedure"), &def.name, &def.about)
+        Found::new(Target::Procedure(ProcedureId(to_u16(place))), t!("procedure"), &def.name, of_plant(&def.about))
     });
     let devices = devices.chain(procedures);
     tabs.chain(overview).chain(active).chain(devices).chain(tags).chain(trends).chain(keys).chain(others).collect()

@@ -23,6 +23,7 @@ use crate::{
         def::{DeviceId, TagId},
         number::to_u16,
     },
+    text::of_plant,
     ui::{
         UiAction, ViewContext,
         keys::Hint,
@@ -91,7 +92,7 @@ impl Why {
         let shown = body.height.saturating_sub(2);
         let first = self.row.min(to_u16(sheet.len()).saturating_sub(shown));
         let place = if self.tags.len() < 2 { String::new() } else { format!("  {}/{}", self.at + 1, self.tags.len()) };
-        let title = t!("why {name} {label}{place}", name = def.name, label = def.label, place);
+        let title = t!("why {name} {label}{place}", name = def.name, label = of_plant(&def.label), place);
         let mut canvas = window(cx, frame, body, &title, (room, sheet.len()));
         sheet.view(cx.theme, &mut canvas, usize::from(first));
         let (inner, below) = (canvas.area(), to_u16(sheet.len()).saturating_sub(first + canvas.height()));

@@ -242,7 +242,9 @@ impl Controllers {
 
     /// The devices that the filter lets through.
     fn listed<'a>(&self, cx: &ViewContext<'a>) -> Vec<&'a DeviceDef> {
-        let words = |device: &DeviceDef| format!("{} {} {}", device.name, device.model, device.title);
+        let words = |device: &DeviceDef| {
+            format!("{} {} {} {}", device.name, device.model, device.title, of_plant(&device.title))
+        };
         cx.def().devices.iter().filter(|device| self.found.fit(&words(device))).collect()
     }
 

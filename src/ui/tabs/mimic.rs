@@ -235,12 +235,14 @@ impl Mimic {
         let motion = !self.still && cx.theme.motion;
         match item {
             MimicItem::Vessel { place, label, level, .. } => {
-                vessel::view(cx, canvas, scale.place(*place), label, *level, selected);
+                vessel::view(cx, canvas, scale.place(*place), of_plant(label), *level, selected);
             }
             MimicItem::Valve { place, label, tag, vertical } => {
-                unit::valve(cx, canvas, scale.spot(*place, *vertical), label, *tag, *vertical, selected)
+                unit::valve(cx, canvas, scale.spot(*place, *vertical), of_plant(label), *tag, *vertical, selected)
             }
-            MimicItem::Pump { place, label, tag } => unit::pump(cx, canvas, scale.place(*place), label, *tag, selected),
+            MimicItem::Pump { place, label, tag } => {
+                unit::pump(cx, canvas, scale.place(*place), of_plant(label), *tag, selected)
+            }
             MimicItem::Agitator { place, tag } => {
                 vessel::agitator(cx, canvas, scale.place(*place), *tag, selected, motion)
             }
@@ -250,7 +252,7 @@ impl Mimic {
             }
             MimicItem::Joint { at, branches } => pipe::joint(cx, canvas, *at, *branches, scale),
             MimicItem::Value { place, label, tag } => {
-                unit::labelled(cx, canvas, scale.place(*place), label, *tag, selected)
+                unit::labelled(cx, canvas, scale.place(*place), of_plant(label), *tag, selected)
             }
             MimicItem::Bar { place, tag } => bar::view(cx, canvas, scale.place(*place), *tag, selected),
             MimicItem::Link { place, .. } => unit::link(cx, canvas, scale.place(*place), &title(cx, item), selected),
@@ -258,7 +260,7 @@ impl Mimic {
                 panel::controller(cx, canvas, scale.place(*place), cx.def().device(*device), selected)
             }
             MimicItem::Sequence { place, label, step, remaining, states } => {
-                let sequence = panel::Sequence { label, step: *step, remaining: *remaining, states };
+                let sequence = panel::Sequence { label: of_plant(label), step: *step, remaining: *remaining, states };
                 sequence.view(cx, canvas, scale.place(*place), selected);
             }
             MimicItem::Trend { place, tag, window } => {
@@ -269,7 +271,7 @@ impl Mimic {
             }
             MimicItem::Text { place, text } => {
                 let at = scale.place(*place);
-                canvas.text(at.x, at.y + at.height / 2, &fit(text, at.width.max(1)), cx.theme.dim());
+                canvas.text(at.x, at.y + at.height / 2, &fit(of_plant(text), at.width.max(1)), cx.theme.dim());
             }
         }
     }

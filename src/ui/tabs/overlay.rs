@@ -169,7 +169,7 @@ impl Overlay {
         let trouble = self.curves.iter().find_map(|(_, curve)| curve.trouble.as_deref());
         match trouble {
             Some(trouble) => canvas.text(x + 2, 0, &fit(trouble, width.saturating_sub(x + 3)), theme.trouble()),
-            None => canvas.text(x + 2, 0, &fit(&def.label, width.saturating_sub(x + 3)), theme.normal()),
+            None => canvas.text(x + 2, 0, &fit(of_plant(&def.label), width.saturating_sub(x + 3)), theme.normal()),
         };
         let legend = to_u16(self.curves.len()) + 1;
         self.draw_chart(cx, &mut canvas.part(0, 1, width, height.saturating_sub(legend + 1)), tag);

@@ -30,7 +30,7 @@ pub(super) use crate::{
         time::elapsed,
     },
     t,
-    text::translate,
+    text::{of_plant, translate},
     ui::{
         UiAction, ViewContext,
         key_table::{self, Below, Keys, Offer, motions},

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{LANGUAGES, model, replay::replayed, screen, type_keys};
 use crate::{
     plant::{def::AlarmId, station_fault::StationFault},
-    text::{Language, Locale, translate},
+    text::{Language, Locale, PlantTexts, translate},
     ui::{
         Msg,
         fixture::Fixture,
@@ -164,6 +164,39 @@ fn no_text_overwrites_another_in_any_language() {
         });
     }
     assert!(overwritten.is_empty(), "{}", overwritten.into_iter().collect::<Vec<_>>().join("\n"));
+}
+
+#[test]
+fn no_label_of_the_plant_stays_in_another_language() {
+    let mut missed = BTreeSet::new();
+    for mut fixture in [Fixture::normal(), Fixture::alarm()] {
+        // What the devices and tags are, not what they are called: of more than one word, so that it is no part of another text.
+        let def = &fixture.def;
+        let of_tags = def.tags.iter().flat_map(|tag| [&tag.label, &tag.meaning, &tag.group]);
+        let of_devices = def.devices.iter().map(|device| &device.title);
+        let labels = of_tags.chain(of_devices).chain([&def.title]).filter(|text| text.contains(' '));
+        let labels: BTreeSet<String> = labels.cloned().collect();
+        assert!(5 < labels.len(), "{labels:?}");
+        let thai = labels.iter().enumerate().map(|(n, label)| (label.clone(), format!("ป้าย{n}"))).collect();
+        fixture.def.texts = PlantTexts::of([("th".to_owned(), thai)].into());
+        let mut seen = 0;
+        for (tab, keys) in PAGES.iter().flat_map(|(tab, typed)| typed.iter().map(move |keys| (tab, keys))) {
+            let mut model = model(&fixture, Theme::FULL);
+            model.locale = Language::THAI.locale();
+            model.tabs.shown = *tab;
+            type_keys(&mut model, keys);
+            let shown = screen(&mut model, 160, 50);
+            seen += shown.matches("ป้าย").count();
+            missed.extend(
+                labels
+                    .iter()
+                    .filter(|label| shown.contains(*label))
+                    .map(|label| format!("{label} on {tab:?} {keys:?}")),
+            );
+        }
+        assert!(20 < seen, "{seen}");
+    }
+    assert!(missed.is_empty(), "{}", missed.into_iter().collect::<Vec<_>>().join("\n"));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! A value as an operator sees it: number, unit and how far to trust it, with one look everywhere.
 
 use crate::t;
-use crate::text::translate;
+use crate::text::{of_plant, translate};
 use ratatui::style::Style;
 
 use super::text;
@@ -84,7 +84,7 @@ pub fn number(cx: &ViewContext, tag: TagId, value: impl Into<Exact>) -> String {
         .bit_labels
         .iter()
         .filter(|(bit, _)| value.bits() >> (*bit).min(63) & 1 == 1)
-        .map(|(_, name)| name.as_str())
+        .map(|(_, name)| of_plant(name))
         .collect();
     if set.is_empty() { t!("none").to_owned() } else { set.join(", ") }
 }

@@ -16,7 +16,7 @@ use crate::{
         traffic::{Exchange, Frame},
     },
     t,
-    text::translate,
+    text::{of_plant, translate},
     ui::{
         ViewContext,
         bus_text::{broken, bytes_text, short_ms},
@@ -203,7 +203,7 @@ fn block_rows(cx: &ViewContext, line: LineId, device: DeviceId, table: Table, ad
             let wire = def.point.address;
             let shown = value::show(cx, *tag);
             let place = format!("{} / 0x{wire:04X}", table.modicon(wire));
-            [def.name.clone(), place, shown.with_unit(), fit(&age(cx.age(*tag)), 6), def.label.clone()]
+            [def.name.clone(), place, shown.with_unit(), fit(&age(cx.age(*tag)), 6), of_plant(&def.label).to_owned()]
         })
         .collect();
     let columns = [

@@ -150,7 +150,7 @@ impl Compare {
     fn row(&self, cx: &ViewContext, canvas: &mut Canvas, y: u16, row: &Compared, run: Option<&Restore>) {
         let theme = cx.theme;
         let step = run.and_then(|run| run.steps.iter().find(|step| Some(step.change.tag) == row.tag));
-        let label = row.tag.map_or(t!("no such setting"), |tag| cx.def().tag(tag).label.as_str());
+        let label = row.tag.map_or(t!("no such setting"), |tag| of_plant(&cx.def().tag(tag).label));
         let (note, trouble) = match (step, run) {
             (Some(step), Some(_)) => match (&step.outcome, step.command) {
                 (Some(outcome), _) => outcome_words(outcome),

@@ -44,7 +44,7 @@ fn below(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, table: &Para
     let hidden = table.view(cx, &mut canvas.part(0, 0, wide, bottom.saturating_sub(words)), device.id);
     if let Some(tag) = table.tag(cx, device.id) {
         let y = bottom.saturating_sub(words);
-        let meaning = if tag.meaning.is_empty() { &tag.label } else { &tag.meaning };
+        let meaning = of_plant(if tag.meaning.is_empty() { &tag.label } else { &tag.meaning });
         // The default first: it must not be what a narrow screen cuts off.
         let default = default_text(cx, tag).map_or(String::new(), |default| t!("default {default}; ", default));
         let x = canvas.text(1, y, &tag.name, cx.theme.strong()) + 2;
@@ -90,7 +90,7 @@ fn heading(cx: &ViewContext, device: &DeviceDef, canvas: &mut Canvas) {
     let line = &cx.def().line(device.line).name;
     // On a narrow screen whether it answers counts for more than what it is for.
     let least = if cx.snapshot.device(device.id).diagnosis.is_some() { 100 } else { 80 };
-    let title = if canvas.width() < least { String::new() } else { format!("{}  ", device.title) };
+    let title = if canvas.width() < least { String::new() } else { format!("{}  ", of_plant(&device.title)) };
     let words = t!("{model}  {title}unit {unit}  {line}", model = device.model, title, unit = device.unit, line);
     let x = canvas.text(x + 2, 0, &words, theme.normal());
     let (words, style) = status_text(cx, device.id);

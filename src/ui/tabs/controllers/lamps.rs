@@ -129,7 +129,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, live: &Li
     let theme = cx.theme;
     let (wide, high) = (canvas.width(), canvas.height());
     let x = canvas.text(1, 0, &device.name, theme.strong());
-    canvas.text(x + 2, 0, &fit_words(&device.title, wide.saturating_sub(x + 3)), theme.dim());
+    canvas.text(x + 2, 0, &fit_words(of_plant(&device.title), wide.saturating_sub(x + 3)), theme.dim());
     let (mut y, mut unknown, mut old, mut cut) = (1, 0, 0, 0);
     for (group, lamps) in groups(cx, device) {
         let cell = lamps.iter().map(|lamp| width(&lamp.name())).max().unwrap_or(0) + 4;
@@ -139,7 +139,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, live: &Li
             cut += lamps.len();
             continue;
         }
-        let x = canvas.text(1, y, group, theme.dim());
+        let x = canvas.text(1, y, of_plant(group), theme.dim());
         if lamps.iter().all(Lamp::is_taken_back) {
             let words = t!("driven by the device: it takes back what is written to them");
             canvas.text(x + 2, y, &fit_words(words, wide.saturating_sub(x + 3)), theme.normal());

@@ -63,7 +63,7 @@ pub fn foot(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     let x = canvas.text(1, bottom, &device.name, cx.theme.strong());
     let (words, style) = status_text(cx, device.id);
-    let title = if device.title.is_empty() { String::new() } else { format!("{}  ", device.title) };
+    let title = if device.title.is_empty() { String::new() } else { format!("{}  ", of_plant(&device.title)) };
     let x = canvas.text(x + 2, bottom, &fit_words(&title, end.saturating_sub(x + 4)), cx.theme.normal());
     canvas.text(x, bottom, &fit_words(&words, end.saturating_sub(x)), style);
 }

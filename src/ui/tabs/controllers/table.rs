@@ -40,7 +40,7 @@ impl ParameterTable {
     /// one with it in its meaning.
     pub fn best(&self, cx: &ViewContext, device: DeviceId) -> usize {
         let typed = self.filter.to_string();
-        let rank = |tag: &TagDef| match (tag.short.to_lowercase(), tag.label.to_lowercase()) {
+        let rank = |tag: &TagDef| match (tag.short.to_lowercase(), of_plant(&tag.label).to_lowercase()) {
             (short, label) if short == typed || label == typed => 0,
             (short, label) if short.contains(&typed) || label.contains(&typed) => 1,
             _ => 2,
@@ -50,7 +50,8 @@ impl ParameterTable {
     }
 
     fn fits(&self, tag: &TagDef) -> bool {
-        self.filter.fit(&format!("{} {} {} {}", tag.short, tag.label, tag.meaning, tag.group))
+        let words = [&tag.label, &tag.meaning, &tag.group].map(|text| format!("{text} {}", of_plant(text)));
+        self.filter.fit(&format!("{} {}", tag.short, words.join(" ")))
     }
 
     /// Parameters under the names of their groups, the selected one in sight; returns how many rows are out of sight
@@ -70,7 +71,7 @@ impl ParameterTable {
         let mut rows: Vec<Result<(usize, &TagDef), &str>> = Vec::new();
         for (n, tag) in tags.iter().enumerate() {
             if n == 0 || tags[n - 1].group != tag.group {
-                rows.push(Err(&tag.group));
+                rows.push(Err(of_plant(&tag.group)));
             }
             rows.push(Ok((n, tag)));
         }
@@ -119,8 +120,8 @@ impl ParameterTable {
             (false, false) => " ",
         };
         let known = shown.note.is_empty() || cx.snapshot.sample(tag.id).value.is_some();
-        let meaning = if known { &tag.meaning } else { &shown.note };
-        let name = format!("{} {}", pad(&tag.short, columns.short), tag.label);
+        let meaning = if known { of_plant(&tag.meaning) } else { &shown.note };
+        let name = format!("{} {}", pad(&tag.short, columns.short), of_plant(&tag.label));
         let default = default_text(cx, tag).unwrap_or_default();
         let range = whole(&range, ParameterColumns::RANGE);
         let row = columns.row([pen, &name, &text, &shown.unit, &range, &default, &read, meaning]);
@@ -167,7 +168,7 @@ impl ParameterColumns {
     fn new(cx: &ViewContext, device: DeviceId, wide: u16) -> ParameterColumns {
         let tags = || cx.def().tags_of(device);
         let short = tags().map(|tag| width(&tag.short)).max().unwrap_or(0).min(10);
-        let label = tags().map(|tag| width(&tag.label)).max().unwrap_or(0);
+        let label = tags().map(|tag| width(of_plant(&tag.label))).max().unwrap_or(0);
         let fixed = 3 + ParameterColumns::VALUE + ParameterColumns::UNIT + ParameterColumns::AGE + 5;
         // Before a name is a stump, the range gives way: the window of a change has it.
         let is_narrow = wide < fixed + ParameterColumns::RANGE + short + 1 + ParameterColumns::LABEL.min(label);

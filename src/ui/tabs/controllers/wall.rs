@@ -120,7 +120,7 @@ fn card(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, selected: boo
     let room = end.saturating_sub(3 + text::width(&alarm) + 3);
     let name = format!(" {} ", fit(&device.name, room.saturating_sub(2)));
     let x = canvas.text(2, 0, &name, if selected { theme.focus() } else { theme.strong() });
-    let title = fit_words(&device.title, room.saturating_sub(x + 1));
+    let title = fit_words(of_plant(&device.title), room.saturating_sub(x + 1));
     if !title.is_empty() {
         canvas.text(x, 0, &format!(" {title} "), theme.normal());
     }

@@ -175,7 +175,7 @@ fn card(cx: &ViewContext, canvas: &mut Canvas, card: &Card, density: Density, se
     }
     let room = at.saturating_sub(width(&alarm) + 6);
     let x = canvas.text(2, 0, &format!(" {} ", fit(&device.name, room)), name);
-    let title = fit_words(&device.title, room.saturating_sub(x));
+    let title = fit_words(of_plant(&device.title), room.saturating_sub(x));
     if !title.is_empty() {
         canvas.text(x, 0, &format!("{title} "), theme.normal());
     }
@@ -239,7 +239,8 @@ fn rate_text(cx: &ViewContext, tag: TagId, series: &Series) -> String {
 /// The words for a tag, or its short name where they do not fit.
 fn label<'a>(cx: &ViewContext<'a>, tag: TagId, room: u16) -> &'a str {
     let def = cx.def().tag(tag);
-    if width(&def.label) <= room { &def.label } else { &def.short }
+    let label = of_plant(&def.label);
+    if width(label) <= room { label } else { &def.short }
 }
 
 #[cfg(test)]

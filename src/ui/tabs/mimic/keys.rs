@@ -48,7 +48,8 @@ fn hints(cx: &ViewContext) -> Vec<Hint> {
             Some(value) => right::needs(cx.def(), &CommandKind::Write { tag: command.tag, value: value.into() }),
             None => rights::to_write(cx, [command.tag]),
         };
-        Hint::new(command.key, &command.label, t!("{label} (asks first)", label = command.label)).needs(role)
+        let label = of_plant(&command.label);
+        Hint::new(command.key, label, t!("{label} (asks first)", label)).needs(role)
     });
     commands.chain([Hint::new("←↑↓→", t!("select"), t!("select an item"))]).collect()
 }

@@ -10,6 +10,7 @@ pub fn rows(cx: &ViewContext) -> Vec<AttentionRow> {
     let sequences = def.logic.sequences.iter().flat_map(|sequence| {
         let now = cx.snapshot.sample(sequence.step).good_value();
         let mark = |(number, name): &(i128, String)| {
+            let name = of_plant(name);
             let is_now = now == Some(*number as f64);
             if is_now { format!("{}{name}", cx.theme.pick("▸", ">")) } else { name.to_lowercase() }
         };

@@ -8,7 +8,7 @@ use crate::ui::tabs::prelude::*;
 pub fn rows(cx: &ViewContext, report: &ShiftReport) -> Vec<AttentionRow> {
     let name = |tag: &str| {
         let label = cx.def().tag_named(tag).map(|id| cx.def().tag(id).label.as_str()).unwrap_or_default();
-        if label.is_empty() { tag.to_owned() } else { translate(label).to_owned() }
+        if label.is_empty() { tag.to_owned() } else { of_plant(label).to_owned() }
     };
     let counted = |figures: &TagFigures| {
         figures.difference.filter(|counted| *counted > Exact::default())?;

@@ -90,7 +90,7 @@ fn draw_name(trends: &Trends, cx: &ViewContext, row: &mut Canvas, (n, pen): (usi
     }
     let style = if off { theme.dim() } else { theme.pen(n) };
     row.text(2, 0, if off { "-" } else { mark(theme, n) }, style);
-    let name = if row.width() >= 100 { format!("{}  {}", def.name, def.label) } else { def.name.clone() };
+    let name = if row.width() >= 100 { format!("{}  {}", def.name, of_plant(&def.label)) } else { def.name.clone() };
     row.text(4, 0, &fit(&name, room), if selected { theme.strong() } else { style });
     (style, off)
 }

@@ -49,7 +49,8 @@ pub(super) fn draw_numbers(trends: &Trends, cx: &ViewContext, canvas: &mut Canva
 fn number(cx: &ViewContext, canvas: &mut Canvas, tag: TagId) {
     let (theme, def) = (cx.theme, cx.def().tag(tag));
     let (quality, shown) = (cx.snapshot.sample(tag).quality, value::show(cx, tag));
-    let end = canvas.text(1, 0, &fit(&format!("{}  {}", def.name, def.label), canvas.width() / 2), theme.strong());
+    let end =
+        canvas.text(1, 0, &fit(&format!("{}  {}", def.name, of_plant(&def.label)), canvas.width() / 2), theme.strong());
     let of_tag = cx.snapshot.alarms.iter().filter(|alarm| cx.def().alarm(alarm.id).subject == Subject::Tag(tag));
     if let Some(alarm) = of_tag.min_by_key(|alarm| cx.def().alarm(alarm.id).priority) {
         let of = cx.def().alarm(alarm.id);

@@ -60,7 +60,7 @@ impl Trends {
 
     pub(super) fn name(&self, cx: &ViewContext) -> String {
         match (cx.def().trends.get(self.group), self.behind()) {
-            (Some(group), _) => group.name.clone(),
+            (Some(group), _) => of_plant(&group.name).to_owned(),
             (None, [tag]) => cx.def().tag(*tag).name.clone(),
             (None, _) => t!("marked").to_owned(),
         }

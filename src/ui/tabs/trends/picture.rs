@@ -344,8 +344,13 @@ fn legend(page: &mut Drawing, trends: &Trends, cx: &ViewContext, (n, pen): (usiz
         });
         format!("{}  {}", values.unwrap_or_default(), t!("good {share}", share = share(*good)))
     });
-    let text =
-        format!("{:<18} {:<10} {}   {}", def.name, axis(trends, cx, pen.tag), def.label, figures.unwrap_or_default());
+    let text = format!(
+        "{:<18} {:<10} {}   {}",
+        def.name,
+        axis(trends, cx, pen.tag),
+        of_plant(&def.label),
+        figures.unwrap_or_default()
+    );
     let text = text + &own.unwrap_or_default();
     page.text((PLOT.0 + 32.0, y), Anchor::Start, text, Ink::Text);
 }

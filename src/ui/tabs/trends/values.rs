@@ -14,7 +14,13 @@ impl Trends {
     pub(super) fn listed(&self, cx: &ViewContext) -> Vec<TagId> {
         let fits = |tag: &TagDef| {
             self.filter.is_empty()
-                || self.filter.fit(&format!("{} {} {}", tag.name, tag.label, cx.snapshot.unit(tag.id)))
+                || self.filter.fit(&format!(
+                    "{} {} {} {}",
+                    tag.name,
+                    tag.label,
+                    of_plant(&tag.label),
+                    cx.snapshot.unit(tag.id)
+                ))
         };
         cx.def().tags.iter().filter(|tag| tag.is_stored() && fits(tag)).map(|tag| tag.id).collect()
     }
@@ -120,7 +126,7 @@ pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas
         canvas.text_right(value, y, &text, shown.style);
         // What the value leaves is the label's.
         let room = value.saturating_sub(width(&text) + name + 4);
-        canvas.text(2 + name, y, &fit(&def.label, room), theme.dim());
+        canvas.text(2 + name, y, &fit(of_plant(&def.label), room), theme.dim());
         let Some(series) = hour(trends, *tag) else { continue };
         if let Some((min, _, max)) = series.summary.filter(|_| has_room && def.enum_labels.is_empty()) {
             for (end, value) in [(low, min), (high, max)] {

@@ -8,6 +8,7 @@ pub(crate) mod trend;
 pub(crate) mod unit;
 pub(crate) mod vessel;
 
+use crate::text::of_plant;
 use ratatui::style::Style;
 
 use super::text::Canvas;
@@ -129,18 +130,20 @@ pub fn title(cx: &ViewContext, item: &MimicItem) -> String {
         MimicItem::Vessel { label, .. }
         | MimicItem::Valve { label, .. }
         | MimicItem::Pump { label, .. }
-        | MimicItem::Sequence { label, .. } => label.clone(),
+        | MimicItem::Sequence { label, .. } => of_plant(label).to_owned(),
         MimicItem::Value { tag, .. }
         | MimicItem::Agitator { tag, .. }
         | MimicItem::Heater { tag, .. }
         | MimicItem::Bar { tag, .. }
-        | MimicItem::Trend { tag, .. } => cx.def().tag(*tag).label.clone(),
+        | MimicItem::Trend { tag, .. } => of_plant(&cx.def().tag(*tag).label).to_owned(),
         MimicItem::Controller { device, .. } => {
-            format!("{} {}", cx.def().device(*device).name, cx.def().device(*device).title)
+            format!("{} {}", cx.def().device(*device).name, of_plant(&cx.def().device(*device).title))
         }
         MimicItem::Pipe { .. } | MimicItem::Joint { .. } => String::new(),
-        MimicItem::Link { page, .. } => cx.def().mimic.pages.get(*page).map_or(String::new(), |page| page.name.clone()),
-        MimicItem::Text { text, .. } => text.clone(),
+        MimicItem::Link { page, .. } => {
+            cx.def().mimic.pages.get(*page).map_or(String::new(), |page| of_plant(&page.name).to_owned())
+        }
+        MimicItem::Text { text, .. } => of_plant(text).to_owned(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Panels beside the mimic: a controller with its bar, and a sequence with its steps.
 
 use crate::t;
+use crate::text::of_plant;
 use ratatui::style::Modifier;
 
 use super::{Bounds, alarm_mark, label_style, limits, put_value, unit::states};
@@ -144,6 +145,7 @@ impl Sequence<'_> {
         let now = cx.snapshot.sample(self.step).good_value();
         let (mut x, mut y) = (0, 0);
         for (number, name) in &cx.def().tag(self.step).enum_labels {
+            let name = of_plant(name);
             let present = now == Some(*number as f64);
             let text =
                 if present { format!("{}{name}", theme.pick("▸", ">")) } else { format!(" {}", name.to_lowercase()) };
