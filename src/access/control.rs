@@ -277,8 +277,16 @@ impl AccessControl {
             SessionRequest::Active => vec![requester.done(), Effect::SessionStatus(terminal)],
             SessionRequest::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
-                let new = Some(clean(&sha256).into());
-                self.record_and_reply(requester, RecordedAction::Export, &file, new, at)
+                match sha256 {
+                    Ok(sha256) => {
+                        let new = Some(clean(&sha256).into());
+                        self.record_and_reply(requester, RecordedAction::Export, &file, new, at)
+                    }
+                    Err(why) => {
+                        let outcome = format!("failed: {}", clean(&why));
+                        self.record_outcome(requester, RecordedAction::Export, &file, (None, &outcome), at)
+                    }
+                }
             }
             SessionRequest::Backup { folder } => self.begin_backup(requester, folder, at),
             SessionRequest::Import { file } => self.begin_import(requester, file, at),
@@ -334,9 +342,20 @@ impl AccessControl {
         new: Option<Arc<str>>,
         at: Timestamp,
     ) -> Vec<Effect> {
-        let Some(session) = self.sessions.get(&requester.terminal) else { return Vec::new() };
         // What becomes of a stop or a reload has an entry of the station behind it.
         let outcome = if new.is_some() { "done" } else { "permitted" };
+        self.record_outcome(requester, action, target, (new, outcome), at)
+    }
+
+    fn record_outcome(
+        &self,
+        requester: Requester,
+        action: RecordedAction,
+        target: &str,
+        (new, outcome): (Option<Arc<str>>, &str),
+        at: Timestamp,
+    ) -> Vec<Effect> {
+        let Some(session) = self.sessions.get(&requester.terminal) else { return Vec::new() };
         let record = ActionRecord { new, ..record(session, action, target, outcome, at) };
         vec![Effect::Record(record), requester.done()]
     }

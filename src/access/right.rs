@@ -300,7 +300,7 @@ mod tests {
             SessionRequest::Stop,
             SessionRequest::Reload,
         ];
-        let exported = SessionRequest::Exported { file: user.clone(), sha256: user };
+        let exported = SessionRequest::Exported { file: user.clone(), sha256: Ok(user) };
         assert!(own.iter().all(|request| needs_for_request(request).is_none()));
         assert!(supervisor.iter().all(|request| needs_for_request(request) == Some(Role::Supervisor)));
         assert_eq!(needs_for_request(&exported), Some(Role::Technician));

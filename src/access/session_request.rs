@@ -92,12 +92,12 @@ pub enum SessionRequest {
         /// The password.
         password: Secret,
     },
-    /// A terminal has written a file out of what the station holds.
+    /// A terminal writes a file out of what the station holds.
     Exported {
         /// Its name.
         file: String,
-        /// Its SHA-256, hexadecimal.
-        sha256: String,
+        /// Its SHA-256, hexadecimal; or why it could not be written, after that was on record.
+        sha256: Result<String, String>,
     },
     /// Write a backup of the history.
     Backup {

@@ -1,6 +1,7 @@
 //! Where a command reads the history: from the station while it runs, else from the file.
 
 use std::{
+    io,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -170,34 +171,43 @@ impl Source {
     /// Writes a file with what the history holds, `-` to standard output. The station has it recorded before anything is
     /// written, or refuses: an export needs a right.
     pub async fn export(&self, path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-        self.record_export(path, sha256(bytes)).await?;
-        let failed = CliError::io(format!("cannot write {}", path.display()));
-        if path.as_os_str() == "-" {
-            return put_out(bytes).map_err(failed);
+        let is_out = path.as_os_str() == "-";
+        let write = || if is_out { put_out(bytes) } else { write_for_user(path, bytes) };
+        self.write_recorded(path, sha256(bytes), write).await?;
+        if !is_out {
+            say(&path.display().to_string());
         }
-        write_for_user(path, bytes).map_err(failed)?;
-        say(&path.display().to_string());
         Ok(())
     }
 
     /// The same with a file that may be too large for the memory.
     pub async fn export_file(&self, path: &Path, from: &Path) -> Result<(), CliError> {
         let (_, sha256) = sync_and_hash(from).map_err(CliError::io(format!("cannot read {}", from.display())))?;
-        self.record_export(path, sha256).await?;
-        let failed = CliError::io(format!("cannot write {}", path.display()));
-        match path.as_os_str() == "-" {
-            true => put_out_file(from).map_err(failed),
-            false => copy_for_user(from, path).map_err(failed),
-        }
+        let write = || if path.as_os_str() == "-" { put_out_file(from) } else { copy_for_user(from, path) };
+        self.write_recorded(path, sha256, write).await
     }
 
-    async fn record_export(&self, path: &Path, sha256: String) -> Result<(), CliError> {
-        let Source::Station(session) = self else { return Ok(()) };
+    /// Writes once that is on record; what then fails is on record too.
+    async fn write_recorded(
+        &self,
+        path: &Path,
+        sha256: String,
+        write: impl FnOnce() -> io::Result<()>,
+    ) -> Result<(), CliError> {
         let file = path.display().to_string();
-        let exported = format!("exported to {file}");
-        let durability = session.request(SessionRequest::Exported { file, sha256 }).await?;
-        client::warn_not_recorded(&exported, durability);
-        Ok(())
+        let failed = CliError::io(format!("cannot write {file}"));
+        let Source::Station(session) = self else { return write().map_err(failed) };
+        let exported = SessionRequest::Exported { file: file.clone(), sha256: Ok(sha256) };
+        let durability = session.request(exported).await?;
+        let written = write();
+        match &written {
+            Ok(()) => client::warn_not_recorded(&format!("exported to {file}"), durability),
+            Err(error) => {
+                let failed = SessionRequest::Exported { file, sha256: Err(error.to_string()) };
+                session.request(failed).await?;
+            }
+        }
+        written.map_err(failed)
     }
 }
 

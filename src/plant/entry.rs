@@ -92,7 +92,7 @@ pub fn needs_confirmation(snapshot: &Snapshot, tag: TagId, value: Exact) -> bool
 pub fn rounded_text(snapshot: &Snapshot, tag: TagId, value: Exact) -> Option<String> {
     let rounded = snapshot.rounded_to_device(tag, value);
     let step = plain(snapshot.step(tag).into());
-    (!scale::is_held(value, rounded)).then(|| {
+    (!scale::is_held(snapshot.def.tag(tag), value, rounded)).then(|| {
         t!(
             "{format} → the resolution of the device is {step}: {plain}",
             format = snapshot.format(tag, value),
@@ -105,7 +105,7 @@ pub fn rounded_text(snapshot: &Snapshot, tag: TagId, value: Exact) -> Option<Str
 /// The number to send once [`rounded_text`] has been read: as the device will hold it.
 pub fn as_confirmed(snapshot: &Snapshot, tag: TagId, value: Exact) -> Exact {
     let rounded = snapshot.rounded_to_device(tag, value);
-    if scale::is_held(value, rounded) { value } else { rounded }
+    if scale::is_held(snapshot.def.tag(tag), value, rounded) { value } else { rounded }
 }
 
 /// Why a number that is allowed may still not be what its author meant.

@@ -1,7 +1,7 @@
 //! Raw numbers to values in engineering units and back.
 
 use super::{
-    exact::{Exact, PLAIN},
+    exact::{Exact, PLAIN, digits},
     half,
     number::{to_f32, to_u32},
     tag::{Encoding, TagDef},
@@ -66,9 +66,37 @@ pub fn rounded_to_device(tag: &TagDef, value: impl Into<Exact>, decimals: i8) ->
     to_raw(tag, value, decimals).map(|raw| to_value(tag, raw, decimals))
 }
 
-/// Does a device that holds the second number hold what was meant by the first? A single-precision register is as good as exact.
-pub fn is_held(value: Exact, held: Exact) -> bool {
-    value.rest().map_or_else(|| (held - value).near().abs() <= 1e-6 * value.near().abs().max(1.0), |_| held == value)
+/// Noise of the arithmetic of a scale, as a share of the greatest number in it.
+const NOISE: f64 = 1e-12;
+
+/// Does a device that holds the second number hold what was meant by the first? Whole numbers are as good as their scale; a
+/// floating-point one is as good as the digits that were given, or as those that its type always has.
+pub fn is_held(tag: &TagDef, value: Exact, held: Exact) -> bool {
+    if value.rest().is_some() {
+        return held == value;
+    }
+    let (value, held) = (value.near(), held.near());
+    let always = match (tag.point.kind.encoding(), tag.point.kind.words()) {
+        (Encoding::Float, 1) => 3,
+        (Encoding::Float, 2) => 6,
+        (Encoding::Float, _) => 15,
+        _ => return (held - value).abs() <= NOISE * value.abs().max(tag.offset.abs()).max(1.0),
+    };
+    let given = format!("{value:e}").bytes().take_while(|sign| *sign != b'e').filter(u8::is_ascii_digit).count();
+    let digits = given.max(always) - 1;
+    format!("{value:.digits$e}") == format!("{held:.digits$e}")
+}
+
+/// The bounds within which a tag can be written, in words: where none is stated, those of its type.
+pub fn bounds_text(tag: &TagDef, (min, max): Bounds, decimals: i8, shown: Option<u8>) -> (String, String) {
+    let of_type = tag.point.raw_range().map(|(low, high)| {
+        let [one, other] = [low, high].map(|raw| to_value(tag, Exact::whole(raw), decimals));
+        if one <= other { (one, other) } else { (other, one) }
+    });
+    let text = |bound: Option<Exact>, of_type: Option<Exact>, none: &str| {
+        bound.or(of_type).map_or(none.to_owned(), |bound| digits(bound, shown))
+    };
+    (text(min, of_type.map(|all| all.0), "−∞"), text(max, of_type.map(|all| all.1), "∞"))
 }
 
 /// The raw number to write for a value within bounds; `None` if the type cannot hold it, or if the value, or what the device
@@ -179,6 +207,50 @@ mod tests {
             assert_eq!(to_value(&tag, raw, decimals), value);
             assert_eq!(to_raw(&tag, value, decimals), Some(raw.into()));
         }
+    }
+
+    #[test]
+    fn a_number_is_held_that_no_digit_of_is_lost() {
+        let mut tag = fixture::plant().tags[0].clone();
+        for (kind, scale, value, is_held) in [
+            (DataType::U32, 10.0, 12_345_670.0, true),
+            (DataType::U32, 10.0, 12_345_675.0, false),
+            (DataType::U32, 0.3, 1_000_000.0, false),
+            (DataType::U32, 0.3, 999_999.9, true),
+            (DataType::U32, 0.1, 0.3, true),
+            (DataType::I16, 0.5, 72.3, false),
+            (DataType::Bcd32, 100.0, 12_345_600.0, true),
+            (DataType::Bcd32, 100.0, 12_345_601.0, false),
+            (DataType::F32, 1.0, 0.1, true),
+            (DataType::F32, 1.0, 9.96e9, true),
+            (DataType::F32, 1.0, 16_777_217.0, false),
+            (DataType::F32, 1.0, 123_456.789, true),
+            (DataType::F64, 1.0, 16_777_217.1, true),
+            (DataType::F16, 1.0, 0.1, true),
+            (DataType::F16, 1.0, 2_049.0, false),
+        ] {
+            (tag.point.kind, tag.scale) = (kind, scale);
+            let held = rounded_to_device(&tag, value, 0).expect("it fits");
+            assert_eq!(super::is_held(&tag, value.into(), held), is_held, "{kind:?} x{scale}: {value} as {held:?}");
+        }
+        (tag.point.kind, tag.scale, tag.offset) = (DataType::I16, 0.1, 273.15);
+        let held = rounded_to_device(&tag, 293.25, 0).expect("it fits");
+        assert!(super::is_held(&tag, 293.25.into(), held), "what scaling adds is no digit: {held:?}");
+    }
+
+    #[test]
+    fn bounds_that_are_not_stated_are_those_of_the_type() {
+        let mut tag = fixture::plant().tags[0].clone();
+        let mut check = |kind, scale, bounds: Bounds, min: &str, max: &str| {
+            (tag.point.kind, tag.scale, tag.offset) = (kind, scale, 0.0);
+            let words = bounds_text(&tag, bounds, 0, None);
+            assert_eq!((words.0.as_str(), words.1.as_str()), (min, max), "{kind:?}");
+        };
+        check(DataType::U16, 1.0, (None, None), "0", "65535");
+        check(DataType::I16, -0.5, (None, None), "-16383.5", "16384");
+        check(DataType::U16, 1.0, (Some(5.0.into()), None), "5", "65535");
+        check(DataType::Bcd16, 1.0, (None, Some(500.0.into())), "0", "500");
+        check(DataType::Bool, 1.0, (None, None), "0", "1");
     }
 
     #[test]

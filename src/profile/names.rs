@@ -236,7 +236,7 @@ pub(super) fn check_held(at: Span, value: Exact, tag: &TagDef, problems: &mut Pr
         problems.add(at, message).label("expected a value that its type can hold");
         return None;
     };
-    if matches!(tag.decimals, Decimals::Fixed(_)) && !scale::is_held(value, held) {
+    if matches!(tag.decimals, Decimals::Fixed(_)) && !scale::is_held(tag, value, held) {
         let message = format!("{} cannot hold {}", tag.name, digits(value, None));
         problems.add(at, message).label(format!("expected the next value that it can hold: {}", digits(held, None)));
     }

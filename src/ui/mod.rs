@@ -284,10 +284,16 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.tabs.of_mut(tab).on_log_failed(&why);
             Vec::new()
         }
-        Msg::Saved(Some(tab), result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
-        Msg::Saved(None, result) => {
-            screen_dump::on_saved(model, result);
-            Vec::new()
+        Msg::Saved(tab, result) => {
+            let failed = screen_dump::failed_export(&result);
+            let actions = match tab {
+                Some(tab) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
+                None => {
+                    screen_dump::on_saved(model, result);
+                    Vec::new()
+                }
+            };
+            failed.into_iter().chain(actions).collect()
         }
         Msg::Loaded(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_loaded(cx, result)),
         Msg::Undelivered(id, why) => {

@@ -45,7 +45,7 @@ impl SessionLock {
     /// The number of a request that goes out. 0 means no request: numbers start at 1.
     pub(super) fn next_request(&mut self, tab: Tab, request: &SessionRequest) -> u32 {
         self.last_request = self.last_request.checked_add(1).unwrap_or(1);
-        if matches!(request, SessionRequest::Exported { .. }) {
+        if matches!(request, SessionRequest::Exported { sha256: Ok(_), .. }) {
             self.exports.push((tab, self.last_request));
         }
         self.last_request

@@ -184,7 +184,7 @@ fn requests() -> Vec<SessionRequest> {
         SessionRequest::Disable { user: user("paul"), disabled: false },
         SessionRequest::ResetPassword { user: user("paul"), password: other() },
         SessionRequest::DeleteUser { user: user("paul") },
-        SessionRequest::Exported { file: user("shift.csv"), sha256: user("00") },
+        SessionRequest::Exported { file: user("shift.csv"), sha256: Ok(user("00")) },
         SessionRequest::Backup { folder: user(crate::support::sockets().join("backup").to_str().unwrap()) },
         SessionRequest::Import { file: user("samples.csv") },
         SessionRequest::Reload,

@@ -9,6 +9,7 @@ mod live;
 mod opening;
 mod poll;
 mod read;
+mod read_alone;
 mod read_before;
 mod read_modify_write;
 mod recheck;

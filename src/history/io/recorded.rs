@@ -151,6 +151,7 @@ pub(super) fn recorded_at(record: &Record) -> Option<i64> {
         Record::Alarm(alarm) => Some(alarm.at.as_microsecond()),
         // It ends then.
         Record::Line(minute) => Some(minute.at.as_microsecond() - 1),
-        Record::Action(_) | Record::Batch(_) | Record::Run(_) | Record::Report(_) | Record::ClockSet => None,
+        Record::Batch(batch) => Some(batch.at.as_microsecond()),
+        Record::Action(_) | Record::Run(_) | Record::Report(_) | Record::ClockSet => None,
     }
 }

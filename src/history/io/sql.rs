@@ -10,7 +10,8 @@ use crate::{
     history::tiers::Tier,
     plant::{
         command::{CommandKind, Outcome},
-        def::{ParquetVersion, ProcedureId},
+        def::{ParquetVersion, ProcedureId, TagId},
+        exact::Exact,
         line_minute::LineMinute,
         record::{ActionRecord, AlarmRecord},
         recorded_action::RecordedAction,
@@ -150,9 +151,11 @@ pub fn actions(order: &str) -> String {
 
 /// The corrections of counters in a span that were accepted, oldest first.
 pub fn corrections(epochs: &str) -> String {
+    let done = CommandKind::CorrectCounter { tag: TagId(0), amount: Exact::default() }.label();
+    // `verified` is what it was called before.
     format!(
         "SELECT {} FROM operator_action
-         WHERE action = ? AND outcome = 'verified' AND utc >= ? AND utc < ?{epochs} ORDER BY utc, rowid",
+         WHERE action = ? AND outcome IN ('{done}', 'verified') AND utc >= ? AND utc < ?{epochs} ORDER BY utc, rowid",
         ActionRecord::columns()
     )
 }

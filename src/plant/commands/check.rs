@@ -9,7 +9,7 @@ use crate::plant::{
     command::{CommandStatus, Outcome, Refusal, WriteId, WriteJob},
     commands::record::value_text,
     def::TagId,
-    exact::{Exact, digits},
+    exact::Exact,
     interlock,
     process_image::ProcessImage,
     sample::Quality,
@@ -24,7 +24,7 @@ use crate::plant::{
 const FRESH: Duration = Duration::from_secs(5);
 
 fn is_fresh(image: &ProcessImage, tag: TagId, at: Timestamp) -> bool {
-    elapsed(image.sample(tag).at, at) <= FRESH
+    !image.is_waiting(tag) && elapsed(image.sample(tag).at, at) <= FRESH
 }
 
 impl CommandTracker {
@@ -102,13 +102,12 @@ impl CommandTracker {
             return refuse(Refusal::Unknown("number of decimals".into()));
         };
         let Some(raw) = scale::raw_within(def, value, decimals, bounds) else {
-            let shown = Some(image.shown_decimals(def));
-            let text = |bound: Option<Exact>, none: &str| bound.map_or(none.into(), |bound| digits(bound, shown));
-            return refuse(Refusal::OutOfRange { min: text(bounds.0, "−∞"), max: text(bounds.1, "∞") });
+            let (min, max) = scale::bounds_text(def, bounds, decimals, Some(image.shown_decimals(def)));
+            return refuse(Refusal::OutOfRange { min: min.into(), max: max.into() });
         };
         // What makes safe is written as near as it can be; else only what was asked for is written.
         let held = scale::to_value(def, raw, decimals);
-        if origin != WriteOrigin::SafeState && !urgent && !scale::is_held(value, held) {
+        if origin != WriteOrigin::SafeState && !urgent && !scale::is_held(def, value, held) {
             return refuse(Refusal::Resolution(value_text(image, def, held)));
         }
         // What was read before the write under way says nothing about the time after it.

@@ -45,7 +45,10 @@ pub(super) fn record(def: &PlantDef, status: &CommandStatus, image: &ProcessImag
         CommandKind::AbortProcedure(id) => (RecordedAction::AbortProcedure, def.procedure(*id).name.to_string(), None),
         CommandKind::CorrectCounter { tag, amount } => {
             let tag = def.tag(*tag);
-            (RecordedAction::CorrectCounter, tag.name.clone(), Some(value_text(image, tag, *amount)))
+            // With all of its digits: it is counted as it stands here.
+            let unit = tag.unit_now(|tag| image.sample(tag));
+            let new = format!("{} {unit}", digits(*amount, None)).trim_end().to_owned();
+            (RecordedAction::CorrectCounter, tag.name.clone(), Some(new))
         }
         CommandKind::HandOver => (RecordedAction::HandOver, def.name.clone(), None),
         CommandKind::TakeOver => (RecordedAction::TakeOver, def.name.clone(), None),

@@ -176,11 +176,11 @@ fn unfit(
     };
     if let Some(raw) = scale::raw_within(tag, change.new, decimals, bounds) {
         let held = scale::to_value(tag, raw, decimals);
+        let is_held = scale::is_held(tag, change.new, held);
         let (tag, value) = (tag.short.clone(), change.new);
-        return (!scale::is_held(value, held)).then_some(Problem::Resolution { tag, value, held });
+        return (!is_held).then_some(Problem::Resolution { tag, value, held });
     }
-    let text = |bound: Option<Exact>, none: &str| bound.map_or(none.to_owned(), |bound| bound.to_string());
-    let (min, max) = (text(bounds.0, "−∞"), text(bounds.1, "∞"));
+    let (min, max) = scale::bounds_text(tag, bounds, decimals, None);
     Some(Problem::OutOfRange { tag: tag.short.clone(), value: change.new, min, max })
 }
 

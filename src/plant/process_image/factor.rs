@@ -44,6 +44,19 @@ impl ProcessImage {
         }
     }
 
+    /// A tag was read alone, for a write. What waits for its power of ten is no longer what is shown.
+    pub fn read_for_write(&mut self, tag: TagId, at: Timestamp) {
+        if let Some(waiting) = self.waiting[tag.index()] {
+            self.doubt(tag, Cause::NotReadBack, at);
+            self.waiting[tag.index()] = Some(waiting);
+        }
+    }
+
+    /// Was it read and is not shown yet, because the power of ten that scales it was not read since?
+    pub fn is_waiting(&self, tag: TagId) -> bool {
+        self.waiting[tag.index()].is_some()
+    }
+
     /// What these tags announce now to the tags that are scaled by them.
     fn announced_by(&self, tags: impl Iterator<Item = TagId>) -> Vec<(TagId, Option<i8>)> {
         let scaled = tags.flat_map(|tag| self.dependents[tag.index()].iter().map(move |of| (tag, *of)));
@@ -178,6 +191,21 @@ mod tests {
         image.read(&[(PV, 5.0)], at(5));
         image.read(&[(DP, -32_768.0)], at(5));
         assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::Unscaled), "not implemented any more");
+    }
+
+    #[test]
+    fn what_was_read_for_a_write_and_waits_is_not_shown_as_good() {
+        let mut image = image();
+        image.read(&[(SV, 50.0), (DP, 0.0)], at(1));
+        image.read(&[(SV, 60.0)], at(2));
+        assert_eq!((image.sample(SV), image.is_waiting(SV)), (Sample::good(50.0, at(1)), true), "as after any poll");
+        image.read_for_write(SV, at(2));
+        assert_eq!(image.sample(SV).quality, Quality::Uncertain(Cause::NotReadBack));
+        assert_eq!(image.good_raw(SV), None, "nothing to compare with");
+        image.read(&[(DP, 0.0)], at(3));
+        assert_eq!((image.sample(SV), image.is_waiting(SV)), (Sample::good(60.0, at(2)), false));
+        image.read_for_write(SV, at(3));
+        assert_eq!(image.sample(SV), Sample::good(60.0, at(2)), "nothing waits");
     }
 
     #[test]

@@ -43,12 +43,10 @@ impl Plant {
             WriteResult::NotRead(fault) | WriteResult::NoValidResponse(fault) => {
                 self.image.written(tag, Some(*fault), at)
             }
-            WriteResult::ReadBack(_)
-            | WriteResult::ReadBackAfterFault(..)
-            | WriteResult::Held(_)
-            | WriteResult::Refused(_)
-            | WriteResult::NotSent(_)
-            | WriteResult::Superseded => {}
+            WriteResult::ReadBack(_) | WriteResult::ReadBackAfterFault(..) | WriteResult::Held(_) => {
+                self.image.read_for_write(tag, at)
+            }
+            WriteResult::Refused(_) | WriteResult::NotSent(_) | WriteResult::Superseded => {}
         }
     }
 }

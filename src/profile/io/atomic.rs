@@ -16,11 +16,21 @@ use super::regular;
 ///
 /// A link stays a link, and what is no file, such as `/dev/null`, is written as it is.
 pub fn write_atomic(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
-    let path = &fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+    let path = &followed(path);
+    if is_no_file(path) {
         return fs::write(path, bytes);
     }
     write_placed(path, bytes, mode, |_, new| fs::rename(new, path)).map(drop)
+}
+
+/// The file that a link leads to.
+fn followed(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// Is there something that is neither a file nor a folder, such as `/dev/null` or a pipe?
+fn is_no_file(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
 }
 
 /// Writes and syncs a new file beside `path`, has `place` put it there by a rename or a link, and syncs the folder. On an
@@ -56,6 +66,10 @@ pub fn write_for_user(path: &Path, bytes: &[u8]) -> io::Result<()> {
 /// The same with the bytes of another file.
 pub fn copy_for_user(from: &Path, path: &Path) -> io::Result<()> {
     fs::create_dir_all(folder(path))?;
+    let path = &followed(path);
+    if is_no_file(path) {
+        return io::copy(&mut regular::open(from)?, &mut OpenOptions::new().write(true).open(path)?).map(drop);
+    }
     let new = beside(path);
     let copied =
         regular::copy(from, &new).and_then(|_| File::open(&new)?.sync_all()).and_then(|()| fs::rename(&new, path));
@@ -140,6 +154,8 @@ fn folder(path: &Path) -> &Path {
 mod tests {
     use std::os::unix::fs::PermissionsExt;
 
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+
     use super::*;
 
     #[test]
@@ -166,6 +182,19 @@ mod tests {
         write_atomic(&folder.path().join("link"), b"by the link", 0o640).unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "by the link");
         write_atomic(Path::new("/dev/null"), b"nothing", 0o640).unwrap();
+        // A copy follows the same rules: a link stays a link, and what is no file is written as it is.
+        copy_for_user(&path, &folder.path().join("link")).unwrap();
+        assert!(fs::symlink_metadata(folder.path().join("link")).unwrap().is_symlink());
+        let pipe = folder.path().join("pipe");
+        mknodat(CWD, &pipe, FileType::Fifo, Mode::from_raw_mode(0o600), 0).unwrap();
+        let reader = {
+            let pipe = pipe.clone();
+            std::thread::spawn(move || fs::read_to_string(pipe).unwrap())
+        };
+        copy_for_user(&path, &pipe).unwrap();
+        assert_eq!(reader.join().unwrap(), "by the link");
+        assert!(!fs::metadata(&pipe).unwrap().is_file());
+        fs::remove_file(&pipe).unwrap();
         assert!(!fs::metadata("/dev/null").unwrap().is_file(), "a device stays one");
         fs::create_dir(folder.path().join("taken")).unwrap();
         write_atomic(&folder.path().join("taken"), b"x", 0o640).unwrap_err();

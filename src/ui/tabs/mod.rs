@@ -59,7 +59,7 @@ struct Outgoing {
 impl Outgoing {
     fn export_request(&self) -> UiAction {
         let file = self.path.display().to_string();
-        UiAction::SessionRequest(self.tab, SessionRequest::Exported { file, sha256: sha256(&self.bytes) })
+        UiAction::SessionRequest(self.tab, SessionRequest::Exported { file, sha256: Ok(sha256(&self.bytes)) })
     }
     fn write(self) -> UiAction {
         UiAction::Do(Effect::SaveReport { tab: Some(self.tab), path: self.path, bytes: self.bytes, new: self.new })

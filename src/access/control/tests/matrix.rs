@@ -161,7 +161,7 @@ every!(requests: SessionRequest {
     SessionRequest::Disable { .. } => [true, false].map(|disabled| SessionRequest::Disable { user: "boss".into(), disabled }),
     SessionRequest::DeleteUser { .. } => [SessionRequest::DeleteUser { user: "boss".into() }],
     SessionRequest::ResetPassword { .. } => [SessionRequest::ResetPassword { user: "Boss".into(), password: "x".into() }],
-    SessionRequest::Exported { .. } => [SessionRequest::Exported { file: eve(), sha256: eve() }],
+    SessionRequest::Exported { .. } => [SessionRequest::Exported { file: eve(), sha256: Ok(eve()) }],
     SessionRequest::Backup { .. } => [SessionRequest::Backup { folder: eve() }],
     SessionRequest::Import { .. } => [SessionRequest::Import { file: eve() }],
     SessionRequest::Stop => [SessionRequest::Stop],

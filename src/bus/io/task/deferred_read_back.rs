@@ -4,10 +4,7 @@ use std::time::Duration;
 
 use jiff::{SignedDuration, Timestamp};
 
-use super::{
-    LinkExit, Task,
-    read::{held_by, read_alone},
-};
+use super::{LinkExit, Task, read::held_by};
 use crate::{
     bus::{
         backoff::Backoff,
@@ -89,7 +86,7 @@ impl Task<'_> {
         let response_time = link.last.as_ref().and_then(|exchange| exchange.response_time);
         let known = response_time.filter(|response_time| *response_time > Duration::ZERO);
         schedule.answered(None, tag.device, known, at);
-        self.publish(read_alone(link, tag, &held, at)).await?;
+        self.publish_alone(link, tag, &held).await?;
         let write = self.unconfirmed.remove(index);
         let result = match write.result {
             WriteResult::NoValidResponse(fault) => WriteResult::ReadBackAfterFault(fault, held),

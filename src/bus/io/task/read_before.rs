@@ -1,9 +1,6 @@
 //! Reading a tag before it is written, where what its author saw was read long ago.
 
-use super::{
-    LinkExit, Task,
-    read::{held_by, read_alone},
-};
+use super::{LinkExit, Task, read::held_by};
 use crate::{
     bus::{
         io::link::{Link, LinkError},
@@ -40,7 +37,7 @@ impl Task<'_> {
             None => return Ok(None),
         };
         let Some(held) = held else { return ended(Fault::NotANumber) };
-        self.publish(read_alone(link, tag, &held, self.clock.now())).await?;
+        self.publish_alone(link, tag, &held).await?;
         let is = |other: &TagValue| match (&held, other) {
             (TagValue::Number(held), TagValue::Number(other)) => scale::same_raw(tag, *held, *other),
             (held, other) => held == other,

@@ -1,10 +1,6 @@
 //! Writing: once, read back, never repeated.
 
-use super::{
-    LinkExit, Task,
-    read::{held_by, read_alone},
-    read_before::ReadBefore,
-};
+use super::{LinkExit, Task, read::held_by, read_before::ReadBefore};
 use crate::{
     bus::{
         codec,
@@ -118,7 +114,7 @@ impl Task<'_> {
     ) -> Result<(), LinkExit> {
         match result {
             WriteResult::ReadBack(held) => {
-                self.publish(read_alone(link, tag, held, self.clock.now())).await?;
+                self.publish_alone(link, tag, held).await?;
             }
             // The value is unknown until it is read again.
             WriteResult::NotRead(_) | WriteResult::Accepted | WriteResult::Sent | WriteResult::NoValidResponse(_) => {

@@ -1,7 +1,7 @@
 //! Writes: sent once, read back, and stops that wait for nothing but the transaction under way.
 
 use super::*;
-use crate::plant::tag_value::TagValue;
+use crate::plant::{tag::Decimals, tag_value::TagValue};
 
 /// Writes register 10 := 10 (so that the read-back fits the address rule) and gives result and number of writes on the wire.
 async fn write(action: SlaveAction, read_back: SlaveAction) -> (WriteResult, usize) {
@@ -71,6 +71,37 @@ async fn what_was_seen_long_ago_is_read_before_it_is_written_over() {
             let result = line.write_over(&def, raw, true, Some(seen.into())).await;
             assert_eq!((result, writes.load(Ordering::Relaxed)), expect, "{mode:?}: {raw} over {seen}");
         }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_power_of_ten_is_read_again_with_what_was_written() {
+    for mode in Mode::ALL {
+        let mut def = plant(mode);
+        def.tags[0].decimals = Decimals::PowerFrom(TagId(1));
+        let mut line = line(def.clone());
+        line.plug(mode, |_, _| SlaveAction::Answer);
+        line.read(&def).await;
+        let job = WriteJob {
+            id: WriteId(7),
+            tag: TagId(0),
+            raw: TagValue::Number(10.0.into()),
+            unlock: None,
+            verify: true,
+            urgent: false,
+            over: None,
+        };
+        line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
+        let mut alone = Vec::new();
+        let of_event = |event: &Event| {
+            match event {
+                Event::Read { values, .. } if values.len() == 1 => alone.push(values[0].0),
+                _ => {}
+            }
+            matches!(event, Event::Wrote { .. }).then_some(())
+        };
+        line.until(&def, of_event).await;
+        assert!(alone.ends_with(&[TagId(0), TagId(1)]), "{mode:?}: {alone:?}");
     }
 }
 

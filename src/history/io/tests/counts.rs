@@ -11,7 +11,6 @@ use crate::plant::recorded_action::RecordedAction;
 use crate::{
     plant::{
         batch::{BatchDef, BatchEvent, BatchRecord},
-        command::Outcome,
         control_run::{ControlRun, Figure, RunCause, RunDef, RunState},
         counter::CounterEvent,
         def::DeviceId,
@@ -243,24 +242,23 @@ fn batches_and_runs_over_a_change_of_shift_count_in_parts() {
 fn a_correction_counts_in_the_period_in_which_it_is_entered() {
     let (_folder, db) = folder();
     let store = Store::open(&db, &def(), sec(0)).unwrap().store;
-    let correction = |at, new: &str, outcome: Outcome| {
-        let outcome = outcome.to_string();
-        let action = ActionRecord::new(sec(at), "anna", RecordedAction::CorrectCounter, "TIC-1.PV", outcome.as_str());
+    let correction = |at, new: &str, outcome: &str| {
+        let action = ActionRecord::new(sec(at), "anna", RecordedAction::CorrectCounter, "TIC-1.PV", outcome);
         Record::Action(ActionRecord { new: Some(new.into()), note: Some("new meter".into()), ..action })
     };
     let mut records = samples(|at| Some(plain(at)), 2 * DAY_S);
-    records.push(correction(DAY_S + 100, "12 °C", Outcome::Verified));
-    records.push(correction(DAY_S + 200, "-2 °C", Outcome::Verified));
-    records.push(correction(DAY_S + 300, "99 °C", Outcome::Pending));
+    records.push(correction(DAY_S + 100, "12.25 °C", "done"));
+    records.push(correction(DAY_S + 200, "-2 °C", "verified"));
+    records.push(correction(DAY_S + 300, "99 °C", "refused: this is for a supervisor"));
     store.append(&records).unwrap();
     let [before, with] = [report(&store, 3_600, DAY_S), report(&store, DAY_S, 2 * DAY_S - 300)];
     assert_eq!(counted(&before, PV), STEP * 276.0);
-    assert_eq!(counted(&with, PV), STEP * 287.0 + 10.0);
+    assert_eq!(counted(&with, PV), STEP * 287.0 + 10.25);
     let rows: Vec<_> =
         with.counters.iter().map(|row| (row.step.event, row.step.counted.near(), row.note.as_str())).collect();
     assert_eq!(
         rows,
-        [(CounterEvent::Corrected, 12.0, "anna: new meter"), (CounterEvent::Corrected, -2.0, "anna: new meter")]
+        [(CounterEvent::Corrected, 12.25, "anna: new meter"), (CounterEvent::Corrected, -2.0, "anna: new meter")]
     );
 }
 

@@ -90,6 +90,25 @@ fn batches_and_runs_are_right_where_the_clock_was_set_back() {
 }
 
 #[test]
+fn a_batch_that_changes_after_the_last_sample_of_an_epoch_is_of_it() {
+    let (_folder, db) = folder();
+    let store = Store::open(&db, &making(), sec(0)).unwrap().store;
+    let batch = |at: Timestamp, place, event| {
+        Record::Batch(BatchRecord { at, batch: "soup".into(), number: 1, place, event, phase: None })
+    };
+    let samples = |from: i64, to: i64| (from..=to).step_by(10).map(|at| good(PV, at, 1.0));
+    // Samples are stored by the millisecond: it begins 0.9 ms after the last one, then the clock is set back by an hour.
+    let begin = Timestamp::from_microsecond(7_200_000_900).unwrap();
+    let mut records: Vec<Record> = samples(6_000, 7_200).collect();
+    records.extend([batch(begin, 0, BatchEvent::Started), Record::ClockSet]);
+    records.extend(samples(3_600, 3_700));
+    records.push(batch(sec(3_630), 1, BatchEvent::Ended));
+    store.append(&records).unwrap();
+    let all = report(&store, 0, 10_000);
+    assert_eq!(all.batches[0].batch.lasted.as_secs(), 30, "{:?}", all.batches[0].batch);
+}
+
+#[test]
 fn a_doubled_hour_is_counted_where_its_samples_are_deleted() {
     let rule = HistoryDef { keep_samples_days: Some(7), ..HistoryDef::default() };
     let def = Arc::new(PlantDef { history: rule, ..PlantDef::clone(&making()) });

@@ -115,7 +115,7 @@ fn a_write_is_recorded_with_the_value_that_the_device_holds() {
     let mut plant = in_steps(100.0);
     let effects = plant.on_command(shown(&plant, 1, SV, 72.3), at(1));
     assert_eq!((&*action_of(&effects).outcome, effects.bus.len()), ("refused: the device would store 72.5 °C", 0));
-    let effects = plant.on_command(shown(&plant, 1, SV, 72.500_000_1), at(1));
+    let effects = plant.on_command(shown(&plant, 1, SV, 72.500_000_000_000_1), at(1));
     let BusRequest::Write(WriteJob { id, raw, .. }) = effects.bus[0].1.clone() else { panic!("a write was requested") };
     assert_eq!(raw, 145.0.into(), "72.5 °C goes out");
     assert_eq!(

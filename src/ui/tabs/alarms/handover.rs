@@ -235,6 +235,7 @@ fn doubtful(cx: &ViewContext) -> Vec<String> {
     bad.into_iter().take(NAMED).chain(more).chain(stale).collect()
 }
 
+/// What is on record is English, whatever the language of the screen.
 fn is_failed(row: &ActionRecord) -> bool {
-    [t!("refused"), t!("not confirmed"), t!("failed")].iter().any(|word| row.outcome.starts_with(word))
+    ["refused", "not confirmed", "failed"].iter().any(|word| row.outcome.starts_with(word))
 }

@@ -8,8 +8,10 @@ use crate::{
         alarm::manager::subject_name,
         def::AlarmDef,
         record::{ActionRecord, AlarmRecord},
+        recorded_action::RecordedAction,
     },
     report::Period,
+    text::recorded,
     ui::layout::Size,
 };
 
@@ -279,9 +281,9 @@ pub fn action_text(cx: &ViewContext, row: &ActionRecord) -> String {
         "  {dot}  {pad} {action} {change}{outcome} by {by}{note}",
         dot,
         pad = pad(&row.target, 12),
-        action = row.action,
+        action = RecordedAction::translated(&row.action),
         change,
-        outcome = row.outcome,
+        outcome = recorded(&row.outcome),
         by = row.by,
         note
     )

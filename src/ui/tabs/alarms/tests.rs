@@ -2,6 +2,7 @@
 
 mod actions;
 mod columns;
+mod languages;
 mod steps;
 
 use std::{collections::HashSet, sync::Arc, time::Duration};

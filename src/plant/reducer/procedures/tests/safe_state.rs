@@ -251,6 +251,22 @@ fn what_the_device_would_round_is_no_step_but_is_safe() {
 }
 
 #[test]
+fn a_safe_state_is_sent_over_what_was_only_read_back() {
+    // SV is scaled by a power of ten that was not read since it was written.
+    let mut def = def();
+    let sv = &mut def.tags[SV.index()];
+    (sv.decimals, sv.quality_from, sv.min, sv.max) = (Decimals::PowerFrom(DP), None, None, None);
+    def.procedures[0].steps = vec![ProcedureStep::Write { tag: SV, value: 500.0 }, ProcedureStep::Hold(LIMIT)];
+    def.procedures[0].safe = vec![(SV, 2000.0)];
+    let mut plant = plant_of(def);
+    let started = start(&mut plant);
+    assert_eq!(written(&started), [(SV, 50.0)]);
+    end(&mut plant, &started, 2, WriteResult::ReadBack);
+    let aborted = command(&mut plant, 2, CommandKind::AbortProcedure(HEAT), 3);
+    assert_eq!(written(&aborted), [(SV, 200.0)], "2000 was read before the write");
+}
+
+#[test]
 fn a_safe_state_is_written_over_whatever_the_device_holds() {
     let over = |effects: &Effects| -> Vec<(TagId, Option<TagValue>)> {
         let job = |(_, request): &(_, BusRequest)| match request {
