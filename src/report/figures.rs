@@ -124,6 +124,8 @@ pub struct EventLeg {
     pub suppressing: Vec<AlarmRecord>,
     /// The events in it, in order.
     pub events: Vec<AlarmRecord>,
+    /// What of it never was: a clock was set forward over it.
+    pub skipped: Vec<(Timestamp, Timestamp)>,
 }
 
 impl EventLeg {
@@ -140,7 +142,8 @@ pub fn times_in_alarm(legs: &[EventLeg]) -> HashMap<&str, Duration> {
         let mut by_subject: HashMap<&str, Vec<&AlarmRecord>> = HashMap::new();
         leg.all().for_each(|event| by_subject.entry(&event.subject).or_default().push(event));
         for (subject, events) in by_subject {
-            *times.entry(subject).or_default() += time_in_alarm(events.into_iter(), leg.from, leg.until);
+            *times.entry(subject).or_default() +=
+                time_in_alarm(events.into_iter(), (leg.from, leg.until), &leg.skipped);
         }
     }
     times
@@ -149,7 +152,7 @@ pub fn times_in_alarm(legs: &[EventLeg]) -> HashMap<&str, Duration> {
 /// The alarms that were active while they were not annunciated, of all parts of a period.
 pub fn suppressed_in(legs: &[EventLeg]) -> Vec<SuppressedSummary> {
     let mut all: Vec<SuppressedSummary> = Vec::new();
-    for EventLeg { from, until, active, suppressing, events } in legs {
+    for EventLeg { from, until, active, suppressing, events, .. } in legs {
         for found in suppressed(active, suppressing, events, *from, *until) {
             let is_same =
                 |other: &&mut SuppressedSummary| (&other.subject, &other.message) == (&found.subject, &found.message);
@@ -233,14 +236,23 @@ pub fn not_responding<'a>(
 
 /// Time within `from..until` in which at least one alarm of a subject was active. The events are all of this subject, in
 /// order, and begin with those of the alarms that were active at `from`; an alarm still active at the end counts to the end.
-pub fn time_in_alarm<'a>(events: impl Iterator<Item = &'a AlarmRecord>, from: Timestamp, until: Timestamp) -> Duration {
+/// Nothing counts that lies in the `skipped` spans.
+pub fn time_in_alarm<'a>(
+    events: impl Iterator<Item = &'a AlarmRecord>,
+    (from, until): (Timestamp, Timestamp),
+    skipped: &[(Timestamp, Timestamp)],
+) -> Duration {
+    let lasted = |from: Timestamp, to: Timestamp| {
+        let within = skipped.iter().map(|(begin, end)| elapsed(from.max(*begin), to.min(*end)));
+        elapsed(from, to).saturating_sub(within.sum())
+    };
     let mut active: HashSet<&str> = HashSet::new();
     let mut since = from;
     let mut total = Duration::ZERO;
     for event in events.filter(|event| event.at < until) {
         let at = event.at.max(since);
         if !active.is_empty() {
-            total += elapsed(since, at);
+            total += lasted(since, at);
         }
         since = at;
         match event.event.active() {
@@ -250,7 +262,7 @@ pub fn time_in_alarm<'a>(events: impl Iterator<Item = &'a AlarmRecord>, from: Ti
         }
     }
     if !active.is_empty() {
-        total += elapsed(since, until);
+        total += lasted(since, until);
     }
     total
 }

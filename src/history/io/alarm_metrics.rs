@@ -138,7 +138,9 @@ impl Store {
             active.iter_mut().chain(&mut suppressing).for_each(|event| event.at = event.at.min(from));
             let sql = sql::journal(&epochs.condition(), sql::OLDEST);
             let events = self.whole_list(&sql, params![utc(begin), utc(end), ROWS_MAX + 1], AlarmRecord::read)?;
-            all.push(EventLeg { from, until, active, suppressing, events });
+            let of_clock = self.pauses(from, until)?.into_iter().filter(|(.., is_of_clock)| *is_of_clock);
+            let skipped = of_clock.map(|(begin, end, _)| (begin, end)).collect();
+            all.push(EventLeg { from, until, active, suppressing, events, skipped });
         }
         Ok(all)
     }

@@ -164,9 +164,13 @@ fn minutes_in_alarm_are_counted_once_where_alarms_overlap() {
         (vec![step(90, "high", Raised), step(150, "high", ReturnedToNormal)], 10),
         (vec![step(110, "high", Raised)], 0),
     ] {
-        let got = time_in_alarm(steps.iter(), sec(0), sec(100));
+        let got = time_in_alarm(steps.iter(), (sec(0), sec(100)), &[]);
         assert_eq!(got, Duration::from_secs(expect), "{steps:?}");
     }
+    // A clock was set forward over 20 s of it, and over 10 s before it.
+    let steps = [step(10, "high", Raised), step(60, "high", ReturnedToNormal)];
+    let got = time_in_alarm(steps.iter(), (sec(0), sec(100)), &[(sec(-5), sec(5)), (sec(30), sec(50))]);
+    assert_eq!(got, Duration::from_secs(30));
 }
 
 #[test]

@@ -143,8 +143,12 @@ impl Listing for UserList {
     type Row = UserRow;
     type Id = Arc<str>;
 
-    fn heading<'a>(&self, _cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
-        Heading::new(t!("Users"), t!("No users: a demonstration needs no login."))
+    fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
+        let none = match cx.def().access.trusted.as_slice() {
+            [] => t!("No users: a demonstration needs no login."),
+            _ => t!("No users with a password: the plant file trusts users of this computer. n adds one"),
+        };
+        Heading::new(t!("Users"), none)
     }
 
     fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, UserRow>> {

@@ -159,6 +159,23 @@ fn beyond_retention_a_report_says_so_and_edges_keep_their_share() {
 }
 
 #[test]
+fn what_a_clock_was_set_forward_over_is_no_time_in_alarm() {
+    let (_folder, db) = folder();
+    let store = open(&db, 0);
+    let minutes = |from: i64, to: i64| (from..to).map(|minute| good(PV, 60 * minute, 1.0));
+    let event = |minute: i64, event| Record::Alarm(step(60 * minute, "high", event));
+    let mut records: Vec<Record> = minutes(0, 10).collect();
+    records.extend([event(8, AlarmEvent::Raised), Record::ClockSet]);
+    records.extend(minutes(70, 80));
+    records.push(event(72, AlarmEvent::ReturnedToNormal));
+    store.append(&records).unwrap();
+    let report = report(&store, 0, 4_800);
+    let of = report.tags.iter().find(|figures| figures.tag == "TIC-1.PV").expect("it is in the report");
+    // From minute 8 to the last sample before the step, and from the first one after it.
+    assert_eq!(of.in_alarm.as_secs(), 60 + 120);
+}
+
+#[test]
 fn a_clock_that_is_set_forward_is_no_station_that_was_off() {
     let (_folder, db) = folder();
     let store = open(&db, 0);
