@@ -79,7 +79,6 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
     let named = tags(&def, &args.tags);
     args.history.refuse_own_file(&def, &args.out)?;
     let (source, period) = args.history.open(&def).await?;
-    let to = period.to.min(source.now());
     if args.raw {
         let csv = args.csv.dialect(&def);
         let format = if args.format == "parquet" { Format::Parquet } else { Format::Csv(csv) };
@@ -90,13 +89,13 @@ async fn write(def: Arc<PlantDef>, args: Args) -> Result<(), CliError> {
                 return Err(named.err().unwrap_or_else(unexpected));
             }
         }
-        let sql = raw(&args.tags, (period.from, to), format);
+        let sql = raw(&args.tags, (period.from, period.to), format);
         return tables.export(&source, &sql, format, &args.out, RAW_TIME_MAX).await;
     }
     if args.format != "csv" {
         return Err(CliError::Usage("--format parquet needs --raw: found values at an interval".to_owned()));
     }
-    let tags = named?;
+    let (tags, to) = (named?, period.to.min(source.now()));
     let rows = rows(period.from, to, args.every, tags.len())?;
     let latest = latest(&source, &def, &tags, period.from, to).await?;
     let (mut progress, mut done) = (Progress::new((rows * tags.len()) as u64), 0);
