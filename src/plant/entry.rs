@@ -137,7 +137,10 @@ pub fn warnings(snapshot: &Snapshot, tag: TagId, value: Exact) -> Vec<String> {
             )
         })
     });
-    large.into_iter().chain(limits).collect()
+    let def = snapshot.def.tag(tag);
+    let raw = scale::to_raw(def, value, snapshot.scaling_decimals(tag)).filter(|raw| def.is_bad(*raw));
+    let bad = raw.map(|_| t!("! by this number the device says that it has no value").to_owned());
+    bad.into_iter().chain(large).chain(limits).collect()
 }
 
 /// The permitted range in words.

@@ -3,6 +3,7 @@
 use super::*;
 use crate::{
     plant::{
+        bad_span::BadSpan,
         sample::{Cause, Sample},
         tag::Bound,
     },
@@ -83,4 +84,19 @@ fn a_large_step_or_a_set_value_at_an_alarm_limit_is_asked_again() {
     assert!(again && why[0].contains("at the alarm limit of TIC-1.PV temperature high (72.0 °C)"), "{why:?}");
     let (_, why) = asked(73.0);
     assert!(why[0].contains("beyond the alarm limit of TIC-1.PV"), "{why:?}");
+}
+
+#[test]
+fn a_number_that_means_no_value_is_asked_again() {
+    let mut fixture = Fixture::normal();
+    let sv = fixture.tag("TIC-1.SV");
+    let raw = Exact::from(650.0);
+    fixture.def.tags[sv.index()].bad_if = vec![BadSpan { first: raw, last: raw }];
+    let asked = |value: f64| {
+        with_cx(&fixture.snapshot(), |cx| {
+            (needs_confirmation(cx, sv, value.into()), entry::warnings(cx.snapshot, sv, value.into()))
+        })
+    };
+    assert_eq!(asked(64.9), (false, Vec::new()));
+    assert_eq!(asked(65.0), (true, vec!["! by this number the device says that it has no value".to_owned()]));
 }
