@@ -262,7 +262,7 @@ async fn unarchived(
 }
 
 async fn journal(source: &Source) -> Result<Vec<AlarmRecord>, CliError> {
-    let (mut all, mut to) = (Vec::new(), Timestamp::MAX);
+    let (mut all, mut to) = (Vec::new(), end(source));
     loop {
         let query = Query::Journal { from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
         let Answer::Journal(page) = source.query(query).await? else { return Err(unexpected()) };
@@ -272,7 +272,7 @@ async fn journal(source: &Source) -> Result<Vec<AlarmRecord>, CliError> {
 }
 
 async fn actions(source: &Source) -> Result<Vec<ActionRecord>, CliError> {
-    let (mut all, mut to) = (Vec::new(), Timestamp::MAX);
+    let (mut all, mut to) = (Vec::new(), end(source));
     loop {
         let query = Query::Actions { from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
         let Answer::Actions(page) = source.query(query).await? else { return Err(unexpected()) };
@@ -283,7 +283,7 @@ async fn actions(source: &Source) -> Result<Vec<ActionRecord>, CliError> {
 
 /// All batches, newest first, page by page; those that began at the begin of the last one of a page come again.
 async fn batches(source: &Source) -> Result<Vec<Batch>, CliError> {
-    let (mut all, mut to) = (Vec::<Batch>::new(), Timestamp::MAX);
+    let (mut all, mut to) = (Vec::<Batch>::new(), end(source));
     loop {
         let query = Query::Batches { from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
         let Answer::Batches(page) = source.query(query).await? else { return Err(unexpected()) };
@@ -303,13 +303,18 @@ async fn batches(source: &Source) -> Result<Vec<Batch>, CliError> {
 
 /// All control runs, newest first, page by page; those that began at the begin of the last one of a page come again.
 async fn control_runs(source: &Source) -> Result<Vec<ControlRun>, CliError> {
-    let (mut all, mut to) = (Vec::new(), Timestamp::MAX);
+    let (mut all, mut to) = (Vec::new(), end(source));
     loop {
         let query = Query::ControlRuns { controller: None, from: Timestamp::UNIX_EPOCH, to, limit: PAGE };
         let Answer::ControlRuns(page) = source.query(query).await? else { return Err(unexpected()) };
         let Some(next) = add_page(&mut all, page, |run| run.from) else { return Ok(all) };
         to = next;
     }
+}
+
+/// Later than what any clock has stored.
+fn end(source: &Source) -> Timestamp {
+    source.now().checked_add(Duration::from_secs(100 * 365 * 86_400)).unwrap_or(Timestamp::MAX)
 }
 
 /// Adds a page of a list that comes newest first. Returns where the next one ends: what happened at the oldest instant of a
