@@ -58,3 +58,18 @@ fn a_backup_is_on_record_before_it_and_after_it() {
         assert_eq!(bench.access.on_history_job_done(ticket, done, bench.now), [], "once");
     }
 }
+
+#[test]
+fn an_export_that_failed_after_it_was_on_record_is_too() {
+    let mut bench = Bench::new(AccessDef::default());
+    bench.open(1, "10.0.0.1");
+    bench.login(1, "boss", BOSS).unwrap();
+    for (sha256, new, outcome) in [(Ok("5f"), Some("5f"), "done"), (Err("disk full"), None, "failed: disk full")] {
+        let sha256 = sha256.map(str::to_owned).map_err(str::to_owned);
+        let request = SessionRequest::Exported { file: "/shift.csv".into(), sha256 };
+        let effects = bench.access.on_request(1, 70, request, bench.now);
+        let [Effect::Record(entry), Effect::Reply(70, Ok(()))] = &effects[..] else { panic!("{effects:?}") };
+        assert_eq!((&*entry.action, &*entry.target, entry.new.as_deref()), ("export", "/shift.csv", new));
+        assert_eq!(&*entry.outcome, outcome);
+    }
+}
