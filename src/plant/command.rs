@@ -3,7 +3,10 @@
 mod bus_request;
 mod refusal;
 
-use crate::{t, text::translate};
+use crate::{
+    t,
+    text::{file, translate},
+};
 use std::{fmt, sync::Arc};
 
 use jiff::Timestamp;
@@ -287,6 +290,15 @@ impl Outcome {
             Outcome::NotConfirmed(_) => "not confirmed",
             Outcome::Failed(_) => "failed",
         }
+    }
+
+    /// Was an action with this outcome on record refused, or is it not known to have had its effect? What a device accepts and never
+    /// shows has not failed. What is on record is English, whatever the language of a screen.
+    pub fn is_failure(recorded: &str) -> bool {
+        let unread = Outcome::NotConfirmed(NotConfirmed::NoReadBack);
+        let words =
+            [Outcome::Refused(Refusal::ReadOnly).label(), Outcome::Failed(Fault::Timeout).label(), unread.label()];
+        words.iter().any(|word| recorded.starts_with(word)) && !recorded.starts_with(&file(|| unread.to_string()))
     }
 }
 

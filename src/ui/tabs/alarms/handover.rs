@@ -3,7 +3,7 @@
 use super::{journal::action_text, metrics::stale, span};
 use crate::ui::tabs::prelude::*;
 use crate::{
-    plant::{line_state::LineState, record::ActionRecord, recorded_action::RecordedAction},
+    plant::{command::Outcome, line_state::LineState, record::ActionRecord, recorded_action::RecordedAction},
     report::Period,
     ui::modal::{faceplate::device_text, reason::subject},
 };
@@ -100,8 +100,8 @@ impl Handover {
                 let rows = actions.iter().filter(|row| from <= row.at && keep(row));
                 folded(cx, rows.map(|row| (row.at, action_text(cx, row).trim_start().to_owned())))
             };
-            section(t!("failed in this shift"), of(|row| is_failed(row) && ActionRecord::changes_plant(row)), true);
-            section(t!("changed in this shift"), of(|row| !is_failed(row) && ActionRecord::changes_plant(row)), false);
+            section(t!("failed in this shift"), of(|row| has_failed(row) && ActionRecord::changes_plant(row)), true);
+            section(t!("changed in this shift"), of(|row| !has_failed(row) && ActionRecord::changes_plant(row)), false);
             if actions.len() >= ROWS {
                 section(t!("the oldest actions are omitted"), Vec::new(), true);
             }
@@ -114,7 +114,7 @@ impl Handover {
         let theme = cx.theme;
         let when = |row: &ActionRecord| moment(row.at, cx.now, &cx.def().time_zone);
         let actions = self.actions.value.as_deref().unwrap_or_default();
-        let note = actions.iter().enumerate().find(|(_, row)| row.is(RecordedAction::HandOver) && !is_failed(row));
+        let note = actions.iter().enumerate().find(|(_, row)| row.is(RecordedAction::HandOver) && !has_failed(row));
         let Some((n, note)) = note else {
             let answered = self.actions.value.is_some();
             let words = if answered { t!("No handover recorded for this shift or the one before.") } else { "" };
@@ -123,7 +123,7 @@ impl Handover {
         let mut lines = vec![(t!("handed over {when} by {by}", when = when(note), by = note.by), theme.strong())];
         let text = note.note.as_deref().unwrap_or(t!("without a note"));
         lines.extend(wrap(text, room).into_iter().map(|line| (format!("  {line}"), theme.normal())));
-        let taken = actions[..n].iter().rev().find(|row| row.is(RecordedAction::TakeOver) && !is_failed(row));
+        let taken = actions[..n].iter().rev().find(|row| row.is(RecordedAction::TakeOver) && !has_failed(row));
         lines.push(match taken {
             Some(row) => (t!("taken over {when} by {by}", when = when(row), by = row.by), theme.strong()),
             None if is_own(cx, note) => {
@@ -137,7 +137,7 @@ impl Handover {
     /// Did the current user hand over, with no take-over since?
     pub fn is_own(&self, cx: &ViewContext) -> bool {
         let last = |row: &&ActionRecord| {
-            (row.is(RecordedAction::HandOver) || row.is(RecordedAction::TakeOver)) && !is_failed(row)
+            (row.is(RecordedAction::HandOver) || row.is(RecordedAction::TakeOver)) && !has_failed(row)
         };
         let actions = self.actions.value.as_deref().unwrap_or_default();
         actions.iter().find(last).is_some_and(|row| row.is(RecordedAction::HandOver) && is_own(cx, row))
@@ -235,7 +235,6 @@ fn doubtful(cx: &ViewContext) -> Vec<String> {
     bad.into_iter().take(NAMED).chain(more).chain(stale).collect()
 }
 
-/// What is on record is English, whatever the language of the screen.
-fn is_failed(row: &ActionRecord) -> bool {
-    ["refused", "not confirmed", "failed"].iter().any(|word| row.outcome.starts_with(word))
+fn has_failed(row: &ActionRecord) -> bool {
+    Outcome::is_failure(&row.outcome)
 }

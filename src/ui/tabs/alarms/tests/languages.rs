@@ -11,6 +11,7 @@ fn what_failed_is_told_in_every_language() {
     let rows = vec![
         action(40, "anna", "write", "TIC-1.SV", "failed: response timeout", None),
         action(100, "anna", "write", "TIC-1.P", "verified", None),
+        action(110, "anna", "unlock", "TIC-1.DP", "not confirmed: accepted, not read back; for TIC-1.P", None),
     ];
     for language in [Language::ENGLISH, Language::THAI] {
         let mut model = model(&suppressed(), Theme::FULL);
@@ -23,7 +24,7 @@ fn what_failed_is_told_in_every_language() {
         let title = |english| language.locale().within(|| cells(translate(english)).into_owned());
         let [failed, changed] = ["failed in this shift", "changed in this shift"].map(title);
         assert!(at(&failed) < at("TIC-1.SV ") && at("TIC-1.SV ") < at(&changed), "{picture}");
-        assert!(at(&changed) < at("TIC-1.P "), "{picture}");
+        assert!(at(&changed) < at("TIC-1.P ") && at(&changed) < at("TIC-1.DP"), "{picture}");
         assert_eq!(picture.contains("verified"), language == Language::ENGLISH, "{picture}");
     }
 }
