@@ -10,12 +10,15 @@ mod form;
 mod formula;
 pub mod headings;
 mod heat_pump;
+mod meanings;
+mod neighbours;
 mod parts;
 mod questions;
 mod reader;
 mod register_names;
 mod row;
 mod sections;
+mod span;
 pub mod words;
 
 use std::collections::BTreeMap;

@@ -2,22 +2,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-pub use super::headings::{Column, is_heading};
 use super::{
     cells::Cells,
     headings::{self, Heading},
     heat_pump,
+    meanings::{are_codes, is_bare_hex, meaning},
+    neighbours::count_bytes,
     questions::{self, Question},
     register_names,
-    words::{
-        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, table_of,
-        type_of, width_of, yes_or_no,
-    },
 };
-use crate::plant::{
-    address::{AddressBase, AddressContext, wire},
-    tag::Table,
+pub use super::{
+    headings::{Column, is_heading},
+    span::{first_of, is_address, span_of},
 };
+use crate::plant::{address::AddressBase, tag::Table};
 
 /// What readers have said about columns, by heading; `None`: it is not used.
 pub type Said = BTreeMap<String, Option<Column>>;
@@ -43,48 +41,6 @@ pub struct Columns {
     pub is_iobroker: bool,
     /// It is an export of ModbusManager, whose devices write with the function for several registers alone.
     pub is_of_manager: bool,
-}
-
-/// Is it an address in any reading?
-pub fn is_address(cell: &str) -> bool {
-    let any = AddressContext { table: Table::Holding, is_stated: false, base: AddressBase::Modicon };
-    any.parse(first_of(cell)).is_some()
-}
-
-/// Of `41003-41004` the first.
-pub fn first_of(cell: &str) -> &str {
-    match ends_of(cell) {
-        Some((first, last)) if number_as(first, last).is_none_or(|(first, last)| first <= last) => first,
-        _ => cell.trim(),
-    }
-}
-
-/// How many registers a span takes: 2 of `41003-41004` and of `41003-04`.
-pub fn span_of(cell: &str) -> Option<u16> {
-    let (first, last) = ends_of(cell)?;
-    let (first, last) = number_as(first, last)?;
-    u16::try_from(last.checked_sub(first)? + 1).ok()
-}
-
-/// First and last of a span: two numbers. A date is no address.
-fn ends_of(cell: &str) -> Option<(&str, &str)> {
-    let (first, last) = cell.split_once(['-', '–', '…'])?;
-    let last = last.trim();
-    (!last.contains(['-', '–', '…']) && last.starts_with(|sign: char| sign.is_ascii_digit()))
-        .then_some((first.trim(), last))
-}
-
-/// Both as numbers; the last may have its last digits only.
-fn number_as(first: &str, last: &str) -> Option<(u32, u32)> {
-    let number = |text: &str| wire(text).map(u32::from).or_else(|| text.parse().ok());
-    let front = first.get(..first.len().saturating_sub(last.len())).unwrap_or_default();
-    let is_short = last.bytes().chain(first.bytes()).all(|byte| byte.is_ascii_digit());
-    Some((number(first)?, if is_short { number(&format!("{front}{last}"))? } else { number(last)? }))
-}
-
-/// Hexadecimal digits without a mark.
-fn is_bare_hex(cell: &str) -> bool {
-    !cell.is_empty() && cell.len() <= 4 && cell.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
 
 impl Columns {
@@ -174,27 +130,6 @@ impl Columns {
     }
 }
 
-/// Are they the codes of sizes that a heat pump has?
-fn are_codes(heading: &str, cells: &[&str]) -> bool {
-    heat_pump::is_of_sizes(heading)
-        && !cells.is_empty()
-        && cells.iter().all(|cell| heat_pump::type_of_code(cell).is_some())
-}
-
-/// Lengths that fit the types of their rows as bytes, and none as registers, are bytes.
-fn count_bytes(means: &mut [Option<Column>], rows: &[Cells]) {
-    let at = |column: Column| means.iter().position(|means| *means == Some(column));
-    let (Some(kind), Some(length)) = (at(Column::Type), at(Column::Length)) else { return };
-    let sized = rows.iter().filter_map(|row| {
-        let kind = row.cells.get(kind).filter(|cell| is_sized_type(cell)).and_then(|cell| type_of(cell, None).ok())?;
-        Some((kind.0.registers(), row.cells.get(length)?.parse::<u16>().ok()?))
-    });
-    let sized: Vec<(u16, u16)> = sized.collect();
-    if !sized.is_empty() && sized.iter().all(|(registers, length)| 2 * registers == *length) {
-        means[length] = Some(Column::Bytes);
-    }
-}
-
 /// What is said of a heading.
 pub fn said_of(said: &Said, heading: &str) -> Option<Option<Column>> {
     let same = |(known, _): &(&String, &Option<Column>)| known.to_lowercase() == heading.to_lowercase();
@@ -224,130 +159,6 @@ fn filled(rows: &[Cells], n: usize) -> Vec<&str> {
     let is_prose = |row: &Cells| row.cells.len() == 1;
     let cells = rows.iter().filter(|row| !is_prose(row)).filter_map(|row| row.cells.get(n)).map(String::as_str);
     cells.filter(|cell| !matches!(*cell, "" | "-" | "–")).collect()
-}
-
-/// How many of a hundred cells fit.
-pub fn share(cells: &[&str], fits: impl Fn(&str) -> bool) -> usize {
-    if cells.is_empty() { 100 } else { 100 * cells.iter().filter(|cell| fits(cell)).count() / cells.len() }
-}
-
-/// What a column means: of what its heading can be, the first that what is in it can be too.
-fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
-    // A type with its size stands in no other column, whatever that is called.
-    if !cells.is_empty() && 80 <= share(cells, is_sized_type) {
-        return Some(Column::Type);
-    }
-    if are_codes(heading, cells) {
-        return Some(Column::Type);
-    }
-    // What is done with a register is no type of it.
-    let is_of_access = !cells.is_empty() && 80 <= share(cells, |cell| access_of(cell).is_some());
-    if is_of_access && Heading::new(heading).has(&["type", "typ", "tipo", "format", "function", "area"]) {
-        return Some(Column::Access);
-    }
-    // A cell that does not fit leaves out its row, not the column.
-    if let Some(exact) = Heading::exact(heading).filter(|exact| 50 <= share(cells, |cell| fits_exactly(*exact, cell))) {
-        return Some(exact);
-    }
-    let words = Heading::new(heading);
-    let candidates = words.candidates();
-    // Codes that are not understood say so row by row: without them each row would be of another table.
-    if words.is_of_codes() && cells.iter().any(|cell| cell.bytes().any(|byte| byte.is_ascii_digit())) {
-        return Some(Column::Table);
-    }
-    if let Some(column) = candidates.iter().copied().find(|column| fits(*column, &words, cells)) {
-        // What is more than 1 as a gain is what a maker has multiplied by.
-        let is_gain = column == Column::Scale && words.has(&["gain"]);
-        let is_above =
-            !cells.is_empty() && 100 == share(cells, |cell| number_of(cell).is_some_and(|number| 1.0 <= number));
-        let is_hex = column == Column::Address && is_of_hex(&words, cells);
-        let is_of_bytes = column == Column::Length && words.has(&["bytes"]);
-        let found = match (is_gain && is_above, is_hex, is_of_bytes) {
-            (true, _, _) => Column::Divisor,
-            (_, true, _) => Column::HexAddress,
-            (_, _, true) => Column::Bytes,
-            (false, false, false) => column,
-        };
-        return Some(found);
-    }
-    // A column of types that are all unknown says so row by row; without it each would be taken for a whole number.
-    candidates.into_iter().find(|column| *column == Column::Type && !words.has(&["size", "signed", "sign", "typ"]))
-}
-
-/// Does a cell fit below the heading of an export?
-fn fits_exactly(exact: Column, cell: &str) -> bool {
-    if matches!(exact, Column::Min | Column::Max | Column::Decimals) {
-        return number_of(cell).is_some();
-    }
-    if matches!(exact, Column::Labels | Column::Bits) {
-        return labels_of(cell).is_some();
-    }
-    exact == Column::Field && field_of(cell).is_some()
-        || exact == Column::Bad && bad_of(cell).is_some()
-        || exact == Column::Group
-}
-
-/// Can what is in it be of a meaning that its heading has?
-fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
-    match column {
-        Column::Address => {
-            let is_bare = is_of_hex(heading, cells);
-            40 <= share(cells, |cell| is_address(cell) || is_bare && is_bare_hex(cell)) || register_names::are(cells)
-        }
-        Column::Type => 1 <= share(cells, |cell| kind_of(cell).is_some() || type_of(cell, Some(1)).is_ok()),
-        Column::Signed => !cells.is_empty() && 60 <= share(cells, |cell| yes_or_no(cell).is_some()),
-        Column::Table => 60 <= share(cells, |cell| table_of(cell).is_some()),
-        Column::Device => 80 <= share(cells, |cell| cell.parse::<u8>().is_ok()) && !cells.is_empty(),
-        Column::Width => {
-            80 <= share(cells, |cell| width_of(cell).is_some()) && cells.iter().any(|cell| width_of(cell) == Some(16))
-        }
-        Column::Field => !cells.is_empty() && 60 <= share(cells, |cell| bit_field_of(cell).is_some()),
-        Column::Access => !cells.is_empty() && 60 <= share(cells, |cell| access_of(cell).is_some()),
-        Column::Length => 60 <= share(cells, |cell| length_of(cell, false).is_some()),
-        Column::Offset => 60 <= share(cells, |cell| number_of(cell).is_some()) && !is_rising(cells),
-        Column::Exponent => {
-            60 <= share(cells, |cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number)))
-        }
-        // Numbers below `item` count rows.
-        Column::Name => {
-            let is_word = |cell: &str| cell.chars().any(char::is_alphabetic);
-            heading.rank_of_names() != 1 || 50 <= share(cells, is_word)
-        }
-        Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
-        Column::HexAddress
-        | Column::Bytes
-        | Column::Places
-        | Column::Area
-        | Column::Min
-        | Column::Max
-        | Column::Decimals
-        | Column::Labels
-        | Column::Bits
-        | Column::Bad
-        | Column::Group
-        | Column::Label
-        | Column::WriteAt
-        | Column::WriteWith
-        | Column::Poll => false,
-    }
-}
-
-/// Do the digits of a column of addresses without a mark count as hexadecimal? One with a letter proves it of all.
-fn is_of_hex(heading: &Heading, cells: &[&str]) -> bool {
-    if heading.has(&["hex"]) {
-        return !heading.has(&["dec"]);
-    }
-    let with_letter = |cell: &&&str| cell.bytes().any(|byte| byte.is_ascii_alphabetic());
-    let bare: Vec<&&str> = cells.iter().filter(|cell| is_bare_hex(cell)).collect();
-    // `F1` may be the name of a parameter.
-    let is_number = |cell: &&str| cell.starts_with(|sign: char| sign.is_ascii_digit());
-    !heading.has(&["dec"]) && bare.iter().any(|cell| with_letter(cell) && is_number(cell))
-}
-
-/// Does it rise from row to row? Then it counts registers.
-fn is_rising(cells: &[&str]) -> bool {
-    let numbers: Vec<f64> = cells.iter().filter_map(|cell| number_of(cell)).collect();
-    3 <= numbers.len() && numbers.windows(2).all(|pair| pair[0] < pair[1])
 }
 
 #[cfg(test)]

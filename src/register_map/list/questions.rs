@@ -1,8 +1,9 @@
 //! Columns that can mean several things, each of which makes other values of them: their reader says which.
 
 use super::{
-    columns::{Column, share},
+    columns::Column,
     headings::Heading,
+    meanings::share,
     words::{bit_field_of, is_marked, is_sized_type, kind_of, length_of, number_of, power_of_ten},
 };
 use crate::{t, text::translate};

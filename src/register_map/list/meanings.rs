@@ -1,0 +1,147 @@
+//! What a column means: of what its heading can be, what stands in it can be too.
+
+use super::{
+    columns::{Column, is_address},
+    headings::Heading,
+    heat_pump, register_names,
+    words::{
+        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, table_of,
+        type_of, width_of, yes_or_no,
+    },
+};
+
+/// Hexadecimal digits without a mark.
+pub fn is_bare_hex(cell: &str) -> bool {
+    !cell.is_empty() && cell.len() <= 4 && cell.bytes().all(|byte| byte.is_ascii_hexdigit())
+}
+
+/// Are they the codes of sizes that a heat pump has?
+pub fn are_codes(heading: &str, cells: &[&str]) -> bool {
+    heat_pump::is_of_sizes(heading)
+        && !cells.is_empty()
+        && cells.iter().all(|cell| heat_pump::type_of_code(cell).is_some())
+}
+
+/// How many of a hundred cells fit.
+pub fn share(cells: &[&str], fits: impl Fn(&str) -> bool) -> usize {
+    if cells.is_empty() { 100 } else { 100 * cells.iter().filter(|cell| fits(cell)).count() / cells.len() }
+}
+
+/// What a column means: of what its heading can be, the first that what is in it can be too.
+pub fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
+    // A type with its size stands in no other column, whatever that is called.
+    if !cells.is_empty() && 80 <= share(cells, is_sized_type) {
+        return Some(Column::Type);
+    }
+    if are_codes(heading, cells) {
+        return Some(Column::Type);
+    }
+    // What is done with a register is no type of it.
+    let is_of_access = !cells.is_empty() && 80 <= share(cells, |cell| access_of(cell).is_some());
+    if is_of_access && Heading::new(heading).has(&["type", "typ", "tipo", "format", "function", "area"]) {
+        return Some(Column::Access);
+    }
+    // A cell that does not fit leaves out its row, not the column.
+    if let Some(exact) = Heading::exact(heading).filter(|exact| 50 <= share(cells, |cell| fits_exactly(*exact, cell))) {
+        return Some(exact);
+    }
+    let words = Heading::new(heading);
+    let candidates = words.candidates();
+    // Codes that are not understood say so row by row: without them each row would be of another table.
+    if words.is_of_codes() && cells.iter().any(|cell| cell.bytes().any(|byte| byte.is_ascii_digit())) {
+        return Some(Column::Table);
+    }
+    if let Some(column) = candidates.iter().copied().find(|column| fits(*column, &words, cells)) {
+        // What is more than 1 as a gain is what a maker has multiplied by.
+        let is_gain = column == Column::Scale && words.has(&["gain"]);
+        let is_above =
+            !cells.is_empty() && 100 == share(cells, |cell| number_of(cell).is_some_and(|number| 1.0 <= number));
+        let is_hex = column == Column::Address && is_of_hex(&words, cells);
+        let is_of_bytes = column == Column::Length && words.has(&["bytes"]);
+        let found = match (is_gain && is_above, is_hex, is_of_bytes) {
+            (true, _, _) => Column::Divisor,
+            (_, true, _) => Column::HexAddress,
+            (_, _, true) => Column::Bytes,
+            (false, false, false) => column,
+        };
+        return Some(found);
+    }
+    // A column of types that are all unknown says so row by row; without it each would be taken for a whole number.
+    candidates.into_iter().find(|column| *column == Column::Type && !words.has(&["size", "signed", "sign", "typ"]))
+}
+
+/// Does a cell fit below the heading of an export?
+fn fits_exactly(exact: Column, cell: &str) -> bool {
+    if matches!(exact, Column::Min | Column::Max | Column::Decimals) {
+        return number_of(cell).is_some();
+    }
+    if matches!(exact, Column::Labels | Column::Bits) {
+        return labels_of(cell).is_some();
+    }
+    exact == Column::Field && field_of(cell).is_some()
+        || exact == Column::Bad && bad_of(cell).is_some()
+        || exact == Column::Group
+}
+
+/// Can what is in it be of a meaning that its heading has?
+fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
+    match column {
+        Column::Address => {
+            let is_bare = is_of_hex(heading, cells);
+            40 <= share(cells, |cell| is_address(cell) || is_bare && is_bare_hex(cell)) || register_names::are(cells)
+        }
+        Column::Type => 1 <= share(cells, |cell| kind_of(cell).is_some() || type_of(cell, Some(1)).is_ok()),
+        Column::Signed => !cells.is_empty() && 60 <= share(cells, |cell| yes_or_no(cell).is_some()),
+        Column::Table => 60 <= share(cells, |cell| table_of(cell).is_some()),
+        Column::Device => 80 <= share(cells, |cell| cell.parse::<u8>().is_ok()) && !cells.is_empty(),
+        Column::Width => {
+            80 <= share(cells, |cell| width_of(cell).is_some()) && cells.iter().any(|cell| width_of(cell) == Some(16))
+        }
+        Column::Field => !cells.is_empty() && 60 <= share(cells, |cell| bit_field_of(cell).is_some()),
+        Column::Access => !cells.is_empty() && 60 <= share(cells, |cell| access_of(cell).is_some()),
+        Column::Length => 60 <= share(cells, |cell| length_of(cell, false).is_some()),
+        Column::Offset => 60 <= share(cells, |cell| number_of(cell).is_some()) && !is_rising(cells),
+        Column::Exponent => {
+            60 <= share(cells, |cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number)))
+        }
+        // Numbers below `item` count rows.
+        Column::Name => {
+            let is_word = |cell: &str| cell.chars().any(char::is_alphabetic);
+            heading.rank_of_names() != 1 || 50 <= share(cells, is_word)
+        }
+        Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
+        Column::HexAddress
+        | Column::Bytes
+        | Column::Places
+        | Column::Area
+        | Column::Min
+        | Column::Max
+        | Column::Decimals
+        | Column::Labels
+        | Column::Bits
+        | Column::Bad
+        | Column::Group
+        | Column::Label
+        | Column::WriteAt
+        | Column::WriteWith
+        | Column::Poll => false,
+    }
+}
+
+/// Do the digits of a column of addresses without a mark count as hexadecimal? One with a letter proves it of all.
+fn is_of_hex(heading: &Heading, cells: &[&str]) -> bool {
+    if heading.has(&["hex"]) {
+        return !heading.has(&["dec"]);
+    }
+    let with_letter = |cell: &&&str| cell.bytes().any(|byte| byte.is_ascii_alphabetic());
+    let bare: Vec<&&str> = cells.iter().filter(|cell| is_bare_hex(cell)).collect();
+    // `F1` may be the name of a parameter.
+    let is_number = |cell: &&str| cell.starts_with(|sign: char| sign.is_ascii_digit());
+    !heading.has(&["dec"]) && bare.iter().any(|cell| with_letter(cell) && is_number(cell))
+}
+
+/// Does it rise from row to row? Then it counts registers.
+fn is_rising(cells: &[&str]) -> bool {
+    let numbers: Vec<f64> = cells.iter().filter_map(|cell| number_of(cell)).collect();
+    3 <= numbers.len() && numbers.windows(2).all(|pair| pair[0] < pair[1])
+}
