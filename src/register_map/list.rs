@@ -6,8 +6,10 @@ pub mod calculated;
 pub mod cells;
 mod codes;
 mod columns;
+mod factors;
 mod form;
 mod formula;
+mod headed;
 pub mod headings;
 mod heat_pump;
 mod meanings;
@@ -19,6 +21,7 @@ mod register_names;
 mod row;
 mod sections;
 mod span;
+mod tables;
 pub mod words;
 
 use std::collections::BTreeMap;
@@ -222,6 +225,11 @@ impl List {
             self.warn_cut();
             return;
         }
+        let is_beyond = |named: &Named| u32::from(u16::MAX) + 1 < u32::from(named.address) + u32::from(named.count());
+        let named = named.and_then(|named| match is_beyond(&named) {
+            true => Err(t!("{name}: it ends beyond the last address", name = named.name)),
+            false => Ok(named),
+        });
         let free = named.and_then(|named| match self.named.iter().find_map(|old| conflict(old, &named)) {
             Some(why) => Err(format!("{}: {why}", named.name)),
             None => Ok(named),
@@ -322,13 +330,14 @@ fn with_sure_writes(taken: Taken, context: &ListContext) -> Taken {
 
 /// What neither the list nor its reader has said of a row.
 fn assumptions(taken: &Taken, context: &ListContext, is_sure: bool) -> Vec<String> {
-    let Taken { named, is_base_assumed, is_order_assumed, is_type_assumed, is_write_lost } = taken;
+    let Taken { named, is_base_assumed, is_order_assumed, is_type_assumed, are_bounds_assumed, is_write_lost } = taken;
     let is_scaled_twice = named.offset != 0.0 && named.scale != 1.0;
     let all = [
         (*is_base_assumed && context.base.is_none(), t!("plain numbers are addresses as sent, from 0").to_owned()),
         (*is_order_assumed && context.order.is_none(), t!("byte order {order}", order = named.order.word())),
         (*is_type_assumed, t!("type uint16").to_owned()),
         (*is_write_lost, t!("only read: where or how it is written is not sure").to_owned()),
+        (*are_bounds_assumed && !is_sure, t!("bounds are values after the factor").to_owned()),
         (is_scaled_twice && !is_sure, t!("the offset is added after the factor").to_owned()),
     ];
     all.into_iter().filter(|(is, _)| *is).map(|(_, what)| what).collect()

@@ -48,8 +48,8 @@ pub fn table_in(title: &str) -> Option<Table> {
 }
 
 /// The codes that write what others beside them read: of one register or coil, and of several; `None` for no such.
-pub fn writes_of(text: &str) -> [Option<u8>; 2] {
-    let codes = table_of(text).map(|_| codes_of(text)).unwrap_or_default();
+pub fn writes_of<'a>(texts: impl Iterator<Item = &'a str>) -> [Option<u8>; 2] {
+    let codes: Vec<u8> = texts.filter(|text| table_of(text).is_some()).flat_map(codes_of).collect();
     let of = |read: u8, write: u8| Some(write).filter(|_| codes.contains(&read) && codes.contains(&write));
     [of(1, 5).or(of(3, 6)), of(1, 15).or(of(3, 16))]
 }
@@ -74,10 +74,10 @@ mod tests {
             ("06", Table::Holding, [None; 2]),
             ("3 - read", Table::Holding, [None; 2]),
         ] {
-            assert_eq!((table_of(text), writes_of(text)), (Some(table), writes), "{text}");
+            assert_eq!((table_of(text), writes_of([text].into_iter())), (Some(table), writes), "{text}");
         }
         for text in ["", "FC", "FC=03,04", "FC=99", "-3", "read", "(3)", "FC=3; FC=4"] {
-            assert_eq!((table_of(text), writes_of(text)), (None, [None; 2]), "{text}");
+            assert_eq!((table_of(text), writes_of([text].into_iter())), (None, [None; 2]), "{text}");
         }
     }
 }

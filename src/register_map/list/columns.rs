@@ -6,8 +6,8 @@ use super::{
     cells::Cells,
     headings::{self, Heading},
     heat_pump,
-    meanings::{are_codes, is_bare_hex, meaning},
-    neighbours::count_bytes,
+    meanings::{are_codes, is_blank, meaning},
+    neighbours::Neighbours,
     questions::{self, Question},
     register_names,
 };
@@ -29,6 +29,8 @@ pub struct Columns {
     pub means: Vec<Option<Column>>,
     /// Those of which it is not known what they mean.
     pub open: Vec<Question>,
+    /// The column of the last addresses of spans, whose first are those of the surest column.
+    pub last: Option<usize>,
     /// Columns of addresses such as `4x0001`, in which `0x` is no mark of hexadecimal digits.
     areas: BTreeSet<usize>,
     /// Columns of addresses such as `R72`.
@@ -56,11 +58,13 @@ impl Columns {
             true => heat_pump::means_of_manager(heading),
             false => (0..heading.len()).map(guess).collect(),
         };
-        if !is_own && !is_iobroker {
-            count_bytes(&mut means, rows);
+        let mut last = None;
+        if !is_own && !is_iobroker && !is_of_manager {
+            last = Neighbours { means: &mut means, headings: &headings, rows }.settle();
         }
         let said: Vec<Option<Option<Column>>> = headings.iter().map(|heading| said_of(said, heading)).collect();
         means.iter_mut().zip(&said).for_each(|(means, said)| *means = said.unwrap_or(*means));
+        let last = last.filter(|n| said[*n].is_none());
         let is_of_areas =
             |n: &usize| means[*n] == Some(Column::Address) && cells[*n].iter().any(|cell| is_in_area(cell));
         let areas = (0..means.len()).filter(is_of_areas).collect();
@@ -70,7 +74,8 @@ impl Columns {
         let codes = (0..means.len()).filter(is_of_codes).collect();
         let is_sure = is_own || is_iobroker;
         let open = Vec::new();
-        let mut columns = Columns { headings, means, open, areas, names, codes, is_sure, is_iobroker, is_of_manager };
+        let mut columns =
+            Columns { headings, means, open, last, areas, names, codes, is_sure, is_iobroker, is_of_manager };
         if !columns.is_sure {
             columns.open = questions::of(&mut columns.means, &columns.headings, &cells, |n| said[n].is_some());
         }
@@ -89,7 +94,7 @@ impl Columns {
             if column == Column::Name {
                 return heading.rank_of_names();
             }
-            let is_sent = heading.has(&["pdu", "protocol", "wire", "hex"]);
+            let is_sent = heading.is_hex() || heading.has(&["pdu", "protocol", "wire"]);
             [is_sent, heading.has(&["address", "addr", "addr.", "adresse"])].iter().position(|is| *is).unwrap_or(2)
         };
         places.sort_by_key(rank);
@@ -101,14 +106,16 @@ impl Columns {
         register_names::number_of(cell).filter(|_| self.names.contains(&place))?.1
     }
 
-    /// The types of a row, as written or as their codes mean them.
+    /// The types of a row.
     pub fn types<'a>(&self, row: &'a Cells) -> Vec<&'a str> {
-        let cell = |place: usize| {
-            let cell = row.cells.get(place)?.as_str();
-            let code = Some(cell).filter(|_| self.codes.contains(&place)).and_then(heat_pump::type_of_code);
-            Some(code.unwrap_or(cell)).filter(|cell| !matches!(*cell, "" | "-" | "–"))
-        };
-        self.places(Column::Type).into_iter().filter_map(cell).collect()
+        self.places(Column::Type).into_iter().filter_map(|place| self.type_at(place, row)).collect()
+    }
+
+    /// The type in a column, as written or as its code means it.
+    pub fn type_at<'a>(&self, place: usize, row: &'a Cells) -> Option<&'a str> {
+        let cell = row.cells.get(place)?.as_str();
+        let code = Some(cell).filter(|_| self.codes.contains(&place)).and_then(heat_pump::type_of_code);
+        Some(code.unwrap_or(cell)).filter(|cell| !is_blank(cell))
     }
 
     /// The cell of a column of addresses, and how it counts where its heading says that.
@@ -117,8 +124,8 @@ impl Columns {
         if let Some((digits, _)) = register_names::number_of(cell).filter(|_| self.names.contains(&place)) {
             return (digits.to_owned(), base);
         }
-        if self.means[place] == Some(Column::HexAddress) && is_bare_hex(cell) {
-            return (format!("0x{cell}"), base);
+        if self.means[place] == Some(Column::HexAddress) {
+            return (marked_hex(cell), base);
         }
         let of_coil = cell
             .strip_prefix(['0'])
@@ -127,6 +134,18 @@ impl Columns {
             Some(address) => (format!("coil:{address}"), base),
             None => (cell.to_owned(), base),
         }
+    }
+}
+
+/// Digits that are hexadecimal, with the mark of these; `40001` is too long for a register, and no decimal number here.
+fn marked_hex(cell: &str) -> String {
+    let marked = |digits: &str| match digits.bytes().all(|byte| byte.is_ascii_hexdigit()) && !digits.is_empty() {
+        true => format!("0x{digits}"),
+        false => digits.to_owned(),
+    };
+    match cell.split_once(['-', '–', '…']) {
+        Some((first, last)) => format!("{}-{}", marked(first.trim()), marked(last.trim())),
+        None => marked(cell),
     }
 }
 
@@ -158,7 +177,7 @@ fn filled(rows: &[Cells], n: usize) -> Vec<&str> {
     // A line of prose is a row of one cell.
     let is_prose = |row: &Cells| row.cells.len() == 1;
     let cells = rows.iter().filter(|row| !is_prose(row)).filter_map(|row| row.cells.get(n)).map(String::as_str);
-    cells.filter(|cell| !matches!(*cell, "" | "-" | "–")).collect()
+    cells.filter(|cell| !is_blank(cell)).collect()
 }
 
 #[cfg(test)]
@@ -187,8 +206,8 @@ mod tests {
             "Reg. address;Function;Unit;Type\n1;Tank level;1;Analog\n",
             &[Some(Address), Some(Name), Some(Device), Some(Type)],
         );
-        check("Register;Gain;Quantity\n1;10;2\n", &[Some(Address), Some(Divisor), Some(Length)]);
-        check("Register;Gain;Offset\n1;0.1;-5\n", &[Some(Address), Some(Scale), Some(Offset)]);
+        check("Register;Gain;Quantity\n1;10;2\n", &[Some(Address), None, Some(Length)]);
+        check("Register;Factor;Offset\n1;0.1;-5\n", &[Some(Address), Some(Scale), Some(Offset)]);
         check(
             "Registeradresse;Bezeichnung;Datentyp;Einheit;Skalierung\n1;Vorlauf;INT16;°C;0,1\n",
             &[Some(Address), Some(Name), Some(Type), Some(Unit), Some(Scale)],

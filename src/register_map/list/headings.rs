@@ -112,27 +112,33 @@ const HEADINGS: [(Column, &[&str]); 17] = [
     (Column::Divisor, &["divisor", "divide", "divider", "division", "div", "teiler", "diviseur", "divisore", "deler", "dzielnik", "делитель", "除数", "ตัวหาร"]),
     (Column::Exponent, &["sf", "exponent", "zehnerpotenz"]),
     (Column::Scale, &["scale", "scaling", "factor", "multiplier", "multiply", "gain", "resolution", "coefficient", "sf", "ratio", "conversion", "scalefactor",
-        "faktor", "skalierung", "skalierungsfaktor", "umrechnung", "umrechnungsfaktor", "multiplikator", "auflösung", "skala", "échelle", "facteur", "résolution", "escala", "fattore", "fator", "schaal", "mnożnik", "skalfaktor", "множитель", "коэффициент", "масштаб", "系数", "倍率", "ตัวคูณ"]),
+        "faktor", "skalierung", "skalierungsfaktor", "umrechnung", "umrechnungsfaktor", "multiplikator", "auflösung", "risoluzione", "skala", "échelle", "facteur", "résolution", "escala", "fattore", "fator", "schaal", "mnożnik", "skalfaktor", "множитель", "коэффициент", "масштаб", "系数", "倍率", "ตัวคูณ"]),
     (Column::Order, &["order", "endian", "endianness", "swap", "byteorder", "wordorder", "reihenfolge", "bytereihenfolge", "wortreihenfolge"]),
     (Column::Device, &["deviceid", "slave", "slaveid", "station", "unit", "geräteadresse"]),
-    (Column::Unit, &["unit", "units", "uom", "dimension", "einheit", "einheiten", "maßeinheit", "unité", "unidad", "unità", "unidade", "eenheid", "jednostka", "enhet", "единица", "единицы", "单位", "หน่วย"]),
+    (Column::Unit, &["unit", "units", "uom", "dimension", "einheit", "einheiten", "maßeinheit", "unité", "unidad", "unidades", "unità", "unidade", "eenheid", "jednostka", "enhet", "единица", "единицы", "单位", "หน่วย"]),
     (Column::Signed, &["signed", "sign", "vorzeichen"]),
     (Column::Type, &["type", "format", "datatype", "dataformat", "encoding", "size", "signed", "sign", "typ", "datentyp", "datenformat", "variablentyp", "tipo", "formato", "formaat", "тип", "类型", "数据类型", "ชนิด", "ชนิดข้อมูล"]),
     (Column::Width, &["bit", "bits", "size", "length", "width", "länge", "größe", "bitbreite"]),
     (Column::Field, &["bit", "bits", "bitnr", "bitnummer", "bitposition"]),
-    (Column::Table, &["table", "function", "area", "fc", "type", "tabelle", "funktionscode", "funktion", "bereich", "registertyp", "registertype", "typ", "tipo", "función", "fonction", "funzione", "функция", "功能码", "ฟังก์ชัน"]),
+    (Column::Table, &["table", "function", "area", "fc", "type", "tabelle", "funktionscode", "funktion", "bereich", "registertyp", "registertype", "regtype", "space", "typ", "tipo", "función", "fonction", "funzione", "функция", "功能码", "ฟังก์ชัน"]),
     (Column::Length, &["len", "length", "size", "count", "quantity", "qty", "words", "registers", "bytes", "länge", "anzahl", "wörter", "größe", "registeranzahl", "datenlänge", "longueur", "registres", "mots", "longitud", "registros", "lunghezza", "registri", "lengte", "długość", "длина", "长度", "数量", "ความยาว", "จำนวน"]),
     (Column::Formula, &["formula", "expression", "formel"]),
     (Column::Offset, &["offset", "versatz", "décalage", "смещение", "偏移"]),
     (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "attributes", "mode", "modus", "zugriff", "zugriffsart", "accès", "acceso", "accesso", "toegang", "dostęp", "доступ", "访问"]),
     (Column::Address, ADDRESS),
-    (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function", "nickname", "tagname", "purpose", "item", "field",
+    (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function", "nickname", "tagname", "purpose", "item", "field", "content", "quantity",
         "bezeichnung", "beschreibung", "benennung", "bedeutung", "datenpunkt", "messwert", "messgröße", "titel", "parametername", "funktion", "kommentar", "désignation", "nom", "libellé", "nombre", "descripción", "nome", "descrizione", "descrição", "naam", "omschrijving", "nazwa", "opis", "namn", "benämning", "beskrivning", "название", "наименование", "описание", "параметр", "名称", "描述", "参数", "ชื่อ", "คำอธิบาย"]),
 ];
 /// A heading with one of these alone is no column of addresses: tables of codes have them too.
 const WEAK: [&str; 2] = ["hex", "dec"];
+/// Parts of words that say how digits are written.
+const HEX: [&str; 6] = ["hex", "esadec", "szesnast", "шестнадцат", "十六进制", "16进制"];
+const DECIMAL: [&str; 5] = ["dec", "dez", "déc", "дес", "十进制"];
+/// The last address of several.
+const LAST: [&str; 9] = ["end", "to", "last", "stop", "ende", "bis", "endadresse", "endregister", "fin"];
 /// Words of names that stand in other columns too, and those of long texts.
-const WEAK_NAMES: [&str; 8] = ["function", "funktion", "signal", "variable", "point", "purpose", "item", "field"];
+const WEAK_NAMES: [&str; 10] =
+    ["function", "funktion", "signal", "variable", "point", "purpose", "item", "field", "content", "quantity"];
 const TEXTS: [&str; 7] =
     ["description", "beschreibung", "kommentar", "descripción", "descrizione", "descrição", "描述"];
 const NAMES: [&str; 9] =
@@ -145,8 +151,17 @@ const HARMLESS: [&str; 42] = [
     "bereich", "grenze", "standard", "standardwert", "wert", "beispiel", "seite", "bemerkung",
 ];
 /// Headings of a number that is divided by ten as often.
-const PLACES: [&str; 8] =
-    ["decimals", "decimal", "digits", "precision", "dezimalstellen", "nachkommastellen", "kommastellen", "nachkomma"];
+const PLACES: [&str; 9] = [
+    "decimals",
+    "decimal",
+    "digits",
+    "precision",
+    "dezimalstellen",
+    "nachkommastellen",
+    "kommastellen",
+    "nachkomma",
+    "dec",
+];
 
 /// What is known of one heading.
 #[derive(Debug, Clone)]
@@ -169,7 +184,8 @@ impl Heading {
 
     /// What it can be, the likeliest first.
     pub fn candidates(&self) -> Vec<Column> {
-        HEADINGS.iter().filter(|(_, known)| self.has(known)).map(|(column, _)| *column).collect()
+        let all = HEADINGS.iter().filter(|(_, known)| self.has(known)).map(|(column, _)| *column);
+        all.chain(self.is_place().then_some(Column::Address)).collect()
     }
 
     /// What it is as an export of this program has it, and no word more.
@@ -186,6 +202,88 @@ impl Heading {
     /// Its column says how many decimals a number has.
     pub fn is_places(&self) -> bool {
         self.has(&PLACES)
+    }
+
+    /// Its column says tables, and nothing else.
+    pub fn is_of_tables(&self) -> bool {
+        self.has(&["table", "regtype", "registertype", "registertyp"])
+            || matches!(self.0.as_slice(), [word] if word == "space" || word == "area")
+    }
+
+    /// Its column can say types.
+    pub fn is_of_types(&self) -> bool {
+        self.has(&["type", "typ", "tipo"])
+    }
+
+    /// Can words for tables below it be those? A name or a unit may be the same word.
+    pub fn may_be_of_tables(&self) -> bool {
+        let candidates = self.candidates();
+        let may_be =
+            |column: &Column| matches!(column, Column::Type | Column::Table | Column::Address | Column::Access);
+        candidates.contains(&Column::Table) || candidates.iter().all(may_be)
+    }
+
+    /// Digits below it are hexadecimal.
+    pub fn is_hex(&self) -> bool {
+        let is_hex =
+            |word: &String| matches!(word.as_str(), "0x" | "h") || HEX.iter().any(|known| word.contains(known));
+        self.0.iter().any(is_hex)
+    }
+
+    /// Digits below it are decimal.
+    pub fn is_decimal(&self) -> bool {
+        self.0.iter().any(|word| DECIMAL.iter().any(|known| word.starts_with(known)))
+    }
+
+    /// Its column says the last of several addresses.
+    pub fn is_last(&self) -> bool {
+        let is_known = |word: &String| LAST.contains(&word.as_str()) || ADDRESS.contains(&word.as_str());
+        self.has(&LAST) && self.0.iter().all(is_known)
+    }
+
+    /// Its column says where something is written, and not where it is read.
+    pub fn is_of_writes(&self) -> bool {
+        self.has(&["write", "writing", "schreiben", "schreibadresse"]) && !self.has(&["read", "lesen"])
+    }
+
+    /// Its column says where something stands, if no other does.
+    pub fn is_place(&self) -> bool {
+        matches!(self.0.as_slice(), [word] if word == "start" || word == "offset")
+    }
+
+    /// Its column says byte orders, or counts rows.
+    pub fn is_any_order(&self) -> bool {
+        matches!(self.0.as_slice(), [word] if word == "order" || word == "reihenfolge")
+    }
+
+    /// Its column says powers of ten, and nothing else.
+    pub fn is_power(&self) -> bool {
+        self.has(&["exponent", "zehnerpotenz"])
+    }
+
+    /// Its column says formats, of types or of decimals.
+    pub fn is_format(&self) -> bool {
+        self.has(&["format", "dataformat", "datenformat", "formato", "formaat"])
+    }
+
+    /// Its column says how exact a number is, which may be its factor as well.
+    pub fn is_accuracy(&self) -> bool {
+        self.has(&["step", "accuracy", "schrittweite", "genauigkeit"])
+    }
+
+    /// Its column multiplies, and never divides.
+    pub fn is_multiplier(&self) -> bool {
+        self.has(&["multiplier", "multiply", "multiplikator"]) || self.is_resolution()
+    }
+
+    /// Its column says what the last digit of a number is worth, perhaps with a unit.
+    pub fn is_resolution(&self) -> bool {
+        self.has(&["resolution", "auflösung", "résolution", "risoluzione"])
+    }
+
+    /// Makers multiply by such a number as well as they divide by it.
+    pub fn is_scale_factor(&self) -> bool {
+        self.has(&["scalefactor", "gain"]) || self.has(&["scale"]) && self.has(&["factor"])
     }
 
     /// How its numbers count, where it says that.
@@ -221,8 +319,9 @@ impl Heading {
         usize::from(self.has(&WEAK_NAMES) && !self.has(&NAMES))
     }
 
-    fn is_strong_address(&self) -> bool {
-        self.0.iter().any(|word| ADDRESS.contains(&word.as_str()) && !WEAK.contains(&word.as_str()))
+    /// Is it that of a column of addresses, by more than how their digits are written?
+    pub fn is_strong_address(&self) -> bool {
+        self.is_place() || self.0.iter().any(|word| ADDRESS.contains(&word.as_str()) && !WEAK.contains(&word.as_str()))
     }
 }
 

@@ -2,13 +2,16 @@
 
 use super::{
     columns::{Column, is_address},
+    factors::places_of,
     headings::Heading,
     heat_pump, register_names,
+    tables::{are_tables, table_of},
     words::{
-        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, table_of,
+        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, order_of,
         type_of, width_of, yes_or_no,
     },
 };
+use crate::plant::address::wire;
 
 /// Hexadecimal digits without a mark.
 pub fn is_bare_hex(cell: &str) -> bool {
@@ -22,6 +25,16 @@ pub fn are_codes(heading: &str, cells: &[&str]) -> bool {
         && cells.iter().all(|cell| heat_pump::type_of_code(cell).is_some())
 }
 
+/// Is there nothing in a cell but a mark of that?
+pub fn is_dash(cell: &str) -> bool {
+    matches!(cell, "" | "-" | "–" | "—")
+}
+
+/// Does a cell only say that nothing stands in it?
+pub fn is_blank(cell: &str) -> bool {
+    is_dash(cell) || ["n/a", "n.a.", "n.a"].iter().any(|none| cell.eq_ignore_ascii_case(none))
+}
+
 /// How many of a hundred cells fit.
 pub fn share(cells: &[&str], fits: impl Fn(&str) -> bool) -> usize {
     if cells.is_empty() { 100 } else { 100 * cells.iter().filter(|cell| fits(cell)).count() / cells.len() }
@@ -29,6 +42,7 @@ pub fn share(cells: &[&str], fits: impl Fn(&str) -> bool) -> usize {
 
 /// What a column means: of what its heading can be, the first that what is in it can be too.
 pub fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
+    let words = Heading::new(heading);
     // A type with its size stands in no other column, whatever that is called.
     if !cells.is_empty() && 80 <= share(cells, is_sized_type) {
         return Some(Column::Type);
@@ -36,33 +50,31 @@ pub fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
     if are_codes(heading, cells) {
         return Some(Column::Type);
     }
+    if !cells.is_empty() && are_tables(&words, cells) {
+        return Some(Column::Table);
+    }
     // What is done with a register is no type of it.
     let is_of_access = !cells.is_empty() && 80 <= share(cells, |cell| access_of(cell).is_some());
-    if is_of_access && Heading::new(heading).has(&["type", "typ", "tipo", "format", "function", "area"]) {
+    if is_of_access && words.has(&["type", "typ", "tipo", "format", "function", "area"]) {
         return Some(Column::Access);
     }
     // A cell that does not fit leaves out its row, not the column.
     if let Some(exact) = Heading::exact(heading).filter(|exact| 50 <= share(cells, |cell| fits_exactly(*exact, cell))) {
         return Some(exact);
     }
-    let words = Heading::new(heading);
+    if words.is_format() && cells.iter().any(|cell| cell.parse::<u8>().is_err() && places_of(cell).is_some()) {
+        return Some(Column::Places);
+    }
     let candidates = words.candidates();
     // Codes that are not understood say so row by row: without them each row would be of another table.
     if words.is_of_codes() && cells.iter().any(|cell| cell.bytes().any(|byte| byte.is_ascii_digit())) {
         return Some(Column::Table);
     }
     if let Some(column) = candidates.iter().copied().find(|column| fits(*column, &words, cells)) {
-        // What is more than 1 as a gain is what a maker has multiplied by.
-        let is_gain = column == Column::Scale && words.has(&["gain"]);
-        let is_above =
-            !cells.is_empty() && 100 == share(cells, |cell| number_of(cell).is_some_and(|number| 1.0 <= number));
-        let is_hex = column == Column::Address && is_of_hex(&words, cells);
-        let is_of_bytes = column == Column::Length && words.has(&["bytes"]);
-        let found = match (is_gain && is_above, is_hex, is_of_bytes) {
-            (true, _, _) => Column::Divisor,
-            (_, true, _) => Column::HexAddress,
-            (_, _, true) => Column::Bytes,
-            (false, false, false) => column,
+        let found = match column {
+            Column::Address if is_of_hex(&words, cells) => Column::HexAddress,
+            Column::Length if words.has(&["bytes", "byte"]) => Column::Bytes,
+            column => column,
         };
         return Some(found);
     }
@@ -109,7 +121,10 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
             let is_word = |cell: &str| cell.chars().any(char::is_alphabetic);
             heading.rank_of_names() != 1 || 50 <= share(cells, is_word)
         }
-        Column::Scale | Column::Divisor | Column::Unit | Column::Order | Column::Formula => true,
+        Column::Order => {
+            !heading.is_any_order() || cells.iter().any(|cell| order_of(cell).is_some() || number_of(cell).is_none())
+        }
+        Column::Scale | Column::Divisor | Column::Unit | Column::Formula => true,
         Column::HexAddress
         | Column::Bytes
         | Column::Places
@@ -128,16 +143,18 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
     }
 }
 
-/// Do the digits of a column of addresses without a mark count as hexadecimal? One with a letter proves it of all.
+/// Do the digits of a column of addresses without a mark count as hexadecimal? Most of them prove it, one with a letter does
+/// not.
 fn is_of_hex(heading: &Heading, cells: &[&str]) -> bool {
-    if heading.has(&["hex"]) {
-        return !heading.has(&["dec"]);
+    if heading.is_hex() || heading.is_decimal() {
+        return !heading.is_decimal();
     }
-    let with_letter = |cell: &&&str| cell.bytes().any(|byte| byte.is_ascii_alphabetic());
-    let bare: Vec<&&str> = cells.iter().filter(|cell| is_bare_hex(cell)).collect();
+    let has_letter = |cell: &str| cell.bytes().any(|byte| byte.is_ascii_alphabetic());
     // `F1` may be the name of a parameter.
-    let is_number = |cell: &&str| cell.starts_with(|sign: char| sign.is_ascii_digit());
-    !heading.has(&["dec"]) && bare.iter().any(|cell| with_letter(cell) && is_number(cell))
+    let is_number = |cell: &str| cell.starts_with(|sign: char| sign.is_ascii_digit());
+    let is_bare = |cell: &str| is_bare_hex(cell) && is_number(cell) && has_letter(cell);
+    let is_marked = |cell: &str| is_bare_hex(cell) && has_letter(cell) || wire(cell).is_some() && has_letter(cell);
+    cells.iter().any(|cell| is_bare(cell)) && 50 < share(cells, is_marked)
 }
 
 /// Does it rise from row to row? Then it counts registers.

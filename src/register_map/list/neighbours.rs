@@ -2,20 +2,119 @@
 
 use super::{
     cells::Cells,
-    columns::Column,
-    words::{is_sized_type, type_of},
+    columns::{Column, first_of, is_address},
+    headings::Heading,
+    meanings::{is_bare_hex, is_blank},
+    words::{is_sized_type, number_of, type_of},
 };
+use crate::plant::address::wire;
 
-/// Lengths that fit the types of their rows as bytes, and none as registers, are bytes.
-pub fn count_bytes(means: &mut [Option<Column>], rows: &[Cells]) {
-    let at = |column: Column| means.iter().position(|means| *means == Some(column));
-    let (Some(kind), Some(length)) = (at(Column::Type), at(Column::Length)) else { return };
-    let sized = rows.iter().filter_map(|row| {
-        let kind = row.cells.get(kind).filter(|cell| is_sized_type(cell)).and_then(|cell| type_of(cell, None).ok())?;
-        Some((kind.0.registers(), row.cells.get(length)?.parse::<u16>().ok()?))
-    });
-    let sized: Vec<(u16, u16)> = sized.collect();
-    if !sized.is_empty() && sized.iter().all(|(registers, length)| 2 * registers == *length) {
-        means[length] = Some(Column::Bytes);
+/// The columns of a list by what each alone can mean.
+pub struct Neighbours<'a> {
+    pub means: &'a mut [Option<Column>],
+    pub headings: &'a [String],
+    pub rows: &'a [Cells],
+}
+
+impl Neighbours<'_> {
+    /// Settles what only the others decide; the column of the last addresses of spans.
+    pub fn settle(&mut self) -> Option<usize> {
+        self.count_bytes();
+        self.find_addresses();
+        let all = || 0..self.means.len();
+        let places: Vec<usize> = all().filter(|n| self.is_of_addresses(*n)).collect();
+        let heading = |n: usize| Heading::new(&self.headings[n]);
+        let is_proper = |n: usize| {
+            let heading = heading(n);
+            let is_bare_decimal = heading.is_decimal() && !heading.is_strong_address();
+            !heading.is_place() && !heading.is_last() && !heading.is_of_writes() && !is_bare_decimal
+        };
+        let proper: Vec<usize> = places.iter().copied().filter(|n| is_proper(*n)).collect();
+        let first = proper.first().or(places.first()).copied()?;
+        let last = all().find(|n| *n != first && heading(*n).is_last() && self.are_last(first, *n));
+        let of_another = |n: usize| match self.means[n] {
+            _ if Some(n) == last => Some(None),
+            // What moves with the addresses says them once more.
+            Some(Column::Offset) => places.iter().any(|place| self.moves(*place, n, true)).then_some(None),
+            Some(Column::Address | Column::HexAddress) if n == first || proper.contains(&n) => None,
+            Some(Column::Address | Column::HexAddress) if heading(n).is_of_writes() => Some(Some(Column::WriteAt)),
+            Some(Column::Address | Column::HexAddress) if heading(n).is_place() => Some(None),
+            Some(Column::Address) if heading(n).is_decimal() => (!self.moves(first, n, false)).then_some(None),
+            _ => None,
+        };
+        let settled: Vec<Option<Option<Column>>> = all().map(of_another).collect();
+        self.means.iter_mut().zip(settled).for_each(|(means, other)| *means = other.unwrap_or(*means));
+        last
+    }
+
+    fn is_of_addresses(&self, n: usize) -> bool {
+        matches!(self.means[n], Some(Column::Address | Column::HexAddress))
+    }
+
+    /// A column of addresses that are none says so row by row; `Start` or `Offset` is one where no other is.
+    fn find_addresses(&mut self) {
+        if (0..self.means.len()).any(|n| self.is_of_addresses(n)) {
+            return;
+        }
+        let is_free = |n: &usize| {
+            let heading = Heading::new(&self.headings[*n]);
+            let is_place = heading.is_place() && self.cells(*n).all(is_address);
+            is_place || self.means[*n].is_none() && heading.is_strong_address()
+        };
+        if let Some(n) = (0..self.means.len()).find(is_free) {
+            self.means[n] = Some(Column::Address);
+        }
+    }
+
+    fn cells(&self, n: usize) -> impl Iterator<Item = &str> {
+        self.rows.iter().filter_map(move |row| row.cells.get(n)).map(String::as_str).filter(|cell| !is_blank(cell))
+    }
+
+    /// The numbers of two columns in the rows that have both.
+    fn pairs(&self, one: usize, other: usize) -> Vec<[f64; 2]> {
+        let number = |row: &Cells, n: usize| {
+            let cell = first_of(row.cells.get(n)?);
+            let digits =
+                Some(cell).filter(|_| self.means[n] == Some(Column::HexAddress)).filter(|cell| is_bare_hex(cell));
+            let bare = digits.and_then(|digits| u16::from_str_radix(digits, 16).ok());
+            bare.or_else(|| wire(cell)).map(f64::from).or_else(|| number_of(cell))
+        };
+        self.rows.iter().filter_map(|row| Some([number(row, one)?, number(row, other)?])).collect()
+    }
+
+    /// Does a column step as the addresses do? It may begin again at 0.
+    fn moves(&self, address: usize, other: usize, begins_again: bool) -> bool {
+        let pairs = self.pairs(address, other);
+        let is_step = |two: &[[f64; 2]]| two[1][0] - two[0][0] == two[1][1] - two[0][1];
+        let is_begin = |two: &[[f64; 2]]| begins_again && two[1][1] == 0.0 && two[0][1] != 0.0;
+        let mut steps = pairs.windows(2);
+        match pairs.as_slice() {
+            [[address, other]] => !begins_again && address == other,
+            _ => {
+                steps.clone().all(|two| is_step(two) || is_begin(two))
+                    && steps.any(|two| is_step(two) && two[0] != two[1])
+            }
+        }
+    }
+
+    /// Is each number of a column that of the address before it, or a greater one?
+    fn are_last(&self, first: usize, last: usize) -> bool {
+        let pairs = self.pairs(first, last);
+        !pairs.is_empty() && pairs.iter().all(|[first, last]| first <= last) && self.cells(last).all(is_address)
+    }
+
+    /// Lengths that fit the types of their rows as bytes, and none as registers, are bytes.
+    fn count_bytes(&mut self) {
+        let at = |column: Column| self.means.iter().position(|means| *means == Some(column));
+        let (Some(kind), Some(length)) = (at(Column::Type), at(Column::Length)) else { return };
+        let sized = self.rows.iter().filter_map(|row| {
+            let kind = row.cells.get(kind).filter(|cell| is_sized_type(cell));
+            let kind = kind.and_then(|cell| type_of(cell, None).ok())?;
+            Some((kind.0.registers(), row.cells.get(length)?.parse::<u16>().ok()?))
+        });
+        let sized: Vec<(u16, u16)> = sized.collect();
+        if !sized.is_empty() && sized.iter().all(|(registers, length)| 2 * registers == *length) {
+            self.means[length] = Some(Column::Bytes);
+        }
     }
 }

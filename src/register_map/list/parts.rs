@@ -3,8 +3,8 @@
 use super::{
     List, ListContext, base,
     cells::Cells,
-    columns::{Columns, Said, is_address, is_heading},
-    headings::has_addresses,
+    columns::{Column, Columns, Said, is_address, is_heading},
+    headings::{Heading, has_addresses},
     row::Row,
 };
 use crate::t;
@@ -49,6 +49,11 @@ fn below_heading(
 ) -> Vec<Row> {
     let columns = Columns::new(heading, below, &context.means);
     list.is_sure |= columns.is_sure;
+    let is_named = columns.means.contains(&Some(Column::Name));
+    if let Some(n) = columns.means.iter().position(Option::is_none).filter(|_| !is_named) {
+        let column = &columns.headings[n];
+        list.warnings.push(t!("no column of names: `--column \"{column}=name\"` says which it is", column));
+    }
     let named = columns.headings.iter().cloned().zip(columns.means.iter().copied());
     list.add_columns(named.collect(), columns.open.clone());
     let row = |row: &Cells| {
@@ -72,7 +77,14 @@ fn by_form(all: &[Cells], is_separated: bool, said: &Said) -> Result<Vec<Row>, S
         let count = |row: &Cells| row.cells.iter().filter(|cell| !cell.is_empty()).count();
         let with_addresses = all.iter().find(|row| 2 <= count(row) && has_addresses(&row.cells, said));
         if let Some(row) = with_addresses {
-            return Err(t!("its heading has no column of names: {heading}", heading = row.cells.join(", ")));
+            let heading = row.cells.join(", ");
+            let is_other = |cell: &&String| !cell.is_empty() && !Heading::new(cell).is_strong_address();
+            let column = row.cells.iter().find(is_other).map_or("", String::as_str);
+            return Err(t!(
+                "its heading has no column of names: {heading}. `--column \"{column}=name\"` says which it is",
+                heading,
+                column
+            ));
         }
         let ruled = all.iter().find(|row| row.is_ruled && 2 <= count(row));
         return Err(no_addresses(&ruled.unwrap_or(first).cells));

@@ -2,9 +2,10 @@
 
 use super::{
     columns::Column,
+    factors::{effect, is_pattern},
     headings::Heading,
-    meanings::share,
-    words::{bit_field_of, is_marked, is_sized_type, kind_of, length_of, number_of, power_of_ten},
+    meanings::{is_blank, share},
+    words::{bit_field_of, is_marked, is_sized_type, kind_of, number_of, power_of_ten},
 };
 use crate::{t, text::translate};
 
@@ -39,21 +40,8 @@ impl Question {
         let effects: Vec<Option<f64>> = self.may_be.iter().map(|column| effect(*column, cell)).collect();
         let is_same = effects.iter().all(|effect| effect.is_some() && *effect == effects[0]);
         let changes_nothing = is_same && effects[0].is_some_and(|effect| 1 < effects.len() || effect == 1.0);
-        !changes_nothing && !matches!(cell, "" | "-" | "–")
+        !changes_nothing && !is_blank(cell)
     }
-}
-
-/// What a number is multiplied by, if its column means this.
-fn effect(column: Column, cell: &str) -> Option<f64> {
-    let number = number_of(cell)?;
-    let of = [
-        (Column::Scale, number),
-        (Column::Divisor, 1.0 / number),
-        (Column::Exponent, power_of_ten(number)),
-        (Column::Places, power_of_ten(-number)),
-        (Column::Decimals, 1.0),
-    ];
-    of.into_iter().find(|(known, _)| *known == column).map(|(_, effect)| effect)
 }
 
 /// The questions that columns leave open, unless their reader has answered them.
@@ -76,6 +64,11 @@ pub fn of(
         let (heading, cells) = (Heading::new(&headings[n]), &cells[n]);
         match means[n] {
             Some(Column::Scale) => of_factor(&heading, cells),
+            Some(Column::Exponent) if !heading.is_power() && !plain(cells).any(|number| number <= 0.0) => {
+                vec![Column::Exponent, Column::Divisor, Column::Scale]
+            }
+            // A pattern may as well say how a number with a point is shown.
+            Some(Column::Places) if cells.iter().any(|cell| is_pattern(cell)) => vec![Column::Places, Column::Decimals],
             Some(Column::Divisor) if plain(cells).any(|number| number.abs() < 1.0) => {
                 vec![Column::Divisor, Column::Scale]
             }
@@ -91,7 +84,7 @@ pub fn of(
             {
                 vec![Column::Field]
             }
-            Some(Column::Length) if is_of_bytes(&heading, cells, &kinds) => vec![Column::Length, Column::Bytes],
+            Some(Column::Length) if is_of_bytes(&heading, &kinds) => vec![Column::Length, Column::Bytes],
             Some(Column::Address) if is_half_hex(cells) => {
                 vec![Column::Address, Column::HexAddress]
             }
@@ -100,6 +93,7 @@ pub fn of(
             }
             None if heading.is_harmless() || cells.is_empty() => Vec::new(),
             None if !is_typed && 60 <= share(cells, |cell| kind_of(cell).is_some()) => vec![Column::Type],
+            None if is_scaled && heading.is_accuracy() => Vec::new(),
             None if is_of_factors(cells) => vec![Column::Scale, Column::Divisor],
             None | Some(_) => Vec::new(),
         }
@@ -129,10 +123,10 @@ fn of_factor(heading: &Heading, cells: &[&str]) -> Vec<Column> {
     if whole.is_some_and(|numbers| numbers.iter().any(|number| *number <= 0)) {
         return vec![Column::Scale, Column::Exponent];
     }
-    let is_sure = heading.has(&["multiplier", "multiply", "multiplikator", "resolution", "auflösung"]);
-    let (is_below, is_above) =
-        (plain(cells).any(|number| number.abs() < 1.0), plain(cells).any(|number| 1.0 < number.abs()));
-    if is_above && !is_below && !is_sure { vec![Column::Scale, Column::Divisor] } else { Vec::new() }
+    let is_above = plain(cells).any(|number| 1.0 < number.abs());
+    // A maker has called 10 and 0.1 so that a value is divided by.
+    let is_other = heading.is_scale_factor() && plain(cells).any(|number| number != 1.0);
+    if is_other || is_above && !heading.is_multiplier() { vec![Column::Scale, Column::Divisor] } else { Vec::new() }
 }
 
 /// Factors stand in few other columns: with decimals, or powers of ten.
@@ -145,18 +139,16 @@ fn is_of_factors(cells: &[&str]) -> bool {
     80 <= share(cells, fits)
 }
 
-/// `3` and `4` alone: function codes or areas.
+/// `3` and `4`: function codes or areas.
 fn is_digit(cells: &[&str]) -> bool {
-    80 <= share(cells, |cell| matches!(cell, "0" | "1" | "2" | "3" | "4"))
+    cells.iter().any(|cell| matches!(*cell, "0" | "1" | "2" | "3" | "4"))
 }
 
-/// Lengths of which nothing shows whether they count registers: no type with its size, and none that is one register long.
-fn is_of_bytes(heading: &Heading, cells: &[&str], kinds: &[&str]) -> bool {
+/// Lengths of which nothing shows whether they count registers: neither their heading nor a type with its size.
+fn is_of_bytes(heading: &Heading, kinds: &[&str]) -> bool {
     let is_stated =
         heading.has(&["registers", "register", "words", "wörter", "quantity", "qty", "count", "registeranzahl"]);
-    !is_stated
-        && !kinds.iter().any(|kind| is_sized_type(kind))
-        && !cells.iter().any(|cell| length_of(cell, false) == Some(1))
+    !is_stated && !kinds.iter().any(|kind| is_sized_type(kind))
 }
 
 /// Some of its cells may be hexadecimal numbers; a single word such as `AC` stands above others.

@@ -3,18 +3,14 @@
 use super::{
     cells::{Cells, of_text},
     columns::{Column, Columns},
+    factors::{effect, is_word, of_unit, one_of, places_of},
     headings::Heading,
+    meanings::{is_blank, is_dash},
     row::{differ, unfit},
-    words::{
-        BadNumber, access_of, bad_of, bit_field_of, labels_of, number_of, poll_of, power_of_ten, type_of,
-        unit_with_factor,
-    },
+    words::{BadNumber, access_of, bad_of, bit_field_of, labels_of, number_of, poll_of, type_of},
 };
 use crate::{
-    plant::{
-        address::in_table,
-        tag::{Access, Poll, Table},
-    },
+    plant::tag::{Access, Poll},
     profile::is_known_unit,
 };
 
@@ -31,7 +27,6 @@ pub struct More {
     pub bad: Vec<(BadNumber, BadNumber)>,
     pub group: String,
     pub label: String,
-    pub write_at: Option<(Table, u16)>,
     pub write_with: Option<u8>,
     pub poll: Option<Poll>,
 }
@@ -45,13 +40,14 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn cells(&self, column: Column) -> impl Iterator<Item = &'a str> {
+    pub fn cells(&self, column: Column) -> impl Iterator<Item = &'a str> {
         let (places, row) = (self.columns.places(column).into_iter(), self.row);
         let is_sure = self.columns.is_sure;
         let cells = places
             .filter_map(|place| row.cells.get(place))
             .map(move |cell| if is_sure { of_text(cell) } else { cell.as_str() });
-        cells.filter(|cell| !matches!(*cell, "" | "-" | "–"))
+        // `n/a` is no number that a device gives for none.
+        cells.filter(move |cell| if column == Column::Bad { !is_dash(cell) } else { !is_blank(cell) })
     }
 
     pub fn text(&self, column: Column) -> Option<&'a str> {
@@ -94,35 +90,49 @@ impl<'a> Reader<'a> {
 
     /// The factor of all columns that have one.
     pub fn factor(&mut self) -> Option<f64> {
-        // 0 is none to ioBroker, which then takes 1.
         let columns = self.columns;
-        let number = |cell: &str| match number_of(cell) {
-            Some(0.0) if columns.is_iobroker => Some(1.0),
-            found => found.or(with_unit(columns, cell).map(|(factor, _)| factor)).filter(|number| *number != 0.0),
+        let words = self.is_of_formats();
+        let of = |column: Column, cell: &str| match column {
+            // 0 is none to ioBroker, which then takes 1.
+            Column::Scale if columns.is_iobroker && number_of(cell) == Some(0.0) => Some(1.0),
+            Column::Scale => effect(column, cell).or(with_unit(columns, cell).map(|(factor, _)| factor)),
+            Column::Places if words && is_word(cell) => effect(column, cell).or(Some(1.0)),
+            column => effect(column, cell),
         };
-        let power = |cell: &str| cell.parse::<i8>().ok().map(f64::from);
-        let scale = self.read(Column::Scale, number);
-        let divisor = self.read(Column::Divisor, number).map(|by| 1.0 / by);
-        let exponent = self.read(Column::Exponent, power).map(power_of_ten);
-        let places = self.read(Column::Places, |cell| power(cell).filter(|places| 0.0 <= *places));
-        // As a person would write it: 0.1, not the nearest to it.
-        let places = places.map(|places| power_of_ten(-places));
-        [divisor, exponent, places, scale].into_iter().flatten().reduce(|all, one| all * one)
+        let mut all = Vec::new();
+        for column in [Column::Scale, Column::Divisor, Column::Exponent, Column::Places] {
+            let factor = self.read(column, |cell| of(column, cell));
+            all.extend(factor.zip(self.text(column)));
+        }
+        one_of(&all).unwrap_or_else(|why| {
+            self.refuse(why);
+            None
+        })
+    }
+
+    /// Is a column of decimals one of formats, of which some have none?
+    fn is_of_formats(&self) -> bool {
+        let is_format = |place: &usize| Heading::new(&self.columns.headings[*place]).is_format();
+        [Column::Places, Column::Decimals]
+            .into_iter()
+            .flat_map(|column| self.columns.places(column))
+            .any(|n| is_format(&n))
     }
 
     pub fn more(&mut self) -> More {
+        let words = self.is_of_formats();
+        let decimals = |cell: &str| places_of(cell).map(Some).or((words && is_word(cell)).then_some(None));
         More {
             access: self.read(Column::Access, access_of),
             min: self.read(Column::Min, number_of),
             max: self.read(Column::Max, number_of),
-            decimals: self.read(Column::Decimals, |cell| cell.parse().ok()),
+            decimals: self.read(Column::Decimals, decimals).flatten(),
             labels: self.read(Column::Labels, labels_of).unwrap_or_default(),
             bits: self.read(Column::Bits, labels_of).unwrap_or_default(),
             field: self.read(Column::Field, bit_field_of),
             bad: self.read(Column::Bad, bad_of).unwrap_or_default(),
             group: self.text(Column::Group).unwrap_or_default().to_owned(),
             label: self.text(Column::Label).unwrap_or_default().to_owned(),
-            write_at: self.read(Column::WriteAt, in_table),
             write_with: self.read(Column::WriteWith, |cell| cell.parse().ok()),
             poll: self.read(Column::Poll, poll_of),
         }
@@ -131,16 +141,18 @@ impl<'a> Reader<'a> {
     /// Headings of what stands in no column that is used, and of a second name.
     pub fn unused(&self) -> Vec<String> {
         let names = self.columns.places(Column::Name);
-        let first = names
-            .iter()
-            .find(|place| self.row.cells.get(**place).is_some_and(|cell| !matches!(cell.as_str(), "" | "-" | "–")));
+        let first = names.iter().find(|place| self.row.cells.get(**place).is_some_and(|cell| !is_blank(cell)));
+        let is_type = |cell: &str| type_of(cell, None).is_ok();
+        let is_known = self.columns.types(self.row).into_iter().any(is_type);
         let is_unused = |n: usize| match self.columns.means[n] {
-            None => true,
+            None => self.columns.last != Some(n),
             Some(Column::Name) => first != Some(&n),
+            Some(Column::Places | Column::Decimals) => places_of(&self.row.cells[n]).is_none(),
+            Some(Column::Type) => is_known && !self.columns.type_at(n, self.row).is_some_and(is_type),
             Some(_) => false,
         };
         let cells = self.row.cells.iter().take(self.columns.means.len()).enumerate();
-        let unused = cells.filter(|(n, cell)| is_unused(*n) && !matches!(cell.as_str(), "" | "-" | "–"));
+        let unused = cells.filter(|(n, cell)| is_unused(*n) && !is_blank(cell));
         unused.map(|(n, _)| self.columns.headings[n].clone()).collect()
     }
 }
@@ -148,8 +160,8 @@ impl<'a> Reader<'a> {
 /// `0.1 V` as a resolution: the factor, and the unit of the value. As a factor, 1 % may be 0.01 as well.
 pub fn with_unit(columns: &Columns, cell: &str) -> Option<(f64, String)> {
     let place = *columns.places(Column::Scale).first()?;
-    let is_resolution = Heading::new(&columns.headings[place]).has(&["resolution", "auflösung", "résolution"]);
+    let is_resolution = Heading::new(&columns.headings[place]).is_resolution();
     // A number alone has no unit.
     let is_number = cell.starts_with(|sign: char| sign.is_ascii_digit()) && number_of(cell).is_none();
-    unit_with_factor(cell).ok().filter(|(_, unit)| is_resolution && is_number && is_known_unit(unit))
+    of_unit(cell).ok().filter(|(_, unit)| is_resolution && is_number && is_known_unit(unit))
 }

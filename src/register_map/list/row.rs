@@ -1,19 +1,15 @@
 //! The cells of a row by what they hold, and what becomes of them.
 
 use super::{
-    cells::Cells,
-    codes,
-    columns::{Column, Columns, first_of, is_address, span_of},
-    formula::Formula,
-    reader::{More, Reader, with_unit},
-    words::{area, bad_span, length_of, number_of, order_of, table_of, type_of, unit_with_factor, width_of, yes_or_no},
+    columns::{Column, first_of},
+    reader::More,
+    words::{bad_span, type_of},
 };
 use crate::{
     plant::{
         address::{AddressBase, AddressContext, of_modicon},
         tag::{Access, ByteOrder, DataType, Encoding, Table},
     },
-    profile::unit_of,
     register_map::named::{Named, decimals_of},
     t,
     text::translate,
@@ -36,29 +32,33 @@ pub struct Row {
     pub(super) kind: Option<String>,
     /// A column says the tables of all rows.
     pub is_tabled: bool,
+    /// It is a row of a known program, in which nothing is assumed of its factors.
+    pub(super) is_sure: bool,
     /// A column says the types of all rows.
-    is_typed: bool,
-    signed: Option<bool>,
+    pub(super) is_typed: bool,
+    pub(super) signed: Option<bool>,
     pub(super) length: Option<u16>,
     /// Bits of a number whose type does not say it.
-    width: Option<u16>,
+    pub(super) width: Option<u16>,
     pub(super) scale: Option<f64>,
-    offset: f64,
+    pub(super) offset: f64,
     /// Where the power of ten of its formula stands.
-    power: Option<String>,
+    pub(super) power: Option<String>,
     pub(super) unit: String,
     /// As the row states it.
     pub table: Option<Table>,
     pub(super) order: Option<ByteOrder>,
     /// Unit address, as the row states it.
     pub device: Option<u8>,
-    more: More,
+    pub(super) more: More,
+    /// Where it is written, as written there.
+    pub(super) write_at: Option<String>,
     /// The function codes that write it, of one register and of several.
-    writes: [Option<u8>; 2],
+    pub(super) writes: [Option<u8>; 2],
     /// Columns that are not used and have something in this row.
     pub unused: Vec<String>,
     /// Why it is no row of registers.
-    refused: Option<String>,
+    pub(super) refused: Option<String>,
     /// Why it cannot be taken, whatever else it says.
     pub(super) wrong: Option<String>,
 }
@@ -87,6 +87,8 @@ pub struct Taken {
     pub is_order_assumed: bool,
     /// Nothing says its type.
     pub is_type_assumed: bool,
+    /// Its bounds are taken as values after its factor.
+    pub are_bounds_assumed: bool,
     /// The list says that it is written, but not surely how.
     pub is_write_lost: bool,
 }
@@ -113,6 +115,18 @@ pub fn unfit(column: Column, cell: &str) -> String {
     t!("`{cell}` is not understood below {column}", cell, column = translate(column.word()))
 }
 
+/// Bounds beside a factor are values, unless no raw number would be one of them.
+fn check_bounds(named: &Named) -> Result<(), String> {
+    let Some((least, most)) = named.point().raw_range().filter(|_| named.scale != 1.0) else { return Ok(()) };
+    // A bound may be the nearest round number.
+    let (least, most) = (least as f64 - 1.0, most as f64 + 1.0);
+    let is_beyond = |bound: &f64| !(least..=most).contains(&((bound - named.offset) / named.scale));
+    match named.min.into_iter().chain(named.max).find(is_beyond) {
+        Some(bound) => Err(t!("`{bound}` is more than its registers hold after the factor: is it before it?", bound)),
+        None => Ok(()),
+    }
+}
+
 impl Row {
     /// Nothing of it is known but its line.
     pub fn without_cells(line: usize) -> Row {
@@ -122,123 +136,6 @@ impl Row {
     /// It is no row of registers.
     pub fn refused(line: usize, why: String) -> Row {
         Row { refused: Some(why), ..Row::without_cells(line) }
-    }
-
-    /// Below a heading.
-    pub fn headed(columns: &Columns, row: &Cells) -> Row {
-        let mut read = Row { line: row.line, ..Row::default() };
-        if row.is_unclosed {
-            return Row { wrong: Some(t!("a quote is never closed").to_owned()), ..read };
-        }
-        if row.cells.iter().skip(columns.headings.len()).any(|cell| !cell.is_empty()) {
-            let (found, expected) = (row.cells.len(), columns.headings.len());
-            return Row { wrong: Some(t!("{found} cells, the heading has {expected}", found, expected)), ..read };
-        }
-        let mut reader = Reader { columns, row, wrong: None };
-        for question in &columns.open {
-            let cell = row.cells.get(question.place).filter(|cell| question.matters(cell));
-            cell.into_iter().for_each(|cell| reader.refuse(question.of_cell(cell)));
-        }
-        // Of two addresses the surest that can be read counts.
-        let written = columns.places(Column::Address).into_iter().filter_map(|place| {
-            let cell = row.cells.get(place).filter(|cell| !cell.is_empty())?;
-            Some(columns.address(place, cell))
-        });
-        let written: Vec<(String, Option<AddressBase>)> = written.collect();
-        let found = written.iter().find(|(cell, _)| is_address(cell)).or(written.first()).cloned();
-        read.addresses = written.into_iter().map(|(cell, _)| cell).collect();
-        (read.address, read.base) = found.map_or((None, None), |(cell, base)| (Some(cell), base));
-        read.base = read.base.filter(|base| {
-            // A Modicon number counts from 1 as well, but not as this one.
-            *base == AddressBase::Zero || read.address.as_ref().is_none_or(|cell| of_modicon(first_of(cell)).is_none())
-        });
-        read.name = reader.text(Column::Name).unwrap_or_default().to_owned();
-        read.is_typed = columns.means.contains(&Some(Column::Type));
-        read.kind = reader.kind();
-        read.signed = reader.read(Column::Signed, yes_or_no);
-        read.length = reader.read(Column::Length, |cell| length_of(cell, false));
-        read.length = read.length.or_else(|| reader.read(Column::Bytes, |cell| length_of(cell, true)));
-        if columns.is_iobroker && read.is_typed {
-            // The program knows the lengths of all types but texts, and the type where none is stated.
-            read.is_register = true;
-            let kind = read.kind.get_or_insert_with(|| "uint16be".to_owned());
-            read.length = read.length.filter(|_| kind.starts_with("string"));
-        }
-        read.take_span(&mut reader);
-        read.width = reader.read(Column::Width, width_of);
-        read.is_tabled = columns.means.iter().flatten().any(|means| matches!(means, Column::Table | Column::Area));
-        read.table = reader.read(Column::Table, table_of).or_else(|| reader.read(Column::Area, area));
-        read.take_table_of_address(&mut reader);
-        read.device = reader.read(Column::Device, |cell| cell.parse().ok());
-        read.order = reader.read(Column::Order, order_of);
-        read.scale = reader.factor();
-        read.offset = reader.read(Column::Offset, number_of).unwrap_or_default();
-        if let Some(text) = reader.text(Column::Formula) {
-            // A factor besides may be part of it, or not.
-            let formula = Formula::of(text).filter(|_| matches!(read.scale, None | Some(1.0)) && read.offset == 0.0);
-            match formula {
-                Some(formula) => (read.scale, read.power) = (Some(formula.factor), formula.power_at),
-                None => {
-                    reader.refuse(t!("the formula `{formula}` is more than a factor and an offset", formula = text))
-                }
-            }
-        }
-        read.more = reader.more();
-        read.more.write_with = read.more.write_with.or(Some(16).filter(|_| columns.is_of_manager));
-        read.writes = reader.text(Column::Table).map(codes::writes_of).unwrap_or_default();
-        read.unused = reader.unused();
-        read.read_unit(&mut reader);
-        read.wrong = reader.wrong;
-        read
-    }
-
-    /// The table that an address such as `HR5` states.
-    fn take_table_of_address(&mut self, reader: &mut Reader<'_>) {
-        let cell = |place: usize| Some((reader.row.cells.get(place)?.as_str(), place));
-        let mut all = reader.columns.places(Column::Address).into_iter().filter_map(cell);
-        let found = all.find_map(|(cell, place)| Some((cell, reader.columns.table_of_address(place, cell)?)));
-        let Some((cell, table)) = found else { return };
-        match self.table.filter(|of| *of != table) {
-            Some(other) => reader.refuse(differ(cell, other.word())),
-            None => self.table = Some(table),
-        }
-    }
-
-    /// The length that a span of addresses states.
-    fn take_span(&mut self, reader: &mut Reader<'_>) {
-        let Some((cell, span)) = self.address.as_ref().and_then(|cell| Some((cell, span_of(cell)?))) else { return };
-        match self.length.filter(|length| *length != span) {
-            Some(length) => {
-                let (other, cell) = (cell, length.to_string());
-                reader.refuse(differ(other, &cell));
-            }
-            None => self.length = Some(span),
-        }
-    }
-
-    /// The unit, and a factor that stands in front of it.
-    fn read_unit(&mut self, reader: &mut Reader<'_>) {
-        let columns = reader.columns;
-        let of_scale = reader.text(Column::Scale).and_then(|cell| Some((cell, with_unit(columns, cell)?.1)));
-        let Some(cell) = reader.text(Column::Unit) else {
-            self.unit = of_scale.map(|(_, unit)| unit).unwrap_or_default();
-            return;
-        };
-        if let Some((other, _)) = of_scale.filter(|(_, unit)| *unit != unit_of(cell)) {
-            reader.refuse(differ(other, cell));
-        }
-        if reader.columns.is_sure {
-            self.unit = unit_of(cell);
-            return;
-        }
-        match unit_with_factor(cell) {
-            Ok((1.0, unit)) => self.unit = unit,
-            Ok((_, _)) if self.scale.is_some() => {
-                reader.refuse(t!("`{cell}`: its unit has a factor, and it has another", cell));
-            }
-            Ok((factor, unit)) => (self.scale, self.unit) = (Some(factor), unit),
-            Err(why) => reader.refuse(why),
-        }
     }
 
     /// Table and address, as assumed where the row does not say more.
@@ -339,8 +236,13 @@ impl Row {
         let named = if is_free { named.ordered(assumed.order) } else { named };
         let first = first_of(written);
         let is_plain = first.bytes().all(|byte| byte.is_ascii_digit()) && assumed.alias.is_none();
+        let named = self.with_more(named, assumed).map_err(because)?;
+        if !self.is_sure {
+            check_bounds(&named).map_err(because)?;
+        }
         Ok(Taken {
-            named: self.with_more(named).map_err(because)?,
+            are_bounds_assumed: named.scale != 1.0 && named.min.or(named.max).is_some(),
+            named,
             is_base_assumed: self.base.is_none() && is_plain && of_modicon(first).is_none_or(|(of, _)| of != table),
             is_order_assumed: stated.is_none() && !is_in_order,
             is_type_assumed: !table.is_bits() && self.kind.is_none() && self.signed.is_none(),
@@ -348,14 +250,31 @@ impl Row {
         })
     }
 
-    fn with_more(&self, mut named: Named) -> Result<Named, String> {
+    /// Where it is written, if that is another place: no device writes the tables that are only read.
+    fn place_of_writes(&self, named: &Named, assumed: Assumed) -> Result<Option<(Table, u16)>, String> {
+        let Some(written) = &self.write_at else { return Ok(None) };
+        let table = match named.table {
+            Table::Coil | Table::Discrete => Table::Coil,
+            Table::Input | Table::Holding => Table::Holding,
+        };
+        let is_stated = self.table.is_some() || assumed.is_stated;
+        let base = self.base.unwrap_or(assumed.base);
+        let place = AddressContext { table, is_stated, base }.parse(first_of(written));
+        let place = place.filter(|(of, _)| of.is_bits() == table.is_bits());
+        let place = place.ok_or_else(|| t!("`{written}` is not an address", written))?;
+        Ok(Some(place).filter(|place| *place != (named.table, named.address)))
+    }
+
+    fn with_more(&self, mut named: Named, assumed: Assumed) -> Result<Named, String> {
         let more = &self.more;
+        let write_at = self.place_of_writes(&named, assumed)?;
         let (one, many) = (self.writes[0].filter(|_| named.count() == 1), self.writes[1]);
-        let by_code = one.or(many).map(|_| Access::ReadWrite);
+        let is_written = one.or(many).is_some() || self.write_at.is_some();
+        let by_code = is_written.then_some(Access::ReadWrite);
         named.access = more.access.or(by_code).unwrap_or(named.access);
         let by_many = many.filter(|_| one.is_none() && named.count() == 1);
         if named.access != Access::Read {
-            (named.write_at, named.write_fc) = (more.write_at, more.write_with.or(by_many));
+            (named.write_at, named.write_fc) = (write_at, more.write_with.or(by_many));
         }
         (named.min, named.max) = (more.min, more.max);
         named.decimals = more.decimals.unwrap_or(named.decimals);

@@ -222,9 +222,14 @@ pub fn yes_or_no(cell: &str) -> Option<bool> {
 pub fn access_of(cell: &str) -> Option<Access> {
     let word: String = cell.to_lowercase().chars().filter(|c| c.is_alphabetic()).collect();
     match word.as_str() {
-        "r" | "ro" | "read" | "readonly" | "lesen" | "nurlesen" => Some(Access::Read),
-        "rw" | "wr" | "readwrite" | "writeread" | "lesenschreiben" => Some(Access::ReadWrite),
-        "w" | "wo" | "write" | "writeonly" | "schreiben" => Some(Access::Write),
+        "r" | "ro" | "rd" | "read" | "readonly" | "lesen" | "nurlesen" | "lecture" | "lectura" | "lettura" | "只读" => {
+            Some(Access::Read)
+        }
+        "rw" | "wr" | "rdwr" | "readwrite" | "writeread" | "lesenschreiben" | "lectureécriture"
+        | "lecturaescritura" | "letturascrittura" | "读写" | "可读写" => Some(Access::ReadWrite),
+        "w" | "wo" | "write" | "writeonly" | "schreiben" | "écriture" | "escritura" | "scrittura" | "只写" => {
+            Some(Access::Write)
+        }
         _ => None,
     }
 }

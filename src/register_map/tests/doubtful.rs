@@ -24,7 +24,7 @@ pub fn check(text: &str, taken: &[&str], left_out: &[&str], asked: &[&str]) {
 }
 
 /// The same as its reader has said what a column means.
-fn said(text: &str, heading: &str, means: Option<Column>, taken: &[&str]) {
+pub fn said(text: &str, heading: &str, means: Option<Column>, taken: &[&str]) {
     let means = Said::from([(heading.to_owned(), means)]);
     let list = read(text.as_bytes(), &ListContext { means, ..ListContext::default() });
     let named: Vec<String> = list.named.iter().map(shown).collect();
@@ -70,12 +70,8 @@ fn a_column_that_may_change_values_is_asked_about() {
     said(places, "Decimals", Some(Column::Places), &["40006 a int16 ABCD x0.1", "40007 b int16 ABCD x1"]);
     check("address;name;type;divisor\n5;a;int16;0.1\n", &[], &["divisor (0.1)"], &["divisor / factor"]);
     check("address;name;type;scale\n5;a;int16;1,000\n", &[], &["`1,000` is not a scale"], &[]);
-    check(
-        "address;name;type;scale\n5;a;int16;10\n6;b;int16;0.1\n",
-        &["40006 a int16 ABCD x10", "40007 b int16 ABCD x0.1"],
-        &[],
-        &[],
-    );
+    let mixed = "address;name;type;scale\n5;a;int16;10\n6;b;int16;0.1\n";
+    check(mixed, &[], &["scale (10)", "scale (0.1)"], &["scale (10): factor / divisor?"]);
     check("address;name;type;multiplier\n5;a;int16;10\n", &["40006 a int16 ABCD x10"], &[], &[]);
 }
 

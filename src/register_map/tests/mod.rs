@@ -4,6 +4,8 @@ mod codes;
 mod configurations;
 mod doubtful;
 mod exports;
+mod foreign_columns;
+mod foreign_places;
 mod headings;
 mod iobroker;
 mod meanings;
