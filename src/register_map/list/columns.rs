@@ -95,6 +95,9 @@ impl Columns {
                 return heading.rank_of_names();
             }
             let is_sent = heading.is_hex() || heading.has(&["pdu", "protocol", "wire"]);
+            if heading.is_decimal() && !heading.is_strong_address() {
+                return 3;
+            }
             [is_sent, heading.has(&["address", "addr", "addr.", "adresse"])].iter().position(|is| *is).unwrap_or(2)
         };
         places.sort_by_key(rank);

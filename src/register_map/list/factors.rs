@@ -9,9 +9,12 @@ use crate::profile::{is_known_unit, unit_of};
 
 /// No register has a greater power of ten; what is greater is a factor or a code.
 const POWER_MAX: i8 = 10;
-/// What a unit is a part of, in words in front of it.
-const PARTS: [(&str, f64); 4] =
-    [("tenths of ", 0.1), ("hundredths of ", 0.01), ("thousandths of ", 0.001), ("zehntel ", 0.1)];
+/// What a unit is a part of, as the first word of it.
+const PARTS: [(&[&str], f64); 3] = [
+    (&["tenth", "tenths", "zehntel", "dixièmes"], 0.1),
+    (&["hundredth", "hundredths", "hundertstel", "centièmes"], 0.01),
+    (&["thousandth", "thousandths", "tausendstel", "millièmes"], 0.001),
+];
 
 /// What a cell makes of its row where its column means this: a number, by which the value is multiplied, or a length.
 pub fn effect(column: Column, cell: &str) -> Option<f64> {
@@ -60,9 +63,11 @@ pub fn is_pattern(cell: &str) -> bool {
     cell.contains(['.', ',']) && places_of(cell).is_some()
 }
 
-/// Does it say a format by a word, such as `FIX2`, `TEMP` or `ENUM`?
-pub fn is_word(cell: &str) -> bool {
-    cell.starts_with(char::is_alphabetic) && cell.chars().all(|sign| sign.is_alphanumeric() || "_- ".contains(sign))
+/// Is it the word of a format that has no decimals, such as `ENUM`?
+pub fn is_kind_of_format(cell: &str) -> bool {
+    let is_word = cell.starts_with(char::is_alphabetic)
+        && cell.chars().all(|sign| sign.is_alphanumeric() || "_- ".contains(sign));
+    is_word && places_of(cell).is_none()
 }
 
 /// The factor that several cells say, each of which may say the same in its own way; `Err` where they differ.
@@ -78,21 +83,28 @@ pub fn one_of(all: &[(f64, &str)]) -> Result<Option<f64>, String> {
 /// A unit, and the factor beside it: `[0.1 V]`, `W [0.1]`, `V×10⁻¹`, `tenths of °C`, and what stands in front of one.
 pub fn of_unit(cell: &str) -> Result<(f64, String), String> {
     let cell = without_brackets(cell.trim());
-    let lower = cell.to_lowercase();
-    let in_words = PARTS.iter().find_map(|(words, part)| {
-        let unit = cell.get(lower.strip_prefix(words).map(|_| words.len())?..)?;
-        Some((*part, unit.trim()))
-    });
+    if let Some((part, unit)) = part_of(cell) {
+        return Ok((part, unit_of(&unit)));
+    }
     let behind = || {
         let (unit, number) = cell.strip_suffix([']', ')']).unwrap_or(cell).rsplit_once(['[', '(', '×', '*'])?;
         Some((number_of(&raised(number.trim()))?, unit.trim()))
     };
     // A unit times ten may as well be that of a number that was multiplied.
     let is_part = |(factor, unit): &(f64, &str)| *factor != 0.0 && factor.abs() <= 1.0 && is_known_unit(unit);
-    match in_words.or_else(behind).filter(is_part) {
+    match behind().filter(is_part) {
         Some((factor, unit)) => Ok((factor, unit_of(unit))),
         None => unit_with_factor(cell),
     }
+}
+
+/// `tenths of °C`, `Zehntel °C`: the part and the unit.
+fn part_of(cell: &str) -> Option<(f64, String)> {
+    let mut words = cell.split_whitespace();
+    let first = words.next()?.to_lowercase();
+    let (_, part) = PARTS.iter().find(|(words, _)| words.contains(&first.as_str()))?;
+    let unit = words.skip_while(|word| ["of", "a", "de"].contains(word)).collect::<Vec<_>>().join(" ");
+    Some((*part, unit))
 }
 
 /// What stands in a pair of brackets.

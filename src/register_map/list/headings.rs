@@ -248,7 +248,7 @@ impl Heading {
 
     /// Its column says where something stands, if no other does.
     pub fn is_place(&self) -> bool {
-        matches!(self.0.as_slice(), [word] if word == "start" || word == "offset")
+        matches!(self.0.as_slice(), [word] if ["start", "offset", "from", "von"].contains(&word.as_str()))
     }
 
     /// Its column says byte orders, or counts rows.

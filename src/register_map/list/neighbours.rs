@@ -35,11 +35,11 @@ impl Neighbours<'_> {
         let of_another = |n: usize| match self.means[n] {
             _ if Some(n) == last => Some(None),
             // What moves with the addresses says them once more.
-            Some(Column::Offset) => places.iter().any(|place| self.moves(*place, n, true)).then_some(None),
+            Some(Column::Offset) => places.iter().any(|place| self.moves(*place, n)).then_some(None),
             Some(Column::Address | Column::HexAddress) if n == first || proper.contains(&n) => None,
             Some(Column::Address | Column::HexAddress) if heading(n).is_of_writes() => Some(Some(Column::WriteAt)),
             Some(Column::Address | Column::HexAddress) if heading(n).is_place() => Some(None),
-            Some(Column::Address) if heading(n).is_decimal() => (!self.moves(first, n, false)).then_some(None),
+            Some(Column::Address) if heading(n).is_decimal() => (!self.are_same(first, n)).then_some(None),
             _ => None,
         };
         let settled: Vec<Option<Option<Column>>> = all().map(of_another).collect();
@@ -83,18 +83,24 @@ impl Neighbours<'_> {
     }
 
     /// Does a column step as the addresses do? It may begin again at 0.
-    fn moves(&self, address: usize, other: usize, begins_again: bool) -> bool {
+    fn moves(&self, address: usize, other: usize) -> bool {
         let pairs = self.pairs(address, other);
         let is_step = |two: &[[f64; 2]]| two[1][0] - two[0][0] == two[1][1] - two[0][1];
-        let is_begin = |two: &[[f64; 2]]| begins_again && two[1][1] == 0.0 && two[0][1] != 0.0;
+        let is_begin = |two: &[[f64; 2]]| two[1][1] == 0.0 && two[0][1] != 0.0;
         let mut steps = pairs.windows(2);
-        match pairs.as_slice() {
-            [[address, other]] => !begins_again && address == other,
-            _ => {
-                steps.clone().all(|two| is_step(two) || is_begin(two))
-                    && steps.any(|two| is_step(two) && two[0] != two[1])
-            }
-        }
+        steps.clone().all(|two| is_step(two) || is_begin(two)) && steps.any(|two| is_step(two) && two[0] != two[1])
+    }
+
+    /// Does a column say the same addresses, as they are or as they count in another way?
+    fn are_same(&self, address: usize, other: usize) -> bool {
+        let pairs = self.pairs(address, other);
+        let apart = pairs.first().map_or(0.0, |[address, other]| address - other);
+        // 1 and 40001 are the first register; 40000 is one that counts from 0 with its table.
+        let is_count = [0, 1, 10_000, 30_000, 40_000, 100_000, 300_000, 400_000].iter().any(|from| {
+            let from = f64::from(*from);
+            apart == from || apart == from + 1.0
+        });
+        is_count && pairs.iter().all(|[address, other]| address - other == apart)
     }
 
     /// Is each number of a column that of the address before it, or a greater one?

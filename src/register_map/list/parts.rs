@@ -54,6 +54,10 @@ fn below_heading(
         let column = &columns.headings[n];
         list.warnings.push(t!("no column of names: `--column \"{column}=name\"` says which it is", column));
     }
+    let place = columns.places(Column::Address).into_iter().map(|n| &columns.headings[n]).next();
+    if let Some(column) = place.filter(|column| !columns.is_sure && Heading::new(column).is_place()) {
+        list.warnings.push(t!("`{column}` is taken for the address of a register", column));
+    }
     let named = columns.headings.iter().cloned().zip(columns.means.iter().copied());
     list.add_columns(named.collect(), columns.open.clone());
     let row = |row: &Cells| {

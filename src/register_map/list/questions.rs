@@ -2,7 +2,7 @@
 
 use super::{
     columns::Column,
-    factors::{effect, is_pattern},
+    factors::{effect, is_kind_of_format, is_pattern},
     headings::Heading,
     meanings::{is_blank, share},
     words::{bit_field_of, is_marked, is_sized_type, kind_of, number_of, power_of_ten},
@@ -40,7 +40,8 @@ impl Question {
         let effects: Vec<Option<f64>> = self.may_be.iter().map(|column| effect(*column, cell)).collect();
         let is_same = effects.iter().all(|effect| effect.is_some() && *effect == effects[0]);
         let changes_nothing = is_same && effects[0].is_some_and(|effect| 1 < effects.len() || effect == 1.0);
-        !changes_nothing && !is_blank(cell)
+        let is_none = is_blank(cell) || Heading::new(&self.heading).is_format() && is_kind_of_format(cell);
+        !changes_nothing && !is_none
     }
 }
 

@@ -3,7 +3,7 @@
 use super::{
     cells::{Cells, of_text},
     columns::{Column, Columns},
-    factors::{effect, is_word, of_unit, one_of, places_of},
+    factors::{effect, is_kind_of_format, of_unit, one_of, places_of},
     headings::Heading,
     meanings::{is_blank, is_dash},
     row::{differ, unfit},
@@ -96,7 +96,7 @@ impl<'a> Reader<'a> {
             // 0 is none to ioBroker, which then takes 1.
             Column::Scale if columns.is_iobroker && number_of(cell) == Some(0.0) => Some(1.0),
             Column::Scale => effect(column, cell).or(with_unit(columns, cell).map(|(factor, _)| factor)),
-            Column::Places if words && is_word(cell) => effect(column, cell).or(Some(1.0)),
+            Column::Places if words && is_kind_of_format(cell) => effect(column, cell).or(Some(1.0)),
             column => effect(column, cell),
         };
         let mut all = Vec::new();
@@ -121,7 +121,7 @@ impl<'a> Reader<'a> {
 
     pub fn more(&mut self) -> More {
         let words = self.is_of_formats();
-        let decimals = |cell: &str| places_of(cell).map(Some).or((words && is_word(cell)).then_some(None));
+        let decimals = |cell: &str| places_of(cell).map(Some).or((words && is_kind_of_format(cell)).then_some(None));
         More {
             access: self.read(Column::Access, access_of),
             min: self.read(Column::Min, number_of),

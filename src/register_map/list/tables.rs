@@ -23,7 +23,7 @@ pub fn are_tables(heading: &Heading, cells: &[&str]) -> bool {
     if heading.is_of_tables() {
         return true;
     }
-    let is_number = |cell: &str| cell.starts_with(|sign: char| sign.is_ascii_digit());
+    let is_number = |cell: &str| cell.starts_with(|sign: char| sign.is_ascii_digit()) && !cell.ends_with(['x', 'X']);
     let is_word = |cell: &&str| !is_number(cell) && table_of(cell).is_some();
     // `I` is a table beside `H`, and else a unit or a type.
     let is_letter = |cell: &&str| cell.len() == 1 && is_word(cell);

@@ -30,6 +30,8 @@ fn a_power_beyond_ten_is_none() {
 
 #[test]
 fn formats_of_decimals_scale() {
+    let words = "Address;Name;Type;Format\n0x10;a;uint16;hex\n0x11;b;uint16;0.0\n";
+    check(words, &["40017 a uint16 ABCD x1"], &["Format (0.0)"], &["Format (0.0)"]);
     let text = "Adresse;Name;Typ;Format\n0x10;a;U32;FIX2\n0x12;b;S32;FIX0\n0x14;c;S32;TEMP\n0x16;d;U32;ENUM\n";
     let taken =
         ["40017 a uint32 ABCD x0.01", "40019 b int32 ABCD x1", "40021 c int32 ABCD x0.1", "40023 d uint32 ABCD x1"];
@@ -104,6 +106,8 @@ fn factors_in_brackets_of_a_unit_count() {
         ("V×10⁻¹", "x0.1 V"),
         ("tenths of °C", "x0.1 °C"),
         ("hundredths of V", "x0.01 V"),
+        ("Zehntel Grad", "x0.1 Grad"),
+        ("m³/h [0.1]", "x0.1 m³/h"),
         ("[V]", "x1 V"),
         ("0.1 V", "x0.1 V"),
     ] {

@@ -17,6 +17,7 @@ fn words_for_tables_make_their_column_that_of_tables() {
         ("Register_type", ["AI", "AO"]),
         ("Type", ["Input", "Holding"]),
         ("Art", ["IR", "HR"]),
+        ("Kind", ["3x", "4x"]),
         ("Table", ["I", "H"]),
         ("RegType", ["3x", "4x"]),
         ("Space", ["input register", "holding register"]),
@@ -98,6 +99,8 @@ fn decimals_before_the_register_are_no_address() {
     let text = "Name;Dec;Register;Type\nTemp;1;0x0100;int16\nFlow;0;0x0101;int16\n";
     check(text, &["40258 Flow int16 ABCD x1"], &["Dec (1)"], &["Dec (1): implied decimals / decimals?"]);
     said(text, "Dec", Some(Column::Places), &["40257 Temp int16 ABCD x0.1", "40258 Flow int16 ABCD x1"]);
+    let rising = "Name;Dec;Register;Type\nTemp;1;0x0100;int16\nFlow;2;0x0101;int16\n";
+    check(rising, &[], &["Dec (1)", "Dec (2)"], &["implied decimals / decimals?"]);
     let both = "Name;Dec;Register;Type\nTemp;256;0x0100;int16\nFlow;257;0x0101;int16\n";
     check(both, &["40257 Temp int16 ABCD x1", "40258 Flow int16 ABCD x1"], &[], &[]);
     check("Dec;Hex;Address;Name;Type\n16;10;0x10;a;int16\n", &["40017 a int16 ABCD x1"], &[], &[]);
@@ -139,7 +142,9 @@ fn a_register_that_cannot_be_does_not_take_the_place_of_another() {
 
 #[test]
 fn first_and_last_address_are_a_span() {
-    for heading in ["Start address;End address", "Start;End", "From address;To address", "Startadresse;Endadresse"] {
+    for heading in
+        ["Start address;End address", "Start;End", "From;To", "From address;To address", "Startadresse;Endadresse"]
+    {
         let text = format!("{heading};Size;Name;Type\n70;71;2;a;uint32\n72;72;1;b;uint16\n");
         check(&text, &["40071 a uint32 ABCD x1", "40073 b uint16 ABCD x1"], &[], &[]);
     }
@@ -151,6 +156,8 @@ fn first_and_last_address_are_a_span() {
 fn start_and_offset_alone_are_addresses() {
     for heading in ["Start", "Offset"] {
         let text = format!("{heading};Name;Type\n70;a;uint16\n72;b;uint16\n");
+        let said = [format!("`{heading}` is taken for the address of a register")];
+        assert_eq!(list_of(&text).warnings, said);
         check(&text, &["40071 a uint16 ABCD x1", "40073 b uint16 ABCD x1"], &[], &[]);
     }
     for heading in ["Quantity", "Content", "Variable"] {
