@@ -124,7 +124,7 @@ const HEADINGS: [(Column, &[&str]); 17] = [
     (Column::Length, &["len", "length", "size", "count", "quantity", "qty", "words", "registers", "bytes", "länge", "anzahl", "wörter", "größe", "registeranzahl", "datenlänge", "longueur", "registres", "mots", "longitud", "registros", "lunghezza", "registri", "lengte", "długość", "длина", "长度", "数量", "ความยาว", "จำนวน"]),
     (Column::Formula, &["formula", "expression", "formel"]),
     (Column::Offset, &["offset", "versatz", "décalage", "смещение", "偏移"]),
-    (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "attributes", "mode", "modus", "zugriff", "zugriffsart", "accès", "acceso", "accesso", "toegang", "dostęp", "доступ", "访问"]),
+    (Column::Access, &["access", "rw", "permission", "permissions", "attribute", "attributes", "mode", "modus", "zugriff", "zugriffsart", "accès", "acceso", "accesso", "toegang", "dostęp", "доступ", "访问", "读写", "属性", "读写属性"]),
     (Column::Address, ADDRESS),
     (Column::Name, &["name", "title", "parameter", "description", "tag", "label", "signal", "variable", "meaning", "point", "function", "nickname", "tagname", "purpose", "item", "field", "content", "quantity",
         "bezeichnung", "beschreibung", "benennung", "bedeutung", "datenpunkt", "messwert", "messgröße", "titel", "parametername", "funktion", "kommentar", "désignation", "nom", "libellé", "nombre", "descripción", "nome", "descrizione", "descrição", "naam", "omschrijving", "nazwa", "opis", "namn", "benämning", "beskrivning", "название", "наименование", "описание", "параметр", "名称", "描述", "参数", "ชื่อ", "คำอธิบาย"]),

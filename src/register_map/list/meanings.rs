@@ -112,7 +112,7 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
         Column::Field => !cells.is_empty() && 60 <= share(cells, |cell| bit_field_of(cell).is_some()),
         Column::Access => !cells.is_empty() && 60 <= share(cells, |cell| access_of(cell).is_some()),
         Column::Length => 60 <= share(cells, |cell| length_of(cell, false).is_some()),
-        Column::Offset => 60 <= share(cells, |cell| number_of(cell).is_some()) && !is_rising(cells),
+        Column::Offset => 60 <= share(cells, |cell| number_of(cell).is_some()),
         Column::Exponent => {
             60 <= share(cells, |cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number)))
         }
@@ -155,10 +155,4 @@ fn is_of_hex(heading: &Heading, cells: &[&str]) -> bool {
     let is_bare = |cell: &str| is_bare_hex(cell) && is_number(cell) && has_letter(cell);
     let is_marked = |cell: &str| is_bare_hex(cell) && has_letter(cell) || wire(cell).is_some() && has_letter(cell);
     cells.iter().any(|cell| is_bare(cell)) && 50 < share(cells, is_marked)
-}
-
-/// Does it rise from row to row? Then it counts registers.
-fn is_rising(cells: &[&str]) -> bool {
-    let numbers: Vec<f64> = cells.iter().filter_map(|cell| number_of(cell)).collect();
-    3 <= numbers.len() && numbers.windows(2).all(|pair| pair[0] < pair[1])
 }

@@ -70,21 +70,22 @@ impl Neighbours<'_> {
         self.rows.iter().filter_map(move |row| row.cells.get(n)).map(String::as_str).filter(|cell| !is_blank(cell))
     }
 
-    /// The numbers of two columns in the rows that have both.
-    fn pairs(&self, one: usize, other: usize) -> Vec<[f64; 2]> {
-        let number = |row: &Cells, n: usize| {
-            let cell = first_of(row.cells.get(n)?);
-            let digits =
-                Some(cell).filter(|_| self.means[n] == Some(Column::HexAddress)).filter(|cell| is_bare_hex(cell));
+    /// The numbers of two columns in the rows that have both; the second is read as what it may mean.
+    fn pairs(&self, one: usize, other: (usize, Option<Column>)) -> Vec<[f64; 2]> {
+        let number = |row: &Cells, (n, means): (usize, Option<Column>)| {
+            let written = row.cells.get(n)?;
+            let cell = first_of(written);
+            let digits = Some(cell).filter(|cell| means == Some(Column::HexAddress) && is_bare_hex(cell));
             let bare = digits.and_then(|digits| u16::from_str_radix(digits, 16).ok());
-            bare.or_else(|| wire(cell)).map(f64::from).or_else(|| number_of(cell))
+            bare.or_else(|| wire(cell)).map(f64::from).or_else(|| number_of(written))
         };
+        let one = (one, self.means[one]);
         self.rows.iter().filter_map(|row| Some([number(row, one)?, number(row, other)?])).collect()
     }
 
     /// Does a column step as the addresses do? It may begin again at 0.
     fn moves(&self, address: usize, other: usize) -> bool {
-        let pairs = self.pairs(address, other);
+        let pairs = self.pairs(address, (other, self.means[other]));
         let is_step = |two: &[[f64; 2]]| two[1][0] - two[0][0] == two[1][1] - two[0][1];
         let is_begin = |two: &[[f64; 2]]| two[1][1] == 0.0 && two[0][1] != 0.0;
         let mut steps = pairs.windows(2);
@@ -93,7 +94,7 @@ impl Neighbours<'_> {
 
     /// Does a column say the same addresses, as they are or as they count in another way?
     fn are_same(&self, address: usize, other: usize) -> bool {
-        let pairs = self.pairs(address, other);
+        let pairs = self.pairs(address, (other, self.means[other]));
         let apart = pairs.first().map_or(0.0, |[address, other]| address - other);
         // 1 and 40001 are the first register; 40000 is one that counts from 0 with its table.
         let is_count = [0, 1, 10_000, 30_000, 40_000, 100_000, 300_000, 400_000].iter().any(|from| {
@@ -105,8 +106,10 @@ impl Neighbours<'_> {
 
     /// Is each number of a column that of the address before it, or a greater one?
     fn are_last(&self, first: usize, last: usize) -> bool {
-        let pairs = self.pairs(first, last);
-        !pairs.is_empty() && pairs.iter().all(|[first, last]| first <= last) && self.cells(last).all(is_address)
+        let pairs = self.pairs(first, (last, self.means[first]));
+        let is_hex = |cell: &str| self.means[first] == Some(Column::HexAddress) && is_bare_hex(cell);
+        let is_last = self.cells(last).all(|cell| is_address(cell) || is_hex(cell));
+        !pairs.is_empty() && pairs.iter().all(|[first, last]| first <= last) && is_last
     }
 
     /// Lengths that fit the types of their rows as bytes, and none as registers, are bytes.

@@ -85,6 +85,7 @@ pub fn of(
             {
                 vec![Column::Field]
             }
+            Some(Column::Offset) if is_rising(cells) => vec![Column::Offset],
             Some(Column::Length) if is_of_bytes(&heading, &kinds) => vec![Column::Length, Column::Bytes],
             Some(Column::Address) if is_half_hex(cells) => {
                 vec![Column::Address, Column::HexAddress]
@@ -143,6 +144,13 @@ fn is_of_factors(cells: &[&str]) -> bool {
 /// `3` and `4`: function codes or areas.
 fn is_digit(cells: &[&str]) -> bool {
     cells.iter().any(|cell| matches!(*cell, "0" | "1" | "2" | "3" | "4"))
+}
+
+/// Does it rise from row to row, perhaps again from 0? It may count something, and not be added.
+fn is_rising(cells: &[&str]) -> bool {
+    let numbers: Vec<f64> = cells.iter().filter_map(|cell| number_of(cell)).collect();
+    let is_step = |pair: &[f64]| pair[0] < pair[1] || pair[1] == 0.0 && pair[0] != 0.0;
+    numbers.windows(2).all(is_step) && numbers.windows(2).any(|pair| pair[0] < pair[1])
 }
 
 /// Lengths of which nothing shows whether they count registers: neither their heading nor a type with its size.

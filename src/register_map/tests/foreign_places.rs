@@ -55,6 +55,11 @@ fn offsets_that_move_with_the_addresses_are_not_added() {
     let blocks = "Register;Offset;Name;Type\n0x10;0;A;int16\n0x11;1;B;int16\n0x20;0;C;int16\n0x21;1;D;int16\n";
     let taken = ["40017 A int16 ABCD x1", "40018 B int16 ABCD x1", "40033 C int16 ABCD x1", "40034 D int16 ABCD x1"];
     check(blocks, &taken, &[], &[]);
+    for offsets in [["0", "4", "8"], ["0", "4", "0"], ["-10", "0", "10"]] {
+        let row = |(n, offset): (usize, &&str)| format!("0x{};{offset};n{n};int16\n", 10 + 2 * n);
+        let rows: String = offsets.iter().enumerate().map(row).collect();
+        check(&format!("Register;Offset;Name;Type\n{rows}"), &[], &["Offset"; 3], &["offset?"]);
+    }
     let value = "Register;Offset;Name;Type\n0x10;-40;A;int16\n0x11;0;B;int16\n0x12;-40;C;int16\n";
     let taken = ["40017 A int16 ABCD x1 -40", "40018 B int16 ABCD x1", "40019 C int16 ABCD x1 -40"];
     check(value, &taken, &[], &[]);
@@ -148,6 +153,8 @@ fn first_and_last_address_are_a_span() {
         let text = format!("{heading};Size;Name;Type\n70;71;2;a;uint32\n72;72;1;b;uint16\n");
         check(&text, &["40071 a uint32 ABCD x1", "40073 b uint16 ABCD x1"], &[], &[]);
     }
+    let hex = "Start address (hex);End address (hex);Name;Type\n100A;100B;a;uint32\n100C;100D;b;uint16\n";
+    check(hex, &["44107 a uint32 ABCD x1"], &["`uint16` does not take 2 registers"], &[]);
     let text = "Start;End;Name;Type\n70;73;a;uint32\n74;75;b;uint32\n";
     check(text, &["40075 b uint32 ABCD x1"], &["`uint32` does not take 4 registers"], &[]);
 }
