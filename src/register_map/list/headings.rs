@@ -134,6 +134,8 @@ const WEAK: [&str; 2] = ["hex", "dec"];
 /// Parts of words that say how digits are written.
 const HEX: [&str; 6] = ["hex", "esadec", "szesnast", "шестнадцат", "十六进制", "16进制"];
 const DECIMAL: [&str; 5] = ["dec", "dez", "déc", "дес", "十进制"];
+/// A heading of these says the table of each row.
+const TABLES: [&str; 6] = ["table", "space", "area", "regtype", "registertype", "registertyp"];
 /// The last address of several.
 const LAST: [&str; 9] = ["end", "to", "last", "stop", "ende", "bis", "endadresse", "endregister", "fin"];
 /// Words of names that stand in other columns too, and those of long texts.
@@ -206,13 +208,14 @@ impl Heading {
 
     /// Its column says tables, and nothing else.
     pub fn is_of_tables(&self) -> bool {
-        self.has(&["table", "regtype", "registertype", "registertyp"])
-            || matches!(self.0.as_slice(), [word] if word == "space" || word == "area")
+        let is_known =
+            |word: &String| TABLES.contains(&word.as_str()) || ["modbus", "register", "data"].contains(&word.as_str());
+        self.has(&TABLES) && self.0.iter().all(is_known)
     }
 
     /// Its column can say types.
     pub fn is_of_types(&self) -> bool {
-        self.has(&["type", "typ", "tipo"])
+        self.has(&["type", "typ", "tipo", "regtype", "registertype", "registertyp"])
     }
 
     /// Can words for tables below it be those? A name or a unit may be the same word.

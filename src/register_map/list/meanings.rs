@@ -50,13 +50,13 @@ pub fn meaning(heading: &str, cells: &[&str]) -> Option<Column> {
     if are_codes(heading, cells) {
         return Some(Column::Type);
     }
-    if !cells.is_empty() && are_tables(&words, cells) {
-        return Some(Column::Table);
-    }
     // What is done with a register is no type of it.
     let is_of_access = !cells.is_empty() && 80 <= share(cells, |cell| access_of(cell).is_some());
-    if is_of_access && words.has(&["type", "typ", "tipo", "format", "function", "area"]) {
+    if is_of_access && (words.is_of_types() || words.has(&["format", "function", "area"])) {
         return Some(Column::Access);
+    }
+    if !cells.is_empty() && are_tables(&words, cells) {
+        return Some(Column::Table);
     }
     // A cell that does not fit leaves out its row, not the column.
     if let Some(exact) = Heading::exact(heading).filter(|exact| 50 <= share(cells, |cell| fits_exactly(*exact, cell))) {

@@ -5,7 +5,7 @@ use super::{
     columns::{Column, first_of, is_address},
     headings::Heading,
     meanings::{is_bare_hex, is_blank},
-    words::{is_sized_type, number_of, type_of},
+    words::{length_of, number_of, type_of},
 };
 use crate::plant::address::wire;
 
@@ -116,14 +116,19 @@ impl Neighbours<'_> {
     fn count_bytes(&mut self) {
         let at = |column: Column| self.means.iter().position(|means| *means == Some(column));
         let (Some(kind), Some(length)) = (at(Column::Type), at(Column::Length)) else { return };
-        let sized = self.rows.iter().filter_map(|row| {
-            let kind = row.cells.get(kind).filter(|cell| is_sized_type(cell));
-            let kind = kind.and_then(|cell| type_of(cell, None).ok())?;
-            Some((kind.0.registers(), row.cells.get(length)?.parse::<u16>().ok()?))
+        let fits = self.rows.iter().filter_map(|row| {
+            let kind = row.cells.get(kind).filter(|cell| is_fixed_type(cell))?;
+            let (registers, cell) = (type_of(kind, None).ok()?.0.registers(), row.cells.get(length)?);
+            Some([false, true].map(|is_bytes| length_of(cell, is_bytes) == Some(registers)))
         });
-        let sized: Vec<(u16, u16)> = sized.collect();
-        if !sized.is_empty() && sized.iter().all(|(registers, length)| 2 * registers == *length) {
+        let fits: Vec<[bool; 2]> = fits.collect();
+        if fits.contains(&[false, true]) && !fits.contains(&[true, false]) {
             self.means[length] = Some(Column::Bytes);
         }
     }
+}
+
+/// Does the word of a type say its size, as `uint16` and `float` do and `int` does not?
+pub fn is_fixed_type(cell: &str) -> bool {
+    type_of(cell, None).is_ok_and(|(kind, _)| kind.registers() == 4 || type_of(cell, Some(4)).is_err())
 }

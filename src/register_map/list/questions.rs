@@ -5,7 +5,8 @@ use super::{
     factors::{effect, is_kind_of_format, is_pattern},
     headings::Heading,
     meanings::{is_blank, share},
-    words::{bit_field_of, is_marked, is_sized_type, kind_of, number_of, power_of_ten},
+    neighbours::is_fixed_type,
+    words::{bit_field_of, is_marked, kind_of, number_of, power_of_ten},
 };
 use crate::{t, text::translate};
 
@@ -157,7 +158,7 @@ fn is_rising(cells: &[&str]) -> bool {
 fn is_of_bytes(heading: &Heading, kinds: &[&str]) -> bool {
     let is_stated =
         heading.has(&["registers", "register", "words", "wörter", "quantity", "qty", "count", "registeranzahl"]);
-    !is_stated && !kinds.iter().any(|kind| is_sized_type(kind))
+    !is_stated && !kinds.iter().any(|kind| is_fixed_type(kind))
 }
 
 /// Some of its cells may be hexadecimal numbers; a single word such as `AC` stands above others.

@@ -148,6 +148,7 @@ impl<'a> Reader<'a> {
             None => self.columns.last != Some(n),
             Some(Column::Name) => first != Some(&n),
             Some(Column::Places | Column::Decimals) => places_of(&self.row.cells[n]).is_none(),
+            Some(Column::WriteAt) => self.text(Column::Access).and_then(access_of) == Some(Access::Read),
             Some(Column::Type) => is_known && !self.columns.type_at(n, self.row).is_some_and(is_type),
             Some(_) => false,
         };

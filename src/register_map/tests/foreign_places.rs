@@ -34,9 +34,22 @@ fn a_column_of_tables_is_never_ignored() {
     for heading in ["Table", "Space", "Area", "RegType"] {
         let text = format!("{heading};Address;Name;Type\nMain;0;a;int16\nHR;1;b;int16\n");
         check(&text, &["40002 b int16 ABCD x1"], &["`Main` is no table"], &[]);
+        let access = format!("{heading};Address;Name;Type\nRO;0x10;a;int16\nRW;0x11;b;int16\n");
+        let (taken, why) = match heading {
+            "RegType" | "Area" => (&["40017 a int16 ABCD x1", "40018 b int16 ABCD x1 rw"][..], &[][..]),
+            _ => (&[][..], &["`RO` is no table", "`RW` is no table"][..]),
+        };
+        check(&access, taken, why, &[]);
         let digits = format!("{heading};Address;Name;Type\n3;0;a;int16\n4;1;b;int16\n");
         check(&digits, &[], &["(3)", "(4)"], &["table / area?"]);
     }
+}
+
+#[test]
+fn a_heading_that_speaks_of_a_table_is_not_that_of_tables() {
+    let text = "Address;Name;Type;Alarm table\n0x10;a;int16;see 4\n";
+    check(text, &["40017 a int16 ABCD x1"], &[], &[]);
+    assert!(list_of(text).notes.contains_key("Alarm table"));
 }
 
 #[test]
@@ -115,6 +128,10 @@ fn decimals_before_the_register_are_no_address() {
 fn a_length_of_a_byte_is_none_of_registers() {
     let text = "Address;Name;Type;Length (Byte)\n0x10;A;UINT;1\n0x11;B;UINT;2\n";
     check(text, &["40017 A uint16 ABCD x1", "40018 B uint16 ABCD x1"], &[], &[]);
+    let mixed = "Address;Name;Type;Length\n0x10;A;UINT16;2\n0x11;B;UINT8;1\n0x12;C;INT;2\n";
+    check(mixed, &["40017 A uint16 ABCD x1", "40018 B uint8 ABCD x1", "40019 C int16 ABCD x1"], &[], &[]);
+    let floats = "Address;Name;Type;Length\n0x10;A;float;2\n0x12;B;INT;2\n";
+    check(floats, &["40017 A float32 ABCD x1", "40019 B int32 ABCD x1"], &[], &[]);
     let open = "Address;Name;Type;Length\n0x10;A;UINT;1\n0x11;B;UINT;2\n";
     check(open, &["40017 A uint16 ABCD x1"], &["Length (2)"], &["Length (2): registers / bytes?"]);
 }
