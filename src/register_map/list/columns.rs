@@ -77,7 +77,7 @@ impl Columns {
         let mut columns =
             Columns { headings, means, open, last, areas, names, codes, is_sure, is_iobroker, is_of_manager };
         if !columns.is_sure {
-            columns.open = questions::of(&mut columns.means, &columns.headings, &cells, |n| said[n].is_some());
+            columns.open = questions::of(&mut columns.means, &columns.headings, (rows, &cells), |n| said[n].is_some());
         }
         columns
     }

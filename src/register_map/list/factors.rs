@@ -70,11 +70,16 @@ pub fn is_kind_of_format(cell: &str) -> bool {
     is_word && places_of(cell).is_none()
 }
 
+/// Are they one number, but for how its digits are kept?
+pub fn is_close(one: f64, other: f64) -> bool {
+    (one - other).abs() <= 1e-9 * one.abs()
+}
+
 /// The factor that several cells say, each of which may say the same in its own way; `Err` where they differ.
 pub fn one_of(all: &[(f64, &str)]) -> Result<Option<f64>, String> {
     let mut said = all.iter().filter(|(factor, _)| *factor != 1.0);
     let Some((first, cell)) = said.next() else { return Ok(all.first().map(|(factor, _)| *factor)) };
-    match said.find(|(factor, _)| 1e-9 * first.abs() < (factor - first).abs()) {
+    match said.find(|(factor, _)| !is_close(*factor, *first)) {
         Some((_, other)) => Err(differ(cell, other)),
         None => Ok(Some(*first)),
     }
@@ -87,7 +92,8 @@ pub fn of_unit(cell: &str) -> Result<(f64, String), String> {
         return Ok((part, unit_of(&unit)));
     }
     let behind = || {
-        let (unit, number) = cell.strip_suffix([']', ')']).unwrap_or(cell).rsplit_once(['[', '(', '×', '*'])?;
+        let open = cell.strip_suffix([']', ')']).unwrap_or(cell);
+        let (unit, number) = open.rsplit_once(['[', '(', '×', '*']).or_else(|| open.rsplit_once(" x"))?;
         Some((number_of(&raised(number.trim()))?, unit.trim()))
     };
     // A unit times ten may as well be that of a number that was multiplied.
@@ -117,12 +123,14 @@ fn without_brackets(cell: &str) -> &str {
 /// `10⁻¹` as `10^-1`.
 fn raised(number: &str) -> String {
     let plain = |sign: char| match sign {
-        '⁻' => '-',
+        '⁻' | '−' => '-',
         sign => {
             "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().zip('0'..='9').find(|(raised, _)| *raised == sign).map_or(sign, |(_, digit)| digit)
         }
     };
-    match number.strip_prefix("10").filter(|power| power.chars().any(|sign| plain(sign) != sign)) {
+    let power = number.strip_prefix("10").filter(|power| power.chars().any(|sign| plain(sign) != sign));
+    // A text may have lost what raises it.
+    match power.or(number.strip_prefix("10").filter(|power| power.starts_with('-'))) {
         Some(power) => format!("10^{}", power.chars().map(plain).collect::<String>()),
         None => number.to_owned(),
     }

@@ -153,17 +153,8 @@ const HARMLESS: [&str; 42] = [
     "bereich", "grenze", "standard", "standardwert", "wert", "beispiel", "seite", "bemerkung",
 ];
 /// Headings of a number that is divided by ten as often.
-const PLACES: [&str; 9] = [
-    "decimals",
-    "decimal",
-    "digits",
-    "precision",
-    "dezimalstellen",
-    "nachkommastellen",
-    "kommastellen",
-    "nachkomma",
-    "dec",
-];
+const PLACES: [&str; 8] =
+    ["decimals", "decimal", "digits", "precision", "dezimalstellen", "nachkommastellen", "kommastellen", "nachkomma"];
 
 /// What is known of one heading.
 #[derive(Debug, Clone)]
@@ -203,7 +194,7 @@ impl Heading {
 
     /// Its column says how many decimals a number has.
     pub fn is_places(&self) -> bool {
-        self.has(&PLACES)
+        self.has(&PLACES) || matches!(self.0.as_slice(), [word] if word == "dec")
     }
 
     /// Its column says tables, and nothing else.

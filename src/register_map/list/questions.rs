@@ -1,8 +1,9 @@
 //! Columns that can mean several things, each of which makes other values of them: their reader says which.
 
 use super::{
+    cells::Cells,
     columns::Column,
-    factors::{effect, is_kind_of_format, is_pattern},
+    factors::{effect, is_close, is_kind_of_format, is_pattern},
     headings::Heading,
     meanings::{is_blank, share},
     neighbours::is_fixed_type,
@@ -50,7 +51,7 @@ impl Question {
 pub fn of(
     means: &mut [Option<Column>],
     headings: &[String],
-    cells: &[Vec<&str>],
+    (rows, cells): (&[Cells], &[Vec<&str>]),
     is_said: impl Fn(usize) -> bool,
 ) -> Vec<Question> {
     let has = |wanted: &[Column]| means.iter().flatten().any(|column| wanted.contains(column));
@@ -111,8 +112,33 @@ pub fn of(
             Some(Question { example: (*example).to_owned(), ..question })
         })
         .collect();
-    open.iter().for_each(|question| means[question.place] = None);
-    open
+    settle(open, means, rows)
+}
+
+/// Answers the questions that other columns answer, and leaves open what the others ask about.
+fn settle(open: Vec<Question>, means: &mut [Option<Column>], rows: &[Cells]) -> Vec<Question> {
+    let sure = |n: &usize| open.iter().all(|question| question.place != *n);
+    let sure: Vec<usize> = (0..means.len()).filter(sure).collect();
+    let proved: Vec<Option<Column>> = open.iter().map(|question| proved(question, &sure, means, rows)).collect();
+    open.iter().zip(&proved).for_each(|(question, proved)| means[question.place] = *proved);
+    open.into_iter().zip(proved).filter(|(_, proved)| proved.is_none()).map(|(question, _)| question).collect()
+}
+
+/// The meaning in which a column says the same factors as one that is sure, in each row: 10 divides beside 0.1.
+fn proved(question: &Question, sure: &[usize], means: &[Option<Column>], rows: &[Cells]) -> Option<Column> {
+    let is_factor =
+        |column: &Column| matches!(column, Column::Scale | Column::Divisor | Column::Exponent | Column::Places);
+    let says_same = |means: Column, (place, other): (usize, Column)| {
+        let both = rows.iter().filter_map(|row| {
+            let cell = row.cells.get(question.place).filter(|cell| question.matters(cell))?;
+            Some((effect(means, cell)?, effect(other, row.cells.get(place)?)))
+        });
+        let both: Vec<(f64, Option<f64>)> = both.collect();
+        !both.is_empty() && both.iter().all(|(one, other)| other.is_some_and(|other| is_close(*one, other)))
+    };
+    let others = || sure.iter().filter_map(|n| Some((*n, means[*n].filter(is_factor)?)));
+    let may_be = question.may_be.iter().copied().filter(is_factor);
+    may_be.into_iter().find(|means| others().any(|other| says_same(*means, other)))
 }
 
 /// The numbers that do not say themselves whether they multiply or divide.

@@ -90,6 +90,18 @@ fn two_columns_that_say_one_factor_count_once() {
 }
 
 #[test]
+fn a_factor_proves_what_another_column_means() {
+    let text = "Address;Name;Type;Factor;Gain\n0x10;a;int16;0.1;10\n0x11;b;int16;1;1\n0x12;c;int16;0.01;100\n";
+    check(text, &["40017 a int16 ABCD x0.1", "40018 b int16 ABCD x1", "40019 c int16 ABCD x0.01"], &[], &[]);
+    let other = text.replace("0.01;100", "0.01;10");
+    check(&other, &["40018 b int16 ABCD x1"], &["Gain (10)", "Gain (10)"], &["Gain (10): factor / divisor?"]);
+    let index = "Address;Name;Type;Conversion index;Divisor\n0x10;a;int16;-1;10\n0x11;b;int16;0;1\n";
+    check(index, &["40017 a int16 ABCD x0.1", "40018 b int16 ABCD x1"], &[], &[]);
+    let dates = "Address;Name;Type;Default (dec)\n0x10;a;int16;1\n";
+    check(dates, &["40017 a int16 ABCD x1"], &[], &[]);
+}
+
+#[test]
 fn no_factor_may_be_written_in_words() {
     let text = "Address;Name;Type;Scale\n0x10;a;int16;N/A\n0x11;b;int16;n.a.\n0x12;c;int16;0.1\n0x13;d;int16;—\n";
     let taken = ["40017 a int16 ABCD x1", "40018 b int16 ABCD x1", "40019 c int16 ABCD x0.1", "40020 d int16 ABCD x1"];
@@ -104,6 +116,8 @@ fn factors_in_brackets_of_a_unit_count() {
         ("W [0.1]", "x0.1 W"),
         ("W (0.1)", "x0.1 W"),
         ("V×10⁻¹", "x0.1 V"),
+        ("V×10-1", "x0.1 V"),
+        ("V x 0.1", "x0.1 V"),
         ("tenths of °C", "x0.1 °C"),
         ("hundredths of V", "x0.01 V"),
         ("Zehntel Grad", "x0.1 Grad"),
