@@ -5,10 +5,10 @@ use super::{
     factors::places_of,
     headings::Heading,
     heat_pump, register_names,
-    tables::{are_tables, table_of},
+    tables::are_tables,
     words::{
         access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, order_of,
-        type_of, width_of, yes_or_no,
+        table_of, type_of, width_of, yes_or_no,
     },
 };
 use crate::plant::address::wire;

@@ -25,6 +25,7 @@ fn words_for_tables_make_their_column_that_of_tables() {
         let text = format!("{heading};Address;Name;Data Type\n{input};0;Flow;UINT16\n{holding};10;Setpoint;INT16\n");
         check(&text, &["30001 Flow uint16 ABCD x1", "40011 Setpoint int16 ABCD x1"], &[], &[]);
     }
+    check("Type;Address;Name\nI;0;a\nI;1;b\n", &[], &["`I` is not a known type", "`I`"], &[]);
     let bits = "Kind;Address;Name\nDI;0;a\nDO;1;b\nCO;2;c\n";
     check(bits, &["10001 a bool ABCD x1", "00002 b bool ABCD x1", "00003 c bool ABCD x1"], &[], &[]);
 }
