@@ -136,11 +136,13 @@ pub(super) fn device(name: &str, search: &Search) -> Result<Option<Text>, String
 
 /// The device profile that an argument of `check` means: a file without lines and devices of its own, or a known name.
 pub(super) fn device_file(argument: &Path, search: &Search) -> Option<(String, Text)> {
-    let stem = argument.file_stem()?.to_str().filter(|stem| plain(stem))?.to_owned();
     if !argument.is_file() {
-        let text = argument.to_str().filter(|name| plain(name)).and_then(|name| device(name, search).ok().flatten());
-        return text.map(|text| (stem, text));
+        let name = argument.to_str().filter(|name| plain(name))?;
+        return device(name, search).ok().flatten().map(|text| (name.to_owned(), text));
     }
+    // Whatever a file is called: its name stands in a plant that is made around it.
+    let letter = |c: char| if plain(c.encode_utf8(&mut [0; 4])) { c } else { '_' };
+    let stem = argument.file_stem()?.to_str()?.chars().map(letter).collect();
     let bytes = read(argument).ok()?;
     let words = String::from_utf8_lossy(&bytes).into_owned();
     let has = |key: &str| words.lines().any(|line| line.trim_start().starts_with(key));

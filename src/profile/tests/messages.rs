@@ -203,3 +203,13 @@ fn a_normal_band_is_a_range_within_the_bounds() {
     let def = load(PLANT.as_bytes(), &meter, PLC).unwrap();
     assert_eq!(def.tag(def.tag_named("D1.T").unwrap()).normal, Some([60.0, 70.5]));
 }
+
+#[test]
+fn a_profile_is_checked_whatever_its_file_is_called() {
+    use crate::profile::{Search, check};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.b \"c\".toml");
+    std::fs::write(&path, METER).unwrap();
+    let checked = check(&path, &Search::shipped()).unwrap_or_else(|errors| panic!("{errors}"));
+    assert_eq!(checked.plant.devices.len(), 1);
+}
