@@ -1,11 +1,17 @@
 //! The tables of a page, as rows of cells.
 
+use std::{collections::BTreeMap, rc::Rc};
+
 use html5gum::{Token, Tokenizer};
 
 use crate::register_map::list::{cells::Cells, titled};
 
 /// A cell that spans more than this is a mistake.
 const SPAN_MAX: usize = 64;
+/// What is further right in a row is not read.
+const COLUMNS_MAX: usize = 1_000;
+/// Most bytes of texts that stand in more cells than one; the cells beyond have none.
+const COPIED_MAX: usize = 64 << 20;
 const ROWS_MAX: usize = 20_000;
 
 /// The rows of all tables of a page, in their order.
@@ -19,8 +25,9 @@ struct Tables {
     /// The last heading above, or caption.
     title: String,
     is_in_title: bool,
-    /// Cells of a row above that reach into this one: column, rows left, text.
-    hanging: Vec<(usize, usize, String)>,
+    /// Cells of a row above that reach into this one, by column: rows left, text.
+    hanging: BTreeMap<usize, (usize, Rc<str>)>,
+    copied: usize,
 }
 
 /// Each table of a page.
@@ -72,6 +79,11 @@ impl Lines<'_> {
     }
 }
 
+fn copy(text: &str, copied: &mut usize) -> String {
+    *copied += text.len();
+    if COPIED_MAX < *copied { String::new() } else { text.to_owned() }
+}
+
 impl Tables {
     fn open(&mut self, name: &[u8], columns: usize, rows: usize) {
         match name {
@@ -116,10 +128,9 @@ impl Tables {
 
     fn hang(&mut self) {
         let Some(row) = &mut self.row else { return };
-        while let Some(one) = self.hanging.iter_mut().find(|(column, rows, _)| *column == row.cells.len() && 0 < *rows)
-        {
-            one.1 -= 1;
-            row.cells.push(one.2.clone());
+        while let Some((rows, text)) = self.hanging.get_mut(&row.cells.len()).filter(|(rows, _)| 0 < *rows) {
+            *rows -= 1;
+            row.cells.push(copy(text, &mut self.copied));
         }
     }
 
@@ -127,19 +138,19 @@ impl Tables {
         let Some((text, columns, rows)) = self.cell.take() else { return };
         self.hang();
         let Some(row) = &mut self.row else { return };
-        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
-        for _ in 0..columns {
+        let text: Rc<str> = text.split_whitespace().collect::<Vec<_>>().join(" ").into();
+        for _ in 0..columns.min(COLUMNS_MAX.saturating_sub(row.cells.len())) {
             if 1 < rows {
-                self.hanging.push((row.cells.len(), rows - 1, text.clone()));
+                self.hanging.insert(row.cells.len(), (rows - 1, Rc::clone(&text)));
             }
-            row.cells.push(text.clone());
+            row.cells.push(copy(&text, &mut self.copied));
         }
     }
 
     fn end_row(&mut self) {
         self.end_cell();
         self.hang();
-        self.hanging.retain(|(_, rows, _)| 0 < *rows);
+        self.hanging.retain(|_, (rows, _)| 0 < *rows);
         let (Some(row), Some(table)) = (self.row.take(), self.tables.last_mut()) else { return };
         if row.cells.iter().any(|cell| !cell.is_empty()) && table.len() < ROWS_MAX {
             table.push(row);
