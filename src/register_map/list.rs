@@ -23,6 +23,7 @@ mod sections;
 mod span;
 mod tables;
 pub mod words;
+mod titles;
 
 use std::collections::BTreeMap;
 
@@ -277,7 +278,7 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
         Ok(rows) => rows,
         Err(why) => return List::refused(why),
     };
-    sections::assign(&mut rows, &sections, context.is_table_stated);
+    sections::assign(&mut rows, &sections, context.is_table_stated, context.base);
     if matches!(context.base, None | Some(AddressBase::Modicon)) {
         base::assign_to_coils(&mut rows, context.base.is_some());
     }

@@ -48,6 +48,8 @@ pub struct Row {
     /// As the row states it.
     pub table: Option<Table>,
     pub(super) order: Option<ByteOrder>,
+    /// Only a title above it says so.
+    pub is_titled: bool,
     /// Unit address, as the row states it.
     pub device: Option<u8>,
     pub(super) more: More,
@@ -191,14 +193,18 @@ impl Row {
         Ok((kind, order))
     }
 
-    /// A bit, as only the digits of its address say, has no type of more bits.
+    /// A bit, as only the digits of its address or a title say, has no type of more bits.
     fn check_bit(&self, assumed: Assumed) -> Result<(), String> {
-        let is_by_digits = self.table.is_none() && !assumed.is_stated;
+        let is_by_digits = self.is_titled || self.table.is_none() && !assumed.is_stated;
         let Some(word) = self.kind.as_ref().filter(|_| is_by_digits) else { return Ok(()) };
         match type_of(word, self.length) {
             Ok((kind, _)) if kind != DataType::Bool => Err(t!("`{word}` does not have {bits} bits", word, bits = 1)),
             Err(why) if self.is_register => Err(why),
             Ok(_) | Err(_) => Ok(()),
+            Ok((kind, _)) if kind != DataType::Bool && self.is_titled => {
+                let table = self.table.unwrap_or(assumed.table).word();
+                Err(t!("`{word}` is more than a bit, and the title above says {table}", word, table))
+            }
         }
     }
 

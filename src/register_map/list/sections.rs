@@ -3,39 +3,21 @@
 
 use super::{
     cells::Cells,
-    codes,
-    columns::{first_of, is_address},
+    columns::{Column, first_of, is_address},
     row::{Row, unfit},
-    words::table_of,
+    titles,
 };
-use crate::{
-    plant::{address::of_modicon, tag::Table},
-    register_map::list::Column,
+use crate::plant::{
+    address::{AddressBase, of_modicon, wire},
+    tag::Table,
 };
-
-/// More words than this are a sentence.
-const WORDS_MAX: usize = 6;
 
 /// The table that a line names for what stands below it.
 fn table_below(cells: &[String]) -> Option<Table> {
-    let mut filled = cells.iter().map(String::as_str).filter(|cell| !cell.is_empty());
+    let mut filled = cells.iter().filter(|cell| !cell.is_empty());
     let first = filled.next()?;
-    let is_title = |text: &str| {
-        let words = || text.split_whitespace();
-        // A code alone is a cell of a row.
-        text.chars().filter(|sign| sign.is_alphabetic()).count() >= 4
-            && words().count() <= WORDS_MAX
-            && words().all(|word| word != "not" && word != "no")
-    };
-    // The number of a chapter is no function code.
-    let plain = first.trim_start_matches(|sign: char| !sign.is_alphabetic());
-    let plain = plain.trim_end_matches(|sign: char| !sign.is_alphanumeric());
     // One that spans several columns stands in each.
-    if is_title(plain) && filled.all(|cell| cell == first) {
-        table_of(plain).or_else(|| codes::table_in(plain))
-    } else {
-        None
-    }
+    titles::table_of(first).filter(|_| filled.all(|cell| cell == first))
 }
 
 /// A line between rows: how many `#` stand before it, and the table that it names. One `#` alone may as well be a comment.
@@ -78,14 +60,17 @@ pub fn split(all: &[Cells], is_separated: bool) -> (Vec<Cells>, Vec<(usize, Opti
 
 /// Gives the rows the tables of their sections. One without a table where others of its list have a cell for it has none:
 /// merged cells leave such gaps.
-pub fn assign(rows: &mut [Row], sections: &[(usize, Option<Table>)], is_stated: bool) {
+pub fn assign(rows: &mut [Row], sections: &[(usize, Option<Table>)], is_stated: bool, base: Option<AddressBase>) {
     let is_some_stated = rows.iter().any(|row| row.is_tabled && row.table.is_some());
+    // Where numbers are known to be as sent, or to count from 1, none of those digits is one of Modicon.
+    let is_counted = |text: &str| matches!(base, Some(AddressBase::Zero | AddressBase::One)) && wire(text).is_some();
     for row in rows.iter_mut().filter(|row| row.table.is_none()) {
         let Some(written) = row.address.as_deref().map(first_of) else { continue };
-        let modicon = of_modicon(written).map(|(table, _)| table);
+        let modicon = of_modicon(written).filter(|_| !is_counted(written)).map(|(table, _)| table);
         let above = sections.iter().rev().find(|(line, _)| *line <= row.line).and_then(|(_, table)| *table);
         // A number of another table says more than a line far above.
         row.table = above.filter(|above| modicon.is_none_or(|table| table == *above));
+        row.is_titled = row.table.is_some();
         let is_clear = row.table.is_some() || modicon.is_some() || is_stated || written.contains(':');
         if is_some_stated && row.is_tabled && !is_clear {
             row.wrong.get_or_insert(unfit(Column::Table, ""));

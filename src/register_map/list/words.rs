@@ -50,12 +50,13 @@ pub fn table_of(text: &str) -> Option<Table> {
     let text = text.to_lowercase().replace('_', " ");
     let is = |words: &[&str]| words.iter().any(|word| text.contains(word));
     let words = [
-        (Table::Coil, is(&["coil"])),
-        (Table::Discrete, is(&["discrete"])),
+        (Table::Coil, is(&["coil"]) || is_output),
+        (Table::Discrete, is(&["discrete", "input status"]) && !is_output),
         (Table::Holding, is(&["holding"])),
         (Table::Input, is(&["input reg", "inputreg"]) || text == "input" || text == "inputs"),
     ];
     let named: Vec<Table> = words.into_iter().filter(|(_, is)| *is).map(|(table, _)| table).collect();
+    let is_output = is(&["discrete output"]);
     match named.as_slice() {
         [] => area_of(&text).or_else(|| codes::table_of(&text)),
         [table] => Some(*table),
@@ -64,7 +65,7 @@ pub fn table_of(text: &str) -> Option<Table> {
 }
 
 /// `4x`, `4xxxx`, `3X0001`: the digit that the Modicon numbers of a table begin with.
-fn area_of(text: &str) -> Option<Table> {
+pub fn area_of(text: &str) -> Option<Table> {
     let text = text.trim();
     let (digit, rest) = text.split_at_checked(1)?;
     let number = rest.strip_prefix('x')?;

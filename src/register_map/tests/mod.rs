@@ -6,6 +6,8 @@ mod doubtful;
 mod exports;
 mod foreign_columns;
 mod foreign_places;
+mod foreign_cells;
+mod foreign_words;
 mod headings;
 mod iobroker;
 mod meanings;
