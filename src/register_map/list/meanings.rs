@@ -88,7 +88,7 @@ fn fits_exactly(exact: Column, cell: &str) -> bool {
         return number_of(cell).is_some();
     }
     if matches!(exact, Column::Labels | Column::Bits) {
-        return labels_of(cell).is_some();
+        return written_labels_of(cell).is_some();
     }
     exact == Column::Field && field_of(cell).is_some()
         || exact == Column::Bad && bad_of(cell).is_some()

@@ -7,7 +7,7 @@ use super::{
     headings::Heading,
     meanings::{is_blank, is_dash},
     row::{differ, unfit},
-    words::{BadNumber, access_of, bad_of, bit_field_of, labels_of, number_of, poll_of, type_of},
+    words::{BadNumber, access_of, bad_of, bit_field_of, labels_of, number_of, poll_of, type_of, written_labels_of},
 };
 use crate::{
     plant::tag::{Access, Poll},
@@ -122,13 +122,14 @@ impl<'a> Reader<'a> {
     pub fn more(&mut self) -> More {
         let words = self.is_of_formats();
         let decimals = |cell: &str| places_of(cell).map(Some).or((words && is_kind_of_format(cell)).then_some(None));
+        let labels = if self.columns.is_sure { labels_of } else { written_labels_of };
         More {
             access: self.read(Column::Access, access_of),
             min: self.read(Column::Min, number_of),
             max: self.read(Column::Max, number_of),
             decimals: self.read(Column::Decimals, decimals).flatten(),
-            labels: self.read(Column::Labels, labels_of).unwrap_or_default(),
-            bits: self.read(Column::Bits, labels_of).unwrap_or_default(),
+            labels: self.read(Column::Labels, labels).unwrap_or_default(),
+            bits: self.read(Column::Bits, labels).unwrap_or_default(),
             field: self.read(Column::Field, bit_field_of),
             bad: self.read(Column::Bad, bad_of).unwrap_or_default(),
             group: self.text(Column::Group).unwrap_or_default().to_owned(),

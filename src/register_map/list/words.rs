@@ -1,5 +1,12 @@
 //! The words of a cell: types with their byte order, tables, factors.
 
+mod labels;
+mod types;
+
+pub use self::{
+    labels::{labels_of, labels_text, written_labels_of},
+    types::{is_sized_type, kind_of, type_of},
+};
 use super::codes;
 use crate::{
     plant::{
@@ -49,6 +56,7 @@ pub fn power_of_ten(exponent: f64) -> f64 {
 pub fn table_of(text: &str) -> Option<Table> {
     let text = text.to_lowercase().replace('_', " ");
     let is = |words: &[&str]| words.iter().any(|word| text.contains(word));
+    let is_output = is(&["discrete output"]);
     let words = [
         (Table::Coil, is(&["coil"]) || is_output),
         (Table::Discrete, is(&["discrete", "input status"]) && !is_output),
@@ -56,7 +64,6 @@ pub fn table_of(text: &str) -> Option<Table> {
         (Table::Input, is(&["input reg", "inputreg"]) || text == "input" || text == "inputs"),
     ];
     let named: Vec<Table> = words.into_iter().filter(|(_, is)| *is).map(|(table, _)| table).collect();
-    let is_output = is(&["discrete output"]);
     match named.as_slice() {
         [] => area_of(&text).or_else(|| codes::table_of(&text)),
         [table] => Some(*table),
@@ -86,104 +93,6 @@ pub fn order_of(text: &str) -> Option<ByteOrder> {
         "bigendian" | "highwordfirst" | "mswfirst" => Some(ByteOrder::Abcd),
         "lowwordfirst" | "lswfirst" | "wordswap" | "wordswapped" | "swappedwords" => Some(ByteOrder::Cdab),
         _ => ByteOrder::ALL.into_iter().find(|order| order.word().eq_ignore_ascii_case(text)),
-    }
-}
-
-/// The type that a manual means by a word.
-pub fn kind_of(text: &str) -> Option<DataType> {
-    // As a profile says it, and an export: `cstring(8)`, `mod10k(2)`.
-    if let Ok(kind) = text.trim().parse() {
-        return Some(kind);
-    }
-    let word: String = text.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
-    let text_bytes =
-        ["string", "char", "ascii"].iter().find_map(|prefix| word.strip_prefix(prefix)?.parse::<u8>().ok());
-    if let Some(bytes) = text_bytes.filter(|bytes| (1..=DataType::TEXT_MAX).contains(bytes)) {
-        return Some(DataType::Text(bytes));
-    }
-    Some(match word.as_str() {
-        "int16" | "i16" | "s16" | "sint16" | "int" | "short" | "signed" | "signed16" | "signed16bit" | "signedint" => {
-            DataType::I16
-        }
-        "uint16" | "u16" | "word" | "uint" | "ushort" | "unsigned" | "unsigned16" | "unsigned16bit" | "unsignedint" => {
-            DataType::U16
-        }
-        "int32" | "i32" | "s32" | "sint32" | "dint" | "long" | "signed32" | "signed32bit" => DataType::I32,
-        "uint32" | "u32" | "dword" | "udint" | "ulong" | "unsigned32" | "unsigned32bit" => DataType::U32,
-        "int64" | "i64" | "s64" | "lint" => DataType::I64,
-        "uint64" | "u64" | "ulint" | "qword" => DataType::U64,
-        "float" | "float32" | "f32" | "real" | "single" | "ieee754" | "floatingpoint" | "32bitfloat" => DataType::F32,
-        "double" | "float64" | "f64" | "lreal" => DataType::F64,
-        "bcd" | "bcd16" => DataType::Bcd16,
-        "bcd32" => DataType::Bcd32,
-        "int24" | "i24" | "s24" => DataType::I24,
-        "uint24" | "u24" => DataType::U24,
-        "int48" | "i48" | "s48" => DataType::I48,
-        "uint48" | "u48" => DataType::U48,
-        "float16" | "f16" | "half" => DataType::F16,
-        "int8" | "i8" | "s8" | "sint8" | "signed8" => DataType::I8,
-        "uint8" | "u8" | "byte" | "unsigned8" => DataType::U8,
-        "bool" | "boolean" | "bit" => DataType::Bool,
-        _ => return None,
-    })
-}
-
-/// A type with its byte order: `FLOAT (CDAB)`; `uint32be`, `floatsw`, `int16le` as the lists of ioBroker have it.
-fn suffixed(text: &str) -> Option<(DataType, ByteOrder)> {
-    let word = text.trim().to_lowercase();
-    if let Some((kind, order)) = word.trim_end_matches(')').rsplit_once([' ', '(', '-', '_']) {
-        let order = ByteOrder::ALL.into_iter().find(|known| known.word().eq_ignore_ascii_case(order));
-        if let (Some(kind), Some(order)) = (kind_of(kind), order) {
-            return Some((kind, order));
-        }
-    }
-    let (kind, suffix) = word.split_at_checked(word.len().checked_sub(2)?)?;
-    let kind = kind_of(kind)?;
-    let order = match (suffix, kind.registers()) {
-        ("be", _) => ByteOrder::Abcd,
-        ("le", 1) => ByteOrder::Badc,
-        ("le", _) => ByteOrder::Dcba,
-        ("sw", 2..) => ByteOrder::Cdab,
-        ("sb", 2..) => ByteOrder::Badc,
-        _ => return None,
-    };
-    Some((kind, order))
-}
-
-/// Is it the word of a type that says its size, which no name of a value is?
-pub fn is_sized_type(text: &str) -> bool {
-    let has_size = text.ends_with(|c: char| c.is_ascii_digit());
-    suffixed(text).is_some() || has_size && kind_of(text).is_some()
-}
-
-/// The type and, where the word says it, the order; by the registers that it takes where the word does not say how many.
-pub fn type_of(word: &str, length: Option<u16>) -> Result<(DataType, Option<ByteOrder>), String> {
-    let plain: String = word.to_lowercase().chars().filter(|c| c.is_alphanumeric()).collect();
-    let of_length = |one, two, four| match length {
-        None | Some(1) => Ok((one, None)),
-        Some(2) => Ok((two, None)),
-        Some(4) => Ok((four, None)),
-        Some(length) => Err(t!("`{word}` of {length} registers is not known", word, length)),
-    };
-    match plain.as_str() {
-        "int" | "signed" | "signedint" | "sint" => return of_length(DataType::I16, DataType::I32, DataType::I64),
-        "uint" | "unsigned" | "unsignedint" => return of_length(DataType::U16, DataType::U32, DataType::U64),
-        "string" | "char" | "ascii" | "text" | "stringbe" | "stringle" => {
-            let bytes = length.and_then(|length| u8::try_from(length.checked_mul(2)?).ok());
-            let bytes = bytes.filter(|bytes| (1..=DataType::TEXT_MAX).contains(bytes));
-            let order = plain.ends_with("le").then_some(ByteOrder::Badc);
-            return bytes
-                .map(|bytes| (DataType::Text(bytes), order))
-                .ok_or_else(|| t!("`{word}` does not say how long the text is", word));
-        }
-        _ => {}
-    }
-    let found = kind_of(word).map(|kind| (kind, None));
-    let found = found.or_else(|| suffixed(word).map(|(kind, order)| (kind, Some(order))));
-    let (kind, order) = found.ok_or_else(|| t!("`{word}` is not a known type", word))?;
-    match length.filter(|length| *length != kind.registers()) {
-        Some(length) => Err(t!("`{word}` does not take {length} registers", word, length)),
-        None => Ok((kind, order)),
     }
 }
 
@@ -260,34 +169,6 @@ pub fn unit_with_factor(cell: &str) -> Result<(f64, String), String> {
         && !rest.trim_start().starts_with(['-', '–', '…', '=', ':'])
         && !rest.starts_with("..");
     if is_number || number_of(last.trim_end_matches(')')).is_some() { unclear() } else { Ok((1.0, unit_of(cell))) }
-}
-
-/// `0=off; 1=on`; a semicolon within a name has `\` in front.
-pub fn labels_of(cell: &str) -> Option<Vec<(i128, String)>> {
-    let mut parts = vec![String::new()];
-    let mut signs = cell.chars();
-    while let Some(sign) = signs.next() {
-        let last = parts.last_mut()?;
-        match sign {
-            ';' => parts.push(String::new()),
-            '\\' => match signs.next()? {
-                'n' => last.push('\n'),
-                sign => last.push(sign),
-            },
-            sign => last.push(sign),
-        }
-    }
-    let label = |part: &String| {
-        let (number, text) = part.split_once('=')?;
-        Some((number.trim().parse().ok()?, text.trim().to_owned()))
-    };
-    parts.iter().map(label).collect()
-}
-
-/// Writes what [`labels_of`] reads.
-pub fn labels_text<'a>(labels: impl Iterator<Item = (i128, &'a str)>) -> String {
-    let escaped = |text: &str| text.replace('\\', "\\\\").replace(';', "\\;").replace('\n', "\\n");
-    labels.map(|(number, text)| format!("{number}={}", escaped(text))).collect::<Vec<_>>().join("; ")
 }
 
 /// `5-4` or `3`: the lowest bit and how many.

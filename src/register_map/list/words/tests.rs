@@ -28,6 +28,67 @@ fn a_type_fits_its_number_of_registers_or_is_refused() {
 }
 
 #[test]
+fn the_words_of_a_type_say_its_kind_sign_size_and_order() {
+    let (big, low) = (Some(ByteOrder::Abcd), Some(ByteOrder::Cdab));
+    for (word, kind, order) in [
+        ("U_WORD", DataType::U16, None),
+        ("S_WORD", DataType::I16, None),
+        ("U_DWORD", DataType::U32, None),
+        ("S_DWORD", DataType::I32, None),
+        ("INTEGER", DataType::I16, None),
+        ("INT32U", DataType::U32, None),
+        ("INT16S", DataType::I16, None),
+        ("unsigned long", DataType::U32, None),
+        ("16-bit unsigned integer", DataType::U16, None),
+        ("Signed Int 32", DataType::I32, None),
+        ("Unsigned 32 bits", DataType::U32, None),
+        ("unsignedint", DataType::U16, None),
+        ("FLOAT32 (IEEE-754)", DataType::F32, None),
+        ("32-bit IEEE float", DataType::F32, None),
+        ("double precision floating point", DataType::F64, None),
+        ("UINT (16 bit)", DataType::U16, None),
+        ("UINT32 big-endian", DataType::U32, big),
+        ("u32 (LSW first)", DataType::U32, low),
+        ("int32 word swapped", DataType::I32, low),
+        ("FLOAT (CDAB)", DataType::F32, low),
+        ("enum16", DataType::U16, None),
+        ("bitfield32", DataType::U32, None),
+        ("acc64", DataType::U64, None),
+        ("sunssf", DataType::I16, None),
+        ("BITMAP", DataType::U16, None),
+        ("E16", DataType::U16, None),
+        ("INT16 SM", DataType::Sm16, None),
+        ("REAL32", DataType::F32, None),
+        ("REAL64", DataType::F64, None),
+    ] {
+        assert_eq!(type_of(word, None), Ok((kind, order)), "{word}");
+    }
+    assert_eq!(type_of("BITMAP", Some(2)), Ok((DataType::U32, None)));
+    assert_eq!(type_of("UTF8", Some(4)), Ok((DataType::Text(8), None)));
+    assert_eq!(type_of("STR", Some(4)), Ok((DataType::Text(8), None)));
+    for word in [
+        "long long",
+        "double word",
+        "word 32",
+        "signed uint16",
+        "unsigned float",
+        "16 bit",
+        "2 x uint16",
+        "int7",
+        "u",
+        "acc",
+        "sm",
+        "int16 uint32",
+        "uint32 little endian",
+        "set point",
+        "int16 quux",
+        "magnitude",
+    ] {
+        assert!(type_of(word, None).is_err(), "{word}");
+    }
+}
+
+#[test]
 fn tables_are_known_by_words_and_function_codes() {
     for (word, table) in [
         ("MODBUS_INPUT_REGISTER", Table::Input),
@@ -100,4 +161,33 @@ fn names_of_numbers_are_read_as_they_are_written() {
     let text = labels_text(labels.into_iter());
     let read = labels_of(&text).expect("it is read");
     assert_eq!(read.iter().map(|(number, text)| (*number, text.as_str())).collect::<Vec<_>>(), labels);
+}
+
+#[test]
+fn names_of_numbers_are_told_apart_as_manuals_write_them() {
+    let read = |cell: &str| {
+        let read = written_labels_of(cell)?;
+        Some(read.into_iter().map(|(number, text)| format!("{number} {text}")).collect::<Vec<_>>().join("+"))
+    };
+    for (cell, expect) in [
+        ("0=Off, 1=Heat, 2=Cool", "0 Off+1 Heat+2 Cool"),
+        ("0: Off, 1: On", "0 Off+1 On"),
+        ("0=Off/1=On", "0 Off+1 On"),
+        ("0 = Off | 1 = On", "0 Off+1 On"),
+        ("0=Off 1=On", "0 Off+1 On"),
+        ("0=off; 1=on, always; -1=at 12:30", "0 off+1 on, always+-1 at 12:30"),
+        ("0x01=One, 0x10=Sixteen", "1 One+16 Sixteen"),
+        ("0=Off\\; really; 1=On", "0 Off; really+1 On"),
+        ("5=five", "5 five"),
+    ] {
+        assert_eq!(read(cell).as_deref(), Some(expect), "{cell}");
+    }
+    for cell in ["", "Off", "see 0=Off", "0=Off, 0=On", "0=, 1=On", "a=b"] {
+        assert_eq!(read(cell), None, "{cell}");
+    }
+    assert_eq!(
+        labels_of("0=Off, 1=On"),
+        Some(vec![(0, "Off, 1=On".to_owned())]),
+        "as an export of this program has it"
+    );
 }
