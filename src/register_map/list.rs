@@ -1,6 +1,7 @@
 //! A register list from a manual becomes names: CSV, Markdown, or columns as they are copied from a PDF, recognised by their
 //! heading or, without one, by their form. What is not sure is not taken, and said by line.
 
+mod address_forms;
 mod base;
 pub mod calculated;
 pub mod cells;
@@ -22,8 +23,8 @@ mod row;
 mod sections;
 mod span;
 mod tables;
-pub mod words;
 mod titles;
+pub mod words;
 
 use std::collections::BTreeMap;
 

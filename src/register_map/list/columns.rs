@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{
+    address_forms,
     cells::Cells,
     headings::{self, Heading},
     heat_pump,
@@ -128,14 +129,14 @@ impl Columns {
             return (digits.to_owned(), base);
         }
         if self.means[place] == Some(Column::HexAddress) {
-            return (marked_hex(cell), base);
+            return (marked_hex(&address_forms::plain(cell)), base);
         }
         let of_coil = cell
             .strip_prefix(['0'])
             .and_then(|rest| rest.strip_prefix(['x', 'X'])?.parse::<u16>().ok()?.checked_sub(1));
         match of_coil.filter(|_| self.areas.contains(&place)) {
             Some(address) => (format!("coil:{address}"), base),
-            None => (cell.to_owned(), base),
+            None => (address_forms::plain(cell).into_owned(), base),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! A row below a heading: its cells by what their columns mean.
 
 use super::{
+    address_forms,
     cells::Cells,
     codes,
     columns::{Column, Columns, first_of, is_address, span_of},
@@ -63,6 +64,8 @@ impl Row {
         read.table = reader.read(Column::Table, tables::table_of).or_else(|| reader.read(Column::Area, area));
         read.take_table_of_address(&mut reader);
         read.device = reader.read(Column::Device, |cell| cell.parse().ok());
+        let unit = || reader.text(Column::Address).and_then(address_forms::of_unit).map(|(unit, _)| unit);
+        read.device = read.device.or_else(unit);
         read.order = reader.read(Column::Order, order_of);
         read.scale = reader.factor();
         read.offset = reader.read(Column::Offset, number_of).unwrap_or_default();

@@ -1,14 +1,15 @@
 //! What a column means: of what its heading can be, what stands in it can be too.
 
 use super::{
+    address_forms,
     columns::{Column, is_address},
     factors::places_of,
     headings::Heading,
     heat_pump, register_names,
     tables::are_tables,
     words::{
-        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, labels_of, length_of, number_of, order_of,
-        table_of, type_of, width_of, yes_or_no,
+        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, length_of, number_of, order_of,
+        table_of, type_of, width_of, written_labels_of, yes_or_no,
     },
 };
 use crate::plant::address::wire;
@@ -100,7 +101,8 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
     match column {
         Column::Address => {
             let is_bare = is_of_hex(heading, cells);
-            40 <= share(cells, |cell| is_address(cell) || is_bare && is_bare_hex(cell)) || register_names::are(cells)
+            let is_one = |cell: &str| is_address(&address_forms::plain(cell)) || is_bare && is_bare_hex(cell);
+            40 <= share(cells, is_one) || register_names::are(cells)
         }
         Column::Type => 1 <= share(cells, |cell| kind_of(cell).is_some() || type_of(cell, Some(1)).is_ok()),
         Column::Signed => !cells.is_empty() && 60 <= share(cells, |cell| yes_or_no(cell).is_some()),
