@@ -127,7 +127,7 @@ fn of_tables(tables: Vec<Vec<cells::Cells>>, context: &ListContext) -> List {
 }
 
 fn of_workbook(bytes: &[u8], context: &ListContext) -> List {
-    let sheets = match workbook::sheets(bytes) {
+    let (sheets, hidden) = match workbook::sheets(bytes) {
         Ok(sheets) => sheets,
         Err(why) => return List::refused(why),
     };
@@ -145,3 +145,4 @@ fn of_workbook(bytes: &[u8], context: &ListContext) -> List {
     }
     List { refused, ..all }
 }
+    all.warnings.extend(hidden.into_iter().map(|name| t!("sheet {name} is hidden, and not read", name)));

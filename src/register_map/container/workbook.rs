@@ -2,7 +2,7 @@
 
 use std::io::{Cursor, Read};
 
-use calamine::{DataRef, Dimensions, Reader, Xlsx};
+use calamine::{DataRef, Dimensions, Reader, SheetVisible, Xlsx, XlsxFormulaMetadata};
 
 use crate::{register_map::list::cells::Cells, t};
 
@@ -18,13 +18,18 @@ pub fn is_archive(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04")
 }
 
-/// Name and rows of each sheet that has any.
-pub fn sheets(bytes: &[u8]) -> Result<Vec<(String, Vec<Cells>)>, String> {
+/// Name and rows of each sheet that has any and is shown, and the names of those that are not.
+pub fn sheets(bytes: &[u8]) -> Result<(Vec<(String, Vec<Cells>)>, Vec<String>), String> {
     check_size(bytes)?;
     let no_book = |error: &dyn std::fmt::Display| t!("it is no Excel workbook (.xlsx): {error}", error);
     let mut book = Xlsx::new(Cursor::new(bytes)).map_err(|error| no_book(&error))?;
     let mut sheets = Vec::new();
-    for name in book.sheet_names().into_iter().take(SHEETS_MAX) {
+    let of = |is_shown: bool| {
+        let all = book.sheets_metadata().iter().filter(|sheet| (sheet.visible == SheetVisible::Visible) == is_shown);
+        all.map(|sheet| sheet.name.clone()).take(SHEETS_MAX).collect::<Vec<_>>()
+    };
+    let (shown, hidden) = (of(true), of(false));
+    for name in shown {
         // A sheet that is a chart has no cells.
         if let Ok(mut rows) = rows(&mut book, &name) {
             spread(&mut rows, &book.merge_cells_by_sheet_name(&name).unwrap_or_default());
@@ -32,7 +37,7 @@ pub fn sheets(bytes: &[u8]) -> Result<Vec<(String, Vec<Cells>)>, String> {
         }
     }
     sheets.retain(|(_, rows)| !rows.is_empty());
-    Ok(sheets)
+    Ok((sheets, hidden))
 }
 
 /// A small file may be a large one in an archive.
@@ -59,9 +64,14 @@ fn check_size(bytes: &[u8]) -> Result<(), String> {
 fn rows(book: &mut Xlsx<Cursor<&[u8]>>, name: &str) -> Result<Vec<Cells>, calamine::XlsxError> {
     let mut cells = book.worksheet_cells_reader(name)?;
     let mut rows: Vec<Cells> = Vec::new();
-    while let Some(cell) = cells.next_cell()? {
-        let (row, column) = cell.get_position();
-        let text = text(cell.get_value());
+    while let Some(cell) = cells.next_cell_with_formula_metadata()? {
+        let (row, column) = cell.pos;
+        let formula = cell.formula.map(|formula| match formula {
+            XlsxFormulaMetadata::Normal { formula } => format!("={formula}"),
+            _ => "=…".to_owned(),
+        });
+        // A formula without a value stands for itself: an empty cell would mean something else.
+        let text = Some(text(&cell.value)).filter(|text| !text.is_empty()).or(formula).unwrap_or_default();
         if text.is_empty() || COLUMNS_MAX <= column {
             continue;
         }
@@ -108,7 +118,11 @@ fn text(value: &DataRef<'_>) -> String {
         DataRef::Bool(flag) => flag.to_string(),
         DataRef::String(text) => text.clone(),
         DataRef::SharedString(text) => (*text).to_owned(),
-        DataRef::DateTime(time) => time.to_string(),
+        // As a day or time: its number of days is none that anybody has written.
+        DataRef::DateTime(time) => {
+            let (year, month, day, hour, minute, second, _) = time.to_ymd_hms_milli();
+            format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02}")
+        }
         DataRef::DateTimeIso(text) | DataRef::DurationIso(text) => text.clone(),
         DataRef::Error(error) => error.to_string(),
     };

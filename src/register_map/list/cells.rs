@@ -1,6 +1,10 @@
 //! A text becomes rows of cells: at one separator for the whole text where its heading has one, else line by line.
 
-use super::{columns::Said, headings::is_heading, sections::title_of};
+use super::{
+    columns::Said,
+    headings::{has_addresses, is_heading},
+    sections::title_of,
+};
 
 /// Most rows of a list.
 pub const ROWS_MAX: usize = 10_000;
@@ -87,9 +91,25 @@ pub fn without_rules(mut all: Vec<Cells>, said: &Said) -> Vec<Cells> {
     // `#address;name` heads the rows, unless another row does.
     let is_only = !all.iter().any(|row| !is_marked(row) && is_heading(&row.cells, said));
     let is_comment = |row: &Cells| is_marked(row) && !is_numbered && !(is_only && is_heading(&row.cells, said));
-    // `## Input registers` is no comment, and the heading of the next part is none.
-    let is_left_out = |row: &Cells| is_rule(&row.cells) || is_comment(row) && title_of(&row.cells).is_none();
+    let has_marks = all.iter().any(is_marked);
+    let mut heading: Option<Vec<String>> = None;
+    let mut is_left_out = |row: &Cells| {
+        let is_new = has_marks && (is_only || !is_marked(row)) && is_heading(&row.cells, said);
+        heading = Some(&row.cells).filter(|_| is_new).cloned().or(heading.take());
+        let is_row = || heading.as_ref().is_some_and(|heading| is_row_below(heading, &row.cells, said));
+        // `## Input registers` is no comment, and the heading of the next part is none.
+        is_rule(&row.cells) || is_comment(row) && !is_row() && title_of(&row.cells).is_none()
+    };
     all.into_iter().filter(|row| !is_left_out(row)).take(ROWS_MAX).collect()
+}
+
+/// Is it a row although its name begins with `#`? A number stands below the heading of addresses, and it is not the first
+/// cell, whose `#` makes a comment of it.
+fn is_row_below(heading: &[String], cells: &[String], said: &Said) -> bool {
+    let is_address = |(heading, cell): (&String, &String)| {
+        cell.bytes().any(|byte| byte.is_ascii_digit()) && has_addresses(std::slice::from_ref(heading), said)
+    };
+    heading.len() == cells.len() && heading.iter().zip(cells).skip(1).any(is_address)
 }
 
 fn row(line: usize, cells: Vec<String>) -> Cells {
@@ -107,23 +127,72 @@ fn separated(text: &str, separator: char) -> Vec<Cells> {
     let reader = reader.has_headers(false).flexible(true).delimiter(delimiter).trim(csv::Trim::All);
     let records = reader.from_reader(text.as_bytes()).into_records();
     // A text in memory is read to its end.
-    let rows = records.filter_map(Result::ok).map(|record| {
+    let records: Vec<csv::StringRecord> = records.filter_map(Result::ok).collect();
+    let place = |number: u64| usize::try_from(number).unwrap_or(0);
+    let starts = |n: usize| records.get(n).and_then(csv::StringRecord::position);
+    let rows = records.iter().enumerate().map(|(n, record)| {
         // It begins before the blank lines that are passed over.
-        let line = record.position().map_or(0, |at| {
-            let place = |number: u64| usize::try_from(number).unwrap_or(0);
+        let line = starts(n).map_or(0, |at| {
             let rest = text.get(place(at.byte())..).unwrap_or_default();
             place(at.line()) + rest.lines().take_while(|line| line.trim().is_empty()).count()
         });
-        let is_unclosed = record.iter().any(|cell| CELL_LINES_MAX < cell.lines().count());
+        let end = starts(n + 1).map_or(text.len(), |at| place(at.byte()));
+        let written = starts(n).and_then(|at| text.get(place(at.byte())..end)).unwrap_or_default();
+        let is_unclosed =
+            record.iter().any(|cell| CELL_LINES_MAX < cell.lines().count()) || is_open(written, separator);
         let mut cells: Vec<String> = record.iter().take(COLUMNS_MAX).map(one_line).collect();
         if separator == '|' {
             // Markdown has one at both ends.
             cells.pop_if(|last| last.is_empty());
             cells.drain(..usize::from(cells.first().is_some_and(String::is_empty)));
+            cells.iter_mut().for_each(|cell| *cell = without_markup(cell).to_owned());
         }
         Cells { line, cells, is_unclosed, is_ruled: false }
     });
     rows.collect()
+}
+
+/// Where in a cell something stands.
+#[derive(Clone, Copy)]
+enum Within {
+    Start,
+    Plain,
+    Quotes,
+    Behind,
+}
+
+/// Is a quote of a row never closed, or by one that opens a cell of a later line?
+fn is_open(written: &str, separator: char) -> bool {
+    let (mut within, mut has_lines) = (Within::Start, false);
+    for sign in written.trim_start().chars() {
+        within = match (within, sign) {
+            (Within::Quotes, '"') => Within::Behind,
+            (Within::Quotes, _) => {
+                has_lines |= sign == '\n';
+                Within::Quotes
+            }
+            (Within::Start, '"') => {
+                has_lines = false;
+                Within::Quotes
+            }
+            // Two are one sign of the cell.
+            (Within::Behind, '"') => Within::Quotes,
+            (_, sign) if sign == separator || sign == '\n' => Within::Start,
+            (Within::Behind, _) if has_lines && !sign.is_whitespace() => return true,
+            (Within::Behind, _) => Within::Behind,
+            (Within::Start | Within::Plain, _) => Within::Plain,
+        };
+    }
+    matches!(within, Within::Quotes)
+}
+
+/// What stands in marks of Markdown: `` `0x0001` ``, `**0x0001**`.
+fn without_markup(cell: &str) -> &str {
+    let within = |mark: &&str| {
+        let inner = cell.strip_prefix(*mark)?.strip_suffix(*mark)?.trim();
+        Some(inner).filter(|inner| !inner.is_empty() && !inner.contains(*mark))
+    };
+    ["**", "__", "`", "*"].iter().find_map(within).map_or(cell, without_markup)
 }
 
 fn one_line(cell: &str) -> String {
@@ -176,7 +245,7 @@ mod tests {
         let escaped = "| Address | Name | Notes |\n|---|---|---|\n| 5 | `A\\|B` | one \\| two |\n";
         let cells =
             super::rows(escaped, separator(escaped, &Said::new()), &Said::new()).pop().expect("it has rows").cells;
-        assert_eq!(cells, ["5", "`A|B`", "one | two"], "a bar that is part of its cell");
+        assert_eq!(cells, ["5", "A|B", "one | two"], "a bar that is part of its cell");
         assert_eq!(separator("40010 Tank 0,1 cm\n40011 Flow 0,1 l\n", &Said::new()), None, "a decimal comma");
     }
 }

@@ -6,6 +6,7 @@ use super::{
     columns::{Column, Columns, Said, is_address, is_heading},
     headings::{Heading, has_addresses},
     row::Row,
+    words::number_of,
 };
 use crate::t;
 
@@ -70,7 +71,43 @@ fn below_heading(
     };
     let mut rows: Vec<Row> = below.iter().map(row).collect();
     base::contradicting(&mut rows);
+    let has_commas = below.iter().flat_map(|row| &row.cells).any(|cell| is_with_comma(cell));
+    for (row, cells) in rows.iter_mut().zip(below) {
+        without_formulas(row, cells, &columns);
+        let numbers = [Column::Scale, Column::Divisor, Column::Offset, Column::Min, Column::Max];
+        let places = numbers.into_iter().flat_map(|column| columns.places(column));
+        let mut found = places.filter_map(|place| cells.cells.get(place)).filter(|cell| is_of_thousands(cell));
+        if let Some(cell) = found.next().filter(|_| has_commas) {
+            row.wrong.get_or_insert(t!("`{cell}` is a number with three decimals, or thousands", cell));
+        }
+    }
     rows
+}
+
+/// `0,1`: the list has decimal commas, and its points may be those of thousands.
+fn is_with_comma(cell: &str) -> bool {
+    cell.contains(',') && !cell.contains(' ') && number_of(cell).is_some()
+}
+
+/// `1.000`, which then is one or a thousand.
+fn is_of_thousands(cell: &str) -> bool {
+    let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let cell = cell.trim_start_matches(['-', '+', 'x', 'X', '*', '×', '/', '÷', ' ']);
+    cell.split_once('.')
+        .is_some_and(|(first, rest)| is_digits(first) && !first.starts_with('0') && is_digits(rest) && rest.len() == 3)
+}
+
+/// A program that writes a workbook may leave the value of a formula to a spreadsheet: nothing is known of such a row.
+fn without_formulas(row: &mut Row, cells: &Cells, columns: &Columns) {
+    let is_used = |n: usize| row.address.is_none() || columns.means.get(n).is_some_and(Option::is_some);
+    let is_formula = |cell: &str| !columns.is_sure && cell.starts_with('=') && !cell.starts_with("==");
+    let mut all = cells.cells.iter().enumerate();
+    let Some((_, cell)) = all.find(|(n, cell)| is_formula(cell) && is_used(*n)) else { return };
+    let why = t!("`{cell}` is a formula without its value: open and save the file in a spreadsheet program", cell);
+    match row.address {
+        Some(_) => row.wrong = Some(why),
+        None => *row = Row::refused(row.line, why),
+    }
 }
 
 /// Rows without a heading; `Err` where they are no list.

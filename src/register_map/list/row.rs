@@ -47,9 +47,9 @@ pub struct Row {
     pub(super) unit: String,
     /// As the row states it.
     pub table: Option<Table>,
-    pub(super) order: Option<ByteOrder>,
     /// Only a title above it says so.
     pub is_titled: bool,
+    pub(super) order: Option<ByteOrder>,
     /// Unit address, as the row states it.
     pub device: Option<u8>,
     pub(super) more: More,
@@ -198,13 +198,13 @@ impl Row {
         let is_by_digits = self.is_titled || self.table.is_none() && !assumed.is_stated;
         let Some(word) = self.kind.as_ref().filter(|_| is_by_digits) else { return Ok(()) };
         match type_of(word, self.length) {
-            Ok((kind, _)) if kind != DataType::Bool => Err(t!("`{word}` does not have {bits} bits", word, bits = 1)),
-            Err(why) if self.is_register => Err(why),
-            Ok(_) | Err(_) => Ok(()),
             Ok((kind, _)) if kind != DataType::Bool && self.is_titled => {
                 let table = self.table.unwrap_or(assumed.table).word();
                 Err(t!("`{word}` is more than a bit, and the title above says {table}", word, table))
             }
+            Ok((kind, _)) if kind != DataType::Bool => Err(t!("`{word}` does not have {bits} bits", word, bits = 1)),
+            Err(why) if self.is_register => Err(why),
+            Ok(_) | Err(_) => Ok(()),
         }
     }
 
