@@ -87,7 +87,10 @@ fn of_text(text: &str, context: &ListContext) -> List {
     };
     let format = match form {
         Ok(format) => format,
-        Err(form) => return List::refused(t!("it is {form}", form)),
+        Err(form) => {
+            let list = of_json(text, context);
+            return list.unwrap_or_else(|| List::refused(t!("it is {form}", form)));
+        }
     };
     let tree = |parsed: Result<Tree, String>, read: fn(&Tree, &ListContext) -> List| match parsed {
         Ok(tree) => read(&tree, context),
@@ -104,10 +107,21 @@ fn of_text(text: &str, context: &ListContext) -> List {
         Format::WirenBoard => tree(json::parse(text), format::wiren_board::read),
         Format::SunSpec => tree(json::parse(text), format::sunspec::read),
         Format::ModbusScope => tree(xml::parse(text), format::modbusscope::read),
-        Format::Mtui => format::mtui::read(body),
+        Format::Mtui => {
+            let list = format::mtui::read(body);
+            let is_none = context.format.is_none() && (list.refused.is_some() || nothing(&list).is_some());
+            let table = is_none.then(|| of_json(text, context)).flatten();
+            return table.unwrap_or(List { format: Some(format), ..list });
+        }
         Format::ModMaster => format::modmaster::read(body, context),
     };
     List { format: Some(format), ..list }
+}
+
+/// The arrays of JSON of no program that is known, as tables.
+fn of_json(text: &str, context: &ListContext) -> Option<List> {
+    let tables = json::tables(&json::parse(text).ok()?)?;
+    Some(List { format: Some(Format::List), ..of_tables(tables, context) })
 }
 
 /// All tables with a heading; where there is none, what the largest of them is not.
@@ -132,6 +146,7 @@ fn of_workbook(bytes: &[u8], context: &ListContext) -> List {
         Err(why) => return List::refused(why),
     };
     let (mut all, mut refused, many) = (List::default(), None, 1 < sheets.len());
+    all.warnings.extend(hidden.into_iter().map(|name| t!("sheet {name} is hidden, and not read", name)));
     for (name, rows) in sheets {
         // Its name may be that of a table.
         let title = list::titled(&name);
@@ -145,4 +160,3 @@ fn of_workbook(bytes: &[u8], context: &ListContext) -> List {
     }
     List { refused, ..all }
 }
-    all.warnings.extend(hidden.into_iter().map(|name| t!("sheet {name} is hidden, and not read", name)));

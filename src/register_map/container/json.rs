@@ -3,6 +3,10 @@
 use jsonc_parser::{CollectOptions, ParseOptions, ast, common::Ranged, parse_to_ast};
 
 use super::node::{DEPTH_MAX, NODES_MAX, Node, Tree, Value, broken, doubled, too_much};
+use crate::register_map::list::{cells::Cells, titled};
+
+/// More keys than this are no table.
+const COLUMNS_MAX: usize = 1_000;
 
 struct Reader {
     /// Where each line begins.
@@ -24,6 +28,38 @@ pub fn parse(text: &str) -> Result<Tree, String> {
         None => Node { line: 1, value: Value::Empty },
     };
     Ok(Tree { root, twice: reader.twice })
+}
+
+/// Each array of objects without arrays and objects of their own, as rows below their keys; what it is called may name their
+/// table. `None` where there is none, or where only some of several are named so.
+pub fn tables(tree: &Tree) -> Option<Vec<Vec<Cells>>> {
+    let is_flat = |item: &Node| {
+        !item.entries().is_empty()
+            && item.entries().iter().all(|(_, node)| matches!(node.value, Value::Empty | Value::Scalar(_)))
+    };
+    let is_table = |node: &Node| {
+        matches!(node.value, Value::List(_)) && !node.items().is_empty() && node.items().iter().all(is_flat)
+    };
+    let whole = [(String::new(), tree.root.clone())];
+    let named = tree.root.entries().iter().chain(&whole).filter(|(_, node)| is_table(node));
+    let tables: Vec<(Option<Cells>, &Node)> = named.map(|(name, node)| (titled(name), node)).collect();
+    let is_clear = tables.len() == 1 || tables.iter().all(|(title, _)| title.is_some());
+    (is_clear && !tables.is_empty()).then(|| tables.into_iter().map(|(title, node)| rows(title, node)).collect())
+}
+
+fn rows(title: Option<Cells>, node: &Node) -> Vec<Cells> {
+    let mut keys: Vec<String> = Vec::new();
+    for (key, _) in node.items().iter().flat_map(Node::entries) {
+        if keys.len() < COLUMNS_MAX && !keys.contains(key) {
+            keys.push(key.clone());
+        }
+    }
+    let row = |line, cells| Cells { line, cells, is_unclosed: false, is_ruled: false };
+    let below = node.items().iter().map(|item| {
+        let cell = |key: &String| item.word(key).unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ");
+        row(item.line, keys.iter().map(cell).collect())
+    });
+    title.into_iter().chain([row(node.line, keys.clone())]).chain(below).collect()
 }
 
 impl Reader {
