@@ -93,7 +93,11 @@ fn weak(words: &[String]) -> Option<Table> {
         let known = WEAK.iter().find(|(_, known)| known == word).map(|(table, _)| *table);
         known.or_else(|| area_of(word))
     };
-    let is_filler = |word: &&String| FILLERS.contains(&word.as_str()) || is_registers(word) || has_number(word);
+    let has_coils = words.iter().any(|word| word == "coils");
+    let is_filler = |word: &&String| {
+        let is_output = has_coils && ["digital", "output", "outputs"].contains(&word.as_str());
+        FILLERS.contains(&word.as_str()) || is_output || is_registers(word) || has_number(word)
+    };
     let tables: Option<Vec<Table>> = words.iter().filter(|word| !is_filler(word)).map(table).collect();
     one_of(tables.filter(|_| !is_one)?).ok()?
 }
@@ -116,6 +120,7 @@ mod tests {
             ("Modbus table 3xxxx", Table::Input),
             ("Coils", Table::Coil),
             ("Coils (read and write)", Table::Coil),
+            ("Coils / digital outputs", Table::Coil),
             ("Coil status", Table::Coil),
             ("Discrete outputs", Table::Coil),
             ("Discrete inputs", Table::Discrete),

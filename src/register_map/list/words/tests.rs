@@ -51,6 +51,7 @@ fn the_words_of_a_type_say_its_kind_sign_size_and_order() {
         ("u32 (LSW first)", DataType::U32, low),
         ("int32 word swapped", DataType::I32, low),
         ("FLOAT (CDAB)", DataType::F32, low),
+        ("string(8) (CDAB)", DataType::Text(8), low),
         ("enum16", DataType::U16, None),
         ("bitfield32", DataType::U32, None),
         ("acc64", DataType::U64, None),

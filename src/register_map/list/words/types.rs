@@ -200,8 +200,12 @@ fn ordered(text: &str) -> Option<(DataType, ByteOrder)> {
         };
         Some((kind, order))
     };
+    let behind = || {
+        let (kind, order) = word.trim_end_matches(')').rsplit_once([' ', '(', '-', '_'])?;
+        Some((kind_of(kind)?, ByteOrder::ALL.into_iter().find(|known| known.word().eq_ignore_ascii_case(order))?))
+    };
     let in_words = || said_of(text).and_then(|(said, order)| Some((said.kind(None)?, order?)));
-    in_words().or_else(suffixed)
+    in_words().or_else(behind).or_else(suffixed)
 }
 
 /// Is it the word of a type that says its size, which no name of a value is?
