@@ -67,8 +67,13 @@ fn one_of(tables: Vec<Table>) -> Result<Option<Table>, ()> {
 fn phrases(words: &[String]) -> Vec<Table> {
     let has = |known: &[&str], word: Option<&String>| word.is_some_and(|word| known.contains(&word.as_str()));
     let at = |n: usize| {
+        // A `Cooling coil` has a status too.
+        let before = n.checked_sub(1).map(|before| words[before].as_str()).filter(|_| words[n] == "coil");
+        if before.is_some_and(|word| !FILLERS.contains(&word) && !word.bytes().all(|byte| byte.is_ascii_digit())) {
+            return None;
+        }
         // `Input status registers` are registers.
-        let is_of_registers = has(&["register", "registers", "word", "words"], words.get(n + 2));
+        let is_of_registers = words[n] == "input" && has(&["register", "registers", "word", "words"], words.get(n + 2));
         let is = |(_, first, second): &&(Table, &[&str], &[&str])| {
             has(first, words.get(n))
                 && has(second, words.get(n + 1))
@@ -122,6 +127,7 @@ mod tests {
             ("Coils (read and write)", Table::Coil),
             ("Coils / digital outputs", Table::Coil),
             ("Coil status", Table::Coil),
+            ("Coil status registers", Table::Coil),
             ("Discrete outputs", Table::Coil),
             ("Discrete inputs", Table::Discrete),
             ("Input status", Table::Discrete),
@@ -131,6 +137,7 @@ mod tests {
         }
         for title in [
             "Cooling coil",
+            "Cooling coil status",
             "Coil 2",
             "Coil temps",
             "Fan coil unit 2",
