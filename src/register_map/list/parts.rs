@@ -63,17 +63,16 @@ fn below_heading(
     list.add_columns(named.collect(), columns.open.clone());
     let row = |row: &Cells| {
         // A line of a PDF with other columns than the heading is taken by its form.
-        if is_separated || row.cells.len() == heading.len() {
-            Row::headed(&columns, row)
-        } else {
-            Row::by_form(row.line, &row.cells)
-        }
+        if is_separated || row.cells.len() == heading.len() { Row::headed(&columns, row) } else { of_form(row) }
     };
     let mut rows: Vec<Row> = below.iter().map(row).collect();
     base::contradicting(&mut rows);
     let has_commas = below.iter().flat_map(|row| &row.cells).any(|cell| is_with_comma(cell));
     for (row, cells) in rows.iter_mut().zip(below) {
-        without_formulas(row, cells, &columns);
+        // Of a row without an address, any may be that.
+        let is_any = row.address.is_none();
+        let is_used = |n: usize| !columns.is_sure && (is_any || columns.means.get(n).is_some_and(Option::is_some));
+        without_formulas(row, cells, is_used);
         let numbers = [Column::Scale, Column::Divisor, Column::Offset, Column::Min, Column::Max];
         let places = numbers.into_iter().flat_map(|column| columns.places(column));
         let mut found = places.filter_map(|place| cells.cells.get(place)).filter(|cell| is_of_thousands(cell));
@@ -98,16 +97,22 @@ fn is_of_thousands(cell: &str) -> bool {
 }
 
 /// A program that writes a workbook may leave the value of a formula to a spreadsheet: nothing is known of such a row.
-fn without_formulas(row: &mut Row, cells: &Cells, columns: &Columns) {
-    let is_used = |n: usize| row.address.is_none() || columns.means.get(n).is_some_and(Option::is_some);
-    let is_formula = |cell: &str| !columns.is_sure && cell.starts_with('=') && !cell.starts_with("==");
+fn without_formulas(row: &mut Row, cells: &Cells, is_used: impl Fn(usize) -> bool) {
+    let is_formula = |cell: &str| cell.starts_with('=') && !cell.starts_with("==");
     let mut all = cells.cells.iter().enumerate();
     let Some((_, cell)) = all.find(|(n, cell)| is_formula(cell) && is_used(*n)) else { return };
     let why = t!("`{cell}` is a formula without its value: open and save the file in a spreadsheet program", cell);
-    match row.address {
-        Some(_) => row.wrong = Some(why),
-        None => *row = Row::refused(row.line, why),
+    match row.address.as_deref().is_some_and(is_address) {
+        true => row.wrong = Some(why),
+        false => *row = Row::refused(row.line, why),
     }
+}
+
+/// A row that is known by the form of its cells, all of which count.
+fn of_form(cells: &Cells) -> Row {
+    let mut row = Row::by_form(cells.line, &cells.cells);
+    without_formulas(&mut row, cells, |_| true);
+    if cells.is_unclosed { Row::refused(cells.line, t!("a quote is never closed").to_owned()) } else { row }
 }
 
 /// Rows without a heading; `Err` where they are no list.
@@ -130,7 +135,7 @@ fn by_form(all: &[Cells], is_separated: bool, said: &Said) -> Result<Vec<Row>, S
         let ruled = all.iter().find(|row| row.is_ruled && 2 <= count(row));
         return Err(no_addresses(&ruled.unwrap_or(first).cells));
     }
-    let rows: Vec<Row> = all.iter().map(|row| Row::by_form(row.line, &row.cells)).collect();
+    let rows: Vec<Row> = all.iter().map(of_form).collect();
     let (found, count) = (rows.iter().filter(|row| row.address.is_some()).count(), rows.len());
     if 2 * found < count {
         return Err(t!("only {found} of its {count} lines have an address", found, count));
