@@ -16,7 +16,7 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Write a device profile from a register map: CSV, Excel, Markdown, HTML, Home Assistant, Telegraf, ioBroker, NIBE,
+    /// Write a device profile from a register map: CSV, Excel, Markdown, HTML, Home Assistant, ESPHome, Telegraf, ioBroker, NIBE,
     /// modbus_local_gateway, solarman, wb-mqtt-serial, SunSpec, ModbusScope, MTUI
     Import(import::Args),
     /// Write a device profile as the configuration of another program; what that cannot say is listed

@@ -37,6 +37,8 @@ keyword_enum! {
         Html => "html",
         /// `modbus:` of Home Assistant.
         HomeAssistant => "homeassistant",
+        /// `modbus_controller` of ESPHome.
+        EspHome => "esphome",
         /// `[[inputs.modbus]]` of Telegraf.
         Telegraf => "telegraf",
         /// A device of modbus_local_gateway.
@@ -67,7 +69,7 @@ pub fn read(bytes: &[u8], context: &ListContext) -> List {
         }
     };
     let known = t!(
-        "What can be read: CSV and other text with a heading (address, name, type, scale, unit, table, in any order), columns of a PDF, tables of Markdown and HTML, sheets of Excel (.xlsx), lists of ioBroker and NIBE, Home Assistant, Telegraf, modbus_local_gateway, solarman, wb-mqtt-serial, models of SunSpec (JSON), ModbusScope, MTUI, and exports of ModMaster and Modsak."
+        "What can be read: CSV and other text with a heading (address, name, type, scale, unit, table, in any order), columns of a PDF, tables of Markdown, HTML and JSON, sheets of Excel (.xlsx), lists of ioBroker and NIBE, Home Assistant, ESPHome, Telegraf, modbus_local_gateway, solarman, wb-mqtt-serial, models of SunSpec (JSON), ModbusScope, MTUI, and exports of ModMaster and Modsak."
     );
     let refused = list.refused.clone().or_else(|| nothing(&list));
     List { refused: refused.map(|why| format!("{why}. {known}")), ..list }
@@ -101,6 +103,7 @@ fn of_text(text: &str, context: &ListContext) -> List {
         Format::Workbook => List::refused(t!("it is no Excel workbook (.xlsx): {error}", error = "PK")),
         Format::Html => of_tables(html::tables(text), context),
         Format::HomeAssistant => tree(yaml::parse(text), format::home_assistant::read),
+        Format::EspHome => tree(yaml::parse(text), format::esphome::read),
         Format::LocalGateway => tree(yaml::parse(text), format::local_gateway::read),
         Format::Solarman => tree(yaml::parse(text), format::solarman::read),
         Format::Telegraf => tree(toml::parse(text), format::telegraf::read),

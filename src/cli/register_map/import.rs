@@ -33,7 +33,7 @@ const SAID_MAX: usize = 400;
 pub struct Args {
     /// The register map; `-` reads standard input
     file: PathBuf,
-    /// What the file is, where that is not seen: list, xlsx, html, homeassistant, telegraf, modbus_local_gateway, solarman,
+    /// What the file is, where that is not seen: list, xlsx, html, homeassistant, esphome, telegraf, modbus_local_gateway, solarman,
     /// wb-mqtt-serial, sunspec, modbusscope, mtui, modmaster
     #[arg(long, value_parser = super::words::<Format>)]
     format: Option<Format>,

@@ -1,5 +1,6 @@
 //! One file a form, and what their rows have in common.
 
+pub mod esphome;
 pub mod foreign;
 pub mod home_assistant;
 pub mod local_gateway;

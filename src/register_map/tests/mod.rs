@@ -3,6 +3,7 @@
 mod codes;
 mod configurations;
 mod doubtful;
+mod esphome;
 mod exports;
 mod foreign_columns;
 mod foreign_places;
