@@ -8,8 +8,8 @@ use super::{
     heat_pump, register_names,
     tables::are_tables,
     words::{
-        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, length_of, number_of, order_of,
-        table_of, type_of, width_of, written_labels_of, yes_or_no,
+        access_of, bad_of, bit_field_of, field_of, is_sized_type, kind_of, length_of, number_of, order_of, table_of,
+        type_of, width_of, written_labels_of, yes_or_no,
     },
 };
 use crate::plant::address::wire;
