@@ -59,6 +59,9 @@ pub struct Peer {
     pub in_process: bool,
 }
 
+/// Of what is begun: what becomes of a stop or a reload has an entry of the station behind it.
+const PERMITTED: (Option<Arc<str>>, &str) = (None, "permitted");
+
 /// Who waits for the reply to a request.
 #[derive(Debug, Clone, Copy)]
 struct Requester {
@@ -277,28 +280,23 @@ impl AccessControl {
             SessionRequest::Active => vec![requester.done(), Effect::SessionStatus(terminal)],
             SessionRequest::Exported { file, sha256 } => {
                 let file: Arc<str> = clean(&file).into();
-                match sha256 {
-                    Ok(sha256) => {
-                        let new = Some(clean(&sha256).into());
-                        self.record_and_reply(requester, RecordedAction::Export, &file, new, at)
-                    }
-                    Err(why) => {
-                        let outcome = format!("failed: {}", clean(&why));
-                        self.record_outcome(requester, RecordedAction::Export, &file, (None, &outcome), at)
-                    }
-                }
+                let (new, outcome) = match sha256 {
+                    Ok(sha256) => (Some(clean(&sha256).into()), "done".to_owned()),
+                    Err(why) => (None, format!("failed: {}", clean(&why))),
+                };
+                self.record_and_reply(requester, RecordedAction::Export, &file, (new, &outcome), at)
             }
             SessionRequest::Backup { folder } => self.begin_backup(requester, folder, at),
             SessionRequest::Import { file } => self.begin_import(requester, file, at),
             SessionRequest::Stop => {
                 let mut effects =
-                    self.record_and_reply(requester, RecordedAction::StopStation, &self.plant_name(), None, at);
+                    self.record_and_reply(requester, RecordedAction::StopStation, &self.plant_name(), PERMITTED, at);
                 effects.push(Effect::Stop);
                 effects
             }
             SessionRequest::Reload => {
                 let mut effects =
-                    self.record_and_reply(requester, RecordedAction::Reload, &self.plant_name(), None, at);
+                    self.record_and_reply(requester, RecordedAction::Reload, &self.plant_name(), PERMITTED, at);
                 effects.retain(|effect| !matches!(effect, Effect::Reply(..)));
                 effects.push(Effect::Reload(ticket, self.users_digest()));
                 effects
@@ -333,21 +331,8 @@ impl AccessControl {
         self.def.name.as_str().into()
     }
 
-    /// Records the action and replies once it is durable.
+    /// Records the action with its new value and outcome, and replies once it is durable.
     fn record_and_reply(
-        &self,
-        requester: Requester,
-        action: RecordedAction,
-        target: &str,
-        new: Option<Arc<str>>,
-        at: Timestamp,
-    ) -> Vec<Effect> {
-        // What becomes of a stop or a reload has an entry of the station behind it.
-        let outcome = if new.is_some() { "done" } else { "permitted" };
-        self.record_outcome(requester, action, target, (new, outcome), at)
-    }
-
-    fn record_outcome(
         &self,
         requester: Requester,
         action: RecordedAction,

@@ -1,7 +1,6 @@
 //! Where a command reads the history: from the station while it runs, else from the file.
 
 use std::{
-    io,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -172,7 +171,8 @@ impl Source {
     /// written, or refuses: an export needs a right.
     pub async fn export(&self, path: &Path, bytes: &[u8]) -> Result<(), CliError> {
         let is_out = path.as_os_str() == "-";
-        let write = || if is_out { put_out(bytes) } else { write_for_user(path, bytes) };
+        let failed = CliError::io(format!("cannot write {}", path.display()));
+        let write = || if is_out { put_out(bytes) } else { write_for_user(path, bytes) }.map_err(failed);
         self.write_recorded(path, sha256(bytes), write).await?;
         if !is_out {
             say(&path.display().to_string());
@@ -183,7 +183,9 @@ impl Source {
     /// The same with a file that may be too large for the memory.
     pub async fn export_file(&self, path: &Path, from: &Path) -> Result<(), CliError> {
         let (_, sha256) = sync_and_hash(from).map_err(CliError::io(format!("cannot read {}", from.display())))?;
-        let write = || if path.as_os_str() == "-" { put_out_file(from) } else { copy_for_user(from, path) };
+        let failed = CliError::io(format!("cannot write {}", path.display()));
+        let is_out = path.as_os_str() == "-";
+        let write = || if is_out { put_out_file(from) } else { copy_for_user(from, path) }.map_err(failed);
         self.write_recorded(path, sha256, write).await
     }
 
@@ -192,11 +194,10 @@ impl Source {
         &self,
         path: &Path,
         sha256: String,
-        write: impl FnOnce() -> io::Result<()>,
+        write: impl FnOnce() -> Result<(), CliError>,
     ) -> Result<(), CliError> {
         let file = path.display().to_string();
-        let failed = CliError::io(format!("cannot write {file}"));
-        let Source::Station(session) = self else { return write().map_err(failed) };
+        let Source::Station(session) = self else { return write() };
         let exported = SessionRequest::Exported { file: file.clone(), sha256: Ok(sha256) };
         let durability = session.request(exported).await?;
         let written = write();
@@ -207,7 +208,7 @@ impl Source {
                 session.request(failed).await?;
             }
         }
-        written.map_err(failed)
+        written
     }
 }
 

@@ -228,8 +228,12 @@ fn devices(file: &PlantFile, lines: &[LineDef], library: &Library, problems: &mu
     }
     stated.into_iter().for_each(|(tag, value)| tags[tag.index()].stated = Some(value));
     sets::mark(&devices, &mut tags, &written, problems);
-    let texts = known.iter().filter_map(|device| device.profile.texts.clone()).collect();
-    Some(Devices { devices, tags, names, classes, exprs, alarms, texts })
+    Some(Devices { devices, tags, names, classes, exprs, alarms, texts: texts_of(&known) })
+}
+
+/// The texts of their profiles in other languages.
+fn texts_of(known: &[ResolvedDevice]) -> Vec<At<Raw>> {
+    known.iter().filter_map(|device| device.profile.texts.clone()).collect()
 }
 
 fn known_devices<'a>(

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{
     diagnostic::{Problems, Span},
-    reader::{At, Node, Raw, wrong_type},
+    reader::{At, Raw, Value as _},
 };
 use crate::{
     plant::def::PlantDef,
@@ -33,23 +33,15 @@ pub(super) fn texts<'a>(
             problem.label(format!("expected one of {}", codes.join(", "))).suggest(code, codes);
             continue;
         }
-        let Node::Table(table) = &table.value else {
-            wrong_type::<()>(&table.value, table.at, "a table of texts", problems);
-            continue;
-        };
-        for (text, (at, value)) in table {
-            match &value.value {
-                Node::Text(other) if !other.trim().is_empty() => {
-                    texts.entry(code.clone()).or_default().entry(text.clone()).or_insert_with(|| other.clone());
-                    translated.push(Translated { at: *at, text: text.clone() });
-                }
-                Node::Text(_) => {
-                    problems.add(value.at, format!("`{text}` has no text in `{code}`")).label("expected a text");
-                }
-                _ => {
-                    wrong_type::<()>(&value.value, value.at, "a string", problems);
-                }
+        let Some(table) = Raw::read(&table.value, table.at, problems) else { continue };
+        for (text, (at, value)) in &table.table {
+            let Some(other) = String::read(&value.value, value.at, problems) else { continue };
+            if other.trim().is_empty() {
+                problems.add(value.at, format!("`{text}` has no text in `{code}`")).label("expected a text");
+                continue;
             }
+            texts.entry(code.clone()).or_default().entry(text.clone()).or_insert(other);
+            translated.push(Translated { at: *at, text: text.clone() });
         }
     }
     (PlantTexts::of(texts), translated)

@@ -47,7 +47,7 @@ mod tests;
 pub use context::{QueryNumbers, ViewContext};
 use dispatch::on_key;
 use effects::perform;
-use model_context::{with_replay, with_tabs};
+use model_context::{in_words, with_replay, with_tabs};
 use std::{borrow::Cow, sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent, KeyEventKind};
@@ -58,7 +58,7 @@ use crate::{
     history::{Answer, HistoryError},
     plant::{sample::Cause, snapshot::Snapshot},
     t,
-    text::{Locale, PlantTexts},
+    text::Locale,
 };
 use extension::Extension;
 use graphics::Picture;
@@ -237,15 +237,10 @@ impl Model {
 
 /// Takes in one message. The only place where a terminal's state changes.
 pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
-    let effects = in_words(model.locale(), model.snapshot.def.texts, || on_msg(model, msg));
+    let effects = in_words(model.words(), || on_msg(model, msg));
     // In the language that the message may have chosen.
-    in_words(model.locale(), model.snapshot.def.texts, || dispatch::list_keys(model));
+    in_words(model.words(), || dispatch::list_keys(model));
     effects
-}
-
-/// With the texts of the program and of the plant in this language.
-fn in_words<R>(locale: Locale, of_plant: PlantTexts, body: impl FnOnce() -> R) -> R {
-    of_plant.within(|| locale.within(body))
 }
 
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
@@ -284,17 +279,7 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.tabs.of_mut(tab).on_log_failed(&why);
             Vec::new()
         }
-        Msg::Saved(tab, result) => {
-            let failed = screen_dump::failed_export(&result);
-            let actions = match tab {
-                Some(tab) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
-                None => {
-                    screen_dump::on_saved(model, result);
-                    Vec::new()
-                }
-            };
-            failed.into_iter().chain(actions).collect()
-        }
+        Msg::Saved(tab, result) => session_lock::on_written(model, tab, result),
         Msg::Loaded(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_loaded(cx, result)),
         Msg::Undelivered(id, why) => {
             model.note_undelivered(id, why);
@@ -332,14 +317,14 @@ fn on_input(model: &mut Model, act: impl FnOnce(&mut Model) -> Vec<UiAction>) ->
 
 /// Draws the terminal as it stands.
 pub fn view(model: &Model, frame: &mut Frame) {
-    in_words(model.locale(), model.snapshot.def.texts, || chrome::view(model, frame));
+    in_words(model.words(), || chrome::view(model, frame));
     glyph_filter::apply(frame.buffer_mut(), &model.theme);
     model.theme.paint_ground(frame.buffer_mut());
 }
 
 /// The terminal's own picture over the cells, while one is wanted.
 pub fn picture(model: &Model) -> Option<Picture> {
-    in_words(model.locale(), model.snapshot.def.texts, || model.tabs.trends.picture(&model.cx()))
+    in_words(model.words(), || model.tabs.trends.picture(&model.cx()))
 }
 
 fn on_paste(model: &mut Model, text: &str) {

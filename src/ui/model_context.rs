@@ -2,6 +2,8 @@
 
 use ratatui::layout::Rect;
 
+use crate::text::{Locale, PlantTexts};
+
 use super::{Model, ViewContext, context::view_context, replay::Replay, tabs::Tabs};
 
 impl Model {
@@ -10,10 +12,20 @@ impl Model {
         context(self, self.screen)
     }
 
+    /// The language of its texts, and those of its plant.
+    pub(super) fn words(&self) -> (Locale, PlantTexts) {
+        (self.locale(), self.snapshot.def.texts)
+    }
+
     /// The same of the present, also while a past is shown.
     pub fn present_cx(&self) -> ViewContext<'_> {
         present_context(self, self.screen)
     }
+}
+
+/// With the texts of the program and of the plant in a language.
+pub(super) fn in_words<R>((locale, of_plant): (Locale, PlantTexts), body: impl FnOnce() -> R) -> R {
+    of_plant.within(|| locale.within(body))
 }
 
 /// What the parts of a terminal of this size may read.

@@ -55,13 +55,6 @@ fn next(model: &mut Model) -> Vec<UiAction> {
 }
 
 /// The record of a file was made, or refused.
-/// A file was on record and could not be written: that is put on record too.
-pub(super) fn failed_export(result: &Result<PathBuf, String>) -> Option<UiAction> {
-    let (file, why) = result.as_ref().err()?.split_once(": ")?;
-    let request = SessionRequest::Exported { file: file.to_owned(), sha256: Err(why.to_owned()) };
-    Some(UiAction::Do(Effect::SessionRequest(QueryId { tab: None, number: 0 }, request)))
-}
-
 pub(super) fn on_request_done(model: &mut Model, number: u32, answer: Result<(), RequestRefusal>) -> Vec<UiAction> {
     let dump = &mut model.screen_dump;
     if number != dump.number || dump.files.is_empty() {

@@ -33,5 +33,5 @@ fn texts_of_no_language_or_of_another_type_are_refused() {
     check("[mimic]", &THAI.replace("texts.th", "texts.thai"), &["unknown language `thai`", "expected one of en, th"]);
     check("[mimic]", &THAI.replace("\"ร้อน\"", "7"), &["[small.toml:32:7]", "a string"]);
     check("[mimic]", &THAI.replace("\"ร้อน\"", "\" \""), &["`hot` has no text in `th`"]);
-    check("[mimic]", "[texts]\nth = \"ร้อน\"\n[mimic]", &["a table of texts"]);
+    check("[mimic]", "[texts]\nth = \"ร้อน\"\n[mimic]", &["expected a table"]);
 }

@@ -90,7 +90,7 @@ fn batches_and_runs_are_right_where_the_clock_was_set_back() {
 }
 
 #[test]
-fn a_batch_that_changes_after_the_last_sample_of_an_epoch_is_of_it() {
+fn a_batch_that_changes_after_the_last_sample_is_of_its_epoch() {
     let (_folder, db) = folder();
     let store = Store::open(&db, &making(), sec(0)).unwrap().store;
     let batch = |at: Timestamp, place, event| {

@@ -165,7 +165,7 @@ fn names_of_numbers_are_read_as_they_are_written() {
 }
 
 #[test]
-fn names_of_numbers_are_told_apart_as_manuals_write_them() {
+fn names_of_numbers_are_parted_as_manuals_part_them() {
     let read = |cell: &str| {
         let read = written_labels_of(cell)?;
         Some(read.into_iter().map(|(number, text)| format!("{number} {text}")).collect::<Vec<_>>().join("+"))

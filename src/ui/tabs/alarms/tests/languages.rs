@@ -1,4 +1,4 @@
-//! What is on record is English; what is told of it is in the language of the terminal.
+//! What is on record is English; what is shown of it is in the language of the terminal.
 
 use super::*;
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
 };
 
 #[test]
-fn what_failed_is_told_in_every_language() {
+fn what_failed_is_listed_in_every_language() {
     let rows = vec![
         action(40, "anna", "write", "TIC-1.SV", "failed: response timeout", None),
         action(100, "anna", "write", "TIC-1.P", "verified", None),
