@@ -146,3 +146,13 @@ fn what_is_written_is_two_files_and_neither_is_a_pipe() {
     let (code, said) = run(folder.path(), &args, LIST.as_bytes());
     assert!(code == Some(1) && !at("c.toml").exists(), "nothing is left half done: {said}");
 }
+
+#[test]
+fn a_profile_that_no_plant_can_name_is_checked_and_says_so() {
+    let folder = folder();
+    let args = ["profile", "import", "-", "--out", "a.b.toml"];
+    let (code, said) = run(folder.path(), &args, LIST.as_bytes());
+    assert!(code == Some(0) && said.contains("no plant file can name this profile"), "{said}");
+    let (code, said) = run(folder.path(), &["check", "a.b.toml"], b"");
+    assert_eq!(code, Some(0), "{said}");
+}

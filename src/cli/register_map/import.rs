@@ -292,6 +292,9 @@ fn say_next(args: &Args, path: &Path, name: &str, written: &Written) {
                 plant.display()
             ));
         }
+        None if profile_name(path).is_none() => {
+            say("      no plant file can name this profile: call it NAME.toml, of letters, digits, `_` and `-` alone");
+        }
         None => say(&format!(
             "      in a plant file beside it: [[device]] with profile = \"{name}\"; for all plants: ~/.config/sightglass/devices"
         )),
