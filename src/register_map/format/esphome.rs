@@ -142,7 +142,8 @@ fn filtered(mut named: Named, item: &Node) -> Result<Named, String> {
             key => return Err(unsaid(key)),
         }
     }
-    if item.all("filters").iter().any(|filter| matches!(filter.value, Value::Scalar(_))) {
+    let is_odd = item.all("filters").iter().any(|filter| matches!(filter.value, Value::Scalar(_)));
+    if is_odd || !named.scale.is_finite() || !named.offset.is_finite() {
         return Err(unsaid("filters"));
     }
     let decimals = decimals_of(named.scale, named.kind).max(decimals_of(named.offset, DataType::U16));

@@ -78,7 +78,7 @@ fn following(cell: &str) -> Option<String> {
     let whole =
         |part: &&str| format!("{}{part}", first.get(..first.len().saturating_sub(part.len())).unwrap_or_default());
     let numbers: Vec<u32> = parts.iter().filter_map(|part| whole(part).parse().ok()).collect();
-    let follows = numbers.len() == parts.len() && numbers.windows(2).all(|two| two[0] + 1 == two[1]);
+    let follows = numbers.len() == parts.len() && numbers.windows(2).all(|two| two[0].checked_add(1) == Some(two[1]));
     follows.then(|| format!("{first}-{}", whole(last)))
 }
 
@@ -131,6 +131,7 @@ mod tests {
             "2025-11-15",
             "holding:5",
             "0!40001",
+            "4294967295/0",
             "1!5",
             "12:30",
         ] {

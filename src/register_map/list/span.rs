@@ -23,7 +23,7 @@ pub fn first_of(cell: &str) -> &str {
 pub fn span_of(cell: &str) -> Option<u16> {
     let (first, last) = ends_of(cell)?;
     let (first, last) = number_as(first, last)?;
-    u16::try_from(last.checked_sub(first)? + 1).ok()
+    u16::try_from(last.checked_sub(first)?.checked_add(1)?).ok()
 }
 
 /// First and last of a span: two numbers. A date is no address.
