@@ -214,8 +214,11 @@ async fn ask(change: &str, question: &[String], yes: bool) -> Result<(), CliErro
 /// A word of the tag, or a number as it is typed on a screen.
 fn value(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, String> {
     let def = snapshot.def.tag(tag);
-    let word = def.enum_labels.iter().find(|(_, label)| label.eq_ignore_ascii_case(text));
-    if let Some((value, _)) = word {
+    // The word itself, else the only one that is it in other letters.
+    let alike = |(_, label): &&(i128, String)| label.eq_ignore_ascii_case(text);
+    let exact = def.enum_labels.iter().find(|(_, label)| label == text);
+    let only = || def.enum_labels.iter().find(alike).filter(|_| def.enum_labels.iter().filter(alike).count() == 1);
+    if let Some((value, _)) = exact.or_else(only) {
         return Ok(Exact::whole(*value));
     }
     let labels: Vec<&str> = def.enum_labels.iter().map(|(_, label)| label.as_str()).collect();
@@ -253,6 +256,22 @@ mod tests {
             let why = read(text).expect_err("no number");
             assert!(why.contains(&format!("found `{text}`, expected a number: ")), "{why}");
         }
+    }
+
+    #[test]
+    fn a_word_is_the_one_that_was_typed() {
+        let mut snapshot = snapshot();
+        let mut def = (*snapshot.def).clone();
+        def.tags[SV.index()].enum_labels = ["run", "Run", "RUN", "Hold"]
+            .iter()
+            .map(|word| (*word).to_owned())
+            .enumerate()
+            .map(|(n, word)| (n as i128 + 1, word))
+            .collect();
+        snapshot.def = Arc::new(def);
+        let read = |text| value(&snapshot, SV, text).map(Exact::near);
+        assert_eq!(["run", "Run", "RUN", "hold"].map(read), [Ok(1.0), Ok(2.0), Ok(3.0), Ok(4.0)]);
+        assert!(read("rUN").is_err_and(|why| why.contains("expected one of run, Run, RUN, Hold")));
     }
 
     #[tokio::test]

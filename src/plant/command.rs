@@ -314,8 +314,8 @@ impl fmt::Display for Outcome {
         f.write_str(translate(self.label()))?;
         match self {
             Outcome::Pending | Outcome::Verified => Ok(()),
-            Outcome::Unchanged => f.write_str(t!(", not written")),
-            Outcome::Sent => f.write_str(t!(", no unit answers a broadcast")),
+            Outcome::Unchanged => write!(f, ", {}", t!("not written")),
+            Outcome::Sent => write!(f, ", {}", t!("no unit answers a broadcast")),
             Outcome::Refused(why) => write!(f, ": {why}"),
             Outcome::NotConfirmed(why) => write!(f, ": {why}"),
             Outcome::Failed(fault) => write!(f, ": {fault}"),

@@ -25,6 +25,9 @@ pub fn check(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, Strin
         return Err(t!("enter a number").to_owned());
     }
     let (number, typed) = parse(text).ok_or_else(|| t!("\"{text}\" is not a number", text))?;
+    if is_of_thousands(text) {
+        return Err(t!("\"{text}\" may be thousands: enter it with a point, or without a comma", text));
+    }
     // Trailing zeros count as decimals: a tag without decimals refuses `1,000` and `1.000`, which mean a thousand to their author.
     check_decimals(typed, snapshot.decimals[tag.index()])?;
     let value = match number {
@@ -45,6 +48,13 @@ pub fn check(snapshot: &Snapshot, tag: TagId, text: &str) -> Result<Exact, Strin
         )),
         (true, true) => Ok(value),
     }
+}
+
+/// `1,500`: three digits behind a comma, and not 0 before it.
+fn is_of_thousands(text: &str) -> bool {
+    let Some((first, last)) = text.trim_start_matches(['=', '+', '-']).split_once(',') else { return false };
+    let is_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    is_digits(first) && is_digits(last) && last.len() == 3 && first.len() <= 3 && !first.starts_with('0')
 }
 
 /// Has a number this many decimals at most as its tag?

@@ -28,13 +28,8 @@ pub fn to_raw(tag: &TagDef, value: impl Into<Exact>, decimals: i8) -> Option<Exa
     let raw = match tag.point.kind.encoding() {
         Encoding::Float => {
             let held = as_stored(tag, unscaled(value, tag.scale, tag.offset, decimals));
-            let max = match tag.point.kind.words() {
-                1 => half::MAX,
-                2 => f64::from(f32::MAX),
-                _ => f64::MAX,
-            };
             // A zero has no sign: its bits would be those of another number to a device that compares words.
-            return (held.abs() <= max).then(|| (held + 0.0).into());
+            return (held.abs() <= float_max(tag)).then(|| (held + 0.0).into());
         }
         Encoding::Text => return None,
         Encoding::Bit
@@ -89,14 +84,30 @@ pub fn is_held(tag: &TagDef, value: Exact, held: Exact) -> bool {
 
 /// The bounds within which a tag can be written, in words: where none is stated, those of its type.
 pub fn bounds_text(tag: &TagDef, (min, max): Bounds, decimals: i8, shown: Option<u8>) -> (String, String) {
-    let of_type = tag.point.raw_range().map(|(low, high)| {
-        let [one, other] = [low, high].map(|raw| to_value(tag, Exact::whole(raw), decimals));
-        if one <= other { (one, other) } else { (other, one) }
-    });
-    let text = |bound: Option<Exact>, of_type: Option<Exact>, none: &str| {
-        bound.or(of_type).map_or(none.to_owned(), |bound| digits(bound, shown))
+    let raw = tag.point.raw_range().map(|(low, high)| [low, high].map(Exact::whole));
+    let raw = raw.unwrap_or_else(|| [-float_max(tag), float_max(tag)].map(Exact::from));
+    let [one, other] = raw.map(|raw| to_value(tag, raw, decimals));
+    let of_type = if one <= other { (one, other) } else { (other, one) };
+    let is_float = tag.point.kind.encoding() == Encoding::Float;
+    let text = |bound: Exact| {
+        let (near, rounded) = (bound.near(), digits(bound, shown));
+        // No one reads a number of forty digits; and one that is rounded may lie beyond the bound.
+        match rounded.parse::<f64>() {
+            _ if is_float && 1e15 <= near.abs() => format!("{near:e}"),
+            Ok(other) if NOISE * near.abs().max(1.0) < (other - near).abs() => digits(bound, None),
+            Ok(_) | Err(_) => rounded,
+        }
     };
-    (text(min, of_type.map(|all| all.0), "−∞"), text(max, of_type.map(|all| all.1), "∞"))
+    (text(min.unwrap_or(of_type.0)), text(max.unwrap_or(of_type.1)))
+}
+
+/// The greatest number that a floating-point type holds.
+fn float_max(tag: &TagDef) -> f64 {
+    match tag.point.kind.words() {
+        1 => half::MAX,
+        2 => f64::from(f32::MAX),
+        _ => f64::MAX,
+    }
 }
 
 /// The raw number to write for a value within bounds; `None` if the type cannot hold it, or if the value, or what the device
@@ -251,6 +262,16 @@ mod tests {
         check(DataType::U16, 1.0, (Some(5.0.into()), None), "5", "65535");
         check(DataType::Bcd16, 1.0, (None, Some(500.0.into())), "0", "500");
         check(DataType::Bool, 1.0, (None, None), "0", "1");
+        let rounded = bounds_text(&tag, (Some((-50.05).into()), Some(99.95.into())), 0, Some(1));
+        assert_eq!(rounded, ("-50.05".to_owned(), "99.95".to_owned()), "never beyond it");
+        let mut check = |kind, scale, bounds: Bounds, min: &str, max: &str| {
+            (tag.point.kind, tag.scale, tag.offset) = (kind, scale, 0.0);
+            let words = bounds_text(&tag, bounds, 0, None);
+            assert_eq!((words.0.as_str(), words.1.as_str()), (min, max), "{kind:?}");
+        };
+        check(DataType::F16, 0.5, (None, None), "-32752", "32752");
+        check(DataType::F32, 1.0, (Some(0.0.into()), None), "0", "3.4028234663852886e38");
+        check(DataType::U64, 1.0, (None, None), "0", "18446744073709551615");
     }
 
     #[test]

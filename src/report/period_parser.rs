@@ -12,7 +12,7 @@ use crate::plant::{def::PlantDef, keyword::Keyword, report::PeriodKind};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PeriodError {
     /// A shift was asked of a plant without shifts.
-    #[error("this plant has no shifts: give the period with --from and --to")]
+    #[error("this plant has no shifts: give its beginning and its end")]
     NoShifts,
     /// No shift has this name.
     #[error("no shift `{found}`: expected last, current, {expected}, or one of these with @YYYY-MM-DD")]

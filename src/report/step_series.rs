@@ -73,8 +73,8 @@ impl StepSeries {
     }
 }
 
-/// Finds the sample in force at rising instants. The samples come in order of time and should begin [`HOLD_MAX`] before
-/// the first.
+/// Finds the sample in force at rising instants. The samples come in the order in which they were stored and should begin
+/// [`HOLD_MAX`] before the first.
 #[derive(Debug, Clone)]
 pub struct ValuesAt {
     instants: Arc<[Timestamp]>,
@@ -88,8 +88,12 @@ impl ValuesAt {
         ValuesAt { values: Vec::with_capacity(instants.len()), instants, current: None }
     }
 
-    /// The next sample.
+    /// The next sample. One that is earlier than the one before it was stored after a clock was set back: from there on what was stored
+    /// later counts.
     pub fn next(&mut self, sample: Sample) {
+        if self.current.is_some_and(|current| sample.at < current.at) {
+            self.values.truncate(self.instants.partition_point(|at| *at < sample.at));
+        }
         self.up_to(sample.at);
         self.current = Some(sample);
     }
@@ -234,6 +238,13 @@ mod tests {
     #[test]
     fn the_value_at_an_instant_is_the_one_that_stood_then() {
         let samples = [Sample::good(1.0, sec(0)), Sample::bad(Cause::Timeout, sec(10)), Sample::good(3.0, sec(20))];
+        // The clock was an hour ahead for a while: what was stored after it was set back counts from there on.
+        let mut back = ValuesAt::new([0, 10, 20, 30, 3_600].map(sec).into());
+        for (at, value) in [(0, 50.0), (5, 60.0), (3_590, 70.0), (15, 80.0), (25, 90.0)] {
+            back.next(Sample::good(value, sec(at)));
+        }
+        let values: Vec<_> = back.end().iter().map(|sample| sample.and_then(|sample| sample.value)).collect();
+        assert_eq!(values, [Some(50.0), Some(60.0), Some(80.0), Some(90.0), None]);
         let mut as_of = ValuesAt::new([-1, 0, 9, 10, 19, 20, 169, 170].map(sec).into());
         samples.into_iter().for_each(|sample| as_of.next(sample));
         let got: Vec<_> = as_of.end().into_iter().map(|sample| sample.and_then(Sample::good_value)).collect();

@@ -99,7 +99,8 @@ impl CommandTracker {
             }
         };
         let Some(decimals) = decimals else {
-            return refuse(Refusal::Unknown("number of decimals".into()));
+            let source = def.decimals.source().map_or(&def.name, |source| &self.def.tag(source).name);
+            return refuse(Refusal::Unknown(source.clone()));
         };
         let Some(raw) = scale::raw_within(def, value, decimals, bounds) else {
             let (min, max) = scale::bounds_text(def, bounds, decimals, Some(image.shown_decimals(def)));

@@ -213,7 +213,7 @@ fn a_gateway_that_answers_for_a_dead_device_is_not_the_device() {
 #[test]
 fn nothing_is_written_blindly() {
     let mut plant = Plant::new(fixture::shared(), at(0), 1.0);
-    let unknown = Outcome::Refused(Refusal::Unknown("number of decimals".into()));
+    let unknown = Outcome::Refused(Refusal::Unknown("TIC-1.DP".into()));
     assert_eq!(write(&mut plant, 50.0, WriteResult::Accepted), (unknown, None));
     for (tag, value, refusal) in [(PV, 1.0, Refusal::ReadOnly), (RUN, 2.0, Refusal::NotAChoice)] {
         let effects = plant.on_command(shown(&plant, 2, tag, value), at(1));

@@ -1,5 +1,6 @@
 //! "Do it or not": the window that carries an action to confirm.
 
+use crate::text::of_plant;
 use std::sync::Arc;
 
 use crate::t;
@@ -116,7 +117,11 @@ impl Confirm {
     /// A write with words of its own (an action of a device).
     pub fn action(cx: &ViewContext, tag: TagId, value: f64, name: &str, words: &str) -> Confirm {
         let confirm = Confirm::write(cx, tag, value);
-        let notes = [words.to_owned()].into_iter().chain(confirm.notes).collect();
+        // The tag may ask the same.
+        let own = of_plant(words).to_owned();
+        let notes = confirm.notes.into_iter().filter(|note| *note != own);
+        let notes = [own.clone()].into_iter().chain(notes).collect();
+        let name = of_plant(name);
         Confirm { title: format!("{name} {}", cx.def().device(cx.def().tag(tag).device).name), notes, ..confirm }
     }
 

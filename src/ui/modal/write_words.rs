@@ -1,5 +1,6 @@
 //! What is said of a write before it is sent.
 
+use crate::text::of_plant;
 use crate::{
     plant::{
         confidence::Confidence,
@@ -33,7 +34,7 @@ pub fn wire_text(def: &TagDef) -> String {
 
 /// What the profile wants said before a write.
 pub(super) fn write_notes(def: &TagDef) -> Vec<String> {
-    let mut notes: Vec<String> = def.confirm.iter().cloned().collect();
+    let mut notes: Vec<String> = def.confirm.iter().map(|words| of_plant(words).to_owned()).collect();
     match def.confidence {
         Confidence::Proven | Confidence::High => {}
         Confidence::Medium => notes.push(t!("! not verified: this row of the register map has one source").to_owned()),

@@ -1,6 +1,7 @@
 //! Writes: stops, unlock registers, interlocks, rounding, and the value that the operator saw.
 
 use super::*;
+use crate::plant::{tag::Decimals, tag_value::TagValue};
 
 /// The plant of the tests, whose PLC is stopped by an action.
 fn with_stop() -> Plant {
@@ -88,6 +89,28 @@ fn a_lost_refresh_of_the_plant_fails_no_command() {
     plant.on_undeliverable(L1, &effects.bus[0].1);
     let outcomes = plant.snapshot().commands.into_iter().map(|status| status.outcome).collect::<Vec<_>>();
     assert_eq!(outcomes, [Outcome::Verified, Outcome::Refused(Refusal::Busy)], "newest first");
+}
+
+#[test]
+fn what_another_power_of_ten_scales_by_now_is_not_verified() {
+    let mut def = fixture::plant();
+    let sv = &mut def.tags[SV.index()];
+    (sv.decimals, sv.quality_from, sv.min, sv.max) = (Decimals::PowerFrom(DP), None, None, None);
+    let different = NotConfirmed::Different(TagValue::Number(4.5.into()));
+    for (power, outcome) in [
+        (Some(0.0), Outcome::Verified),
+        (Some(-1.0), Outcome::NotConfirmed(different)),
+        (None, Outcome::NotConfirmed(NotConfirmed::NoReadBack)),
+    ] {
+        let mut plant = Plant::new(Arc::new(def.clone()), at(0), 1.0);
+        plant.on_event(read(0, &[(SV, 20.0), (DP, 0.0)]));
+        let effects = plant.on_command(shown(&plant, 1, SV, 45.0), at(1));
+        let BusRequest::Write(WriteJob { id, raw, .. }) = effects.bus[0].1.clone() else { panic!("a write") };
+        plant.on_event(read(2, &[(SV, 45.0)]));
+        power.map(|power| plant.on_event(read(2, &[(DP, power)])));
+        plant.on_event(Event::Wrote { at: at(2), id, result: WriteResult::ReadBack(raw) });
+        assert_eq!(plant.snapshot().commands[0].outcome, outcome, "{power:?}");
+    }
 }
 
 /// SV in steps of 0.5 °C (scale 5 on a register with one decimal), at 70 °C.

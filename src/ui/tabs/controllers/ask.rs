@@ -58,7 +58,7 @@ fn warnings(def: &PlantDef, changes: &[PlannedChange]) -> Vec<String> {
     let unsure: Vec<&str> = unsure.map(|tag| tag.short.as_str()).collect();
     let mut asked: Vec<(&str, Vec<&str>)> = Vec::new();
     for tag in &tags {
-        let Some(words) = tag.confirm.as_deref() else { continue };
+        let Some(words) = tag.confirm.as_deref().map(of_plant) else { continue };
         match asked.iter_mut().find(|(other, _)| *other == words) {
             Some((_, shorts)) => shorts.push(&tag.short),
             None => asked.push((words, vec![&tag.short])),

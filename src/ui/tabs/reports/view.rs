@@ -267,17 +267,17 @@ pub fn lines(
 
 fn figures(cx: &ViewContext, tag: &TagFigures, charted: bool, later: bool) -> Line<'static> {
     let (theme, (name, figure)) = (cx.theme, widths(cx.area.width));
-    let value = |value: Option<Exact>| match value {
-        Some(value) => pad_left(&digits(value, Some(tag.decimals)), figure),
-        None => pad_left("–", figure),
-    };
+    // A part of a number is another number, and two that touch are one.
+    let right = |number: &str| pad_left(&text::whole(number, figure - 1), figure);
+    let value =
+        |value: Option<Exact>| value.map_or_else(|| right("–"), |value| right(&digits(value, Some(tag.decimals))));
     let mean = mean_or_difference(tag).replace('—', "–");
     let alarm = if tag.in_alarm.is_zero() { "–".to_owned() } else { long(tag.in_alarm) };
     let good =
         if tag.good >= 1.0 { "100 %".to_owned() } else { format!("{:.1} %", (tag.good * 1_000.0).floor() / 10.0) };
     let figures = [
         Span::styled(value(tag.min), theme.normal()),
-        Span::styled(pad_left(&mean, figure), theme.normal()),
+        Span::styled(right(&mean), theme.normal()),
         Span::styled(value(tag.max), theme.normal()),
         Span::styled(value(tag.last), theme.normal()),
         Span::styled(pad_left(&alarm, figure + 1), if tag.in_alarm.is_zero() { theme.dim() } else { theme.strong() }),
