@@ -30,7 +30,8 @@ fn a_wrong_number_is_reported_before_it_is_sent() {
         check(text, Err(&format!("\"{text}\" is not a number")));
     }
     check("70.55", Err("at most 1 decimal"));
-    check("1,000", Err("at most 1 decimal"));
+    check("1,000", Err("\"1,000\" may be thousands: enter it with a point, or without a comma"));
+    check("0,125", Err("at most 1 decimal"));
     check("1000", Err("outside range 0.0 … 120.0 °C"));
 }
 

@@ -252,7 +252,7 @@ fn what_the_device_would_round_is_no_step_but_is_safe() {
 
 #[test]
 fn a_safe_state_is_sent_over_what_was_only_read_back() {
-    // SV is scaled by a power of ten that was not read since it was written.
+    // SV is scaled by a power of ten that is not read with it: the step is not confirmed.
     let mut def = def();
     let sv = &mut def.tags[SV.index()];
     (sv.decimals, sv.quality_from, sv.min, sv.max) = (Decimals::PowerFrom(DP), None, None, None);
@@ -261,9 +261,8 @@ fn a_safe_state_is_sent_over_what_was_only_read_back() {
     let mut plant = plant_of(def);
     let started = start(&mut plant);
     assert_eq!(written(&started), [(SV, 50.0)]);
-    end(&mut plant, &started, 2, WriteResult::ReadBack);
-    let aborted = command(&mut plant, 2, CommandKind::AbortProcedure(HEAT), 3);
-    assert_eq!(written(&aborted), [(SV, 200.0)], "2000 was read before the write");
+    let failed = end(&mut plant, &started, 2, WriteResult::ReadBack);
+    assert_eq!(written(&failed), [(SV, 200.0)], "2000 was read before the write");
 }
 
 #[test]
