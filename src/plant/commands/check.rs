@@ -104,7 +104,7 @@ impl CommandTracker {
         };
         let Some(raw) = scale::raw_within(def, value, decimals, bounds) else {
             let (min, max) = scale::bounds_text(def, bounds, decimals, Some(image.shown_decimals(def)));
-            return refuse(Refusal::OutOfRange { min: min.into(), max: max.into() });
+            return refuse(Refusal::OutOfRange { min, max });
         };
         // What makes safe is written as near as it can be; else only what was asked for is written.
         let held = scale::to_value(def, raw, decimals);

@@ -18,8 +18,11 @@ pub fn is_archive(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04")
 }
 
+/// Name and rows of each sheet that is read, and the names of those that are hidden.
+pub type Sheets = (Vec<(String, Vec<Cells>)>, Vec<String>);
+
 /// Name and rows of each sheet that has any and is shown, and the names of those that are not.
-pub fn sheets(bytes: &[u8]) -> Result<(Vec<(String, Vec<Cells>)>, Vec<String>), String> {
+pub fn sheets(bytes: &[u8]) -> Result<Sheets, String> {
     check_size(bytes)?;
     let no_book = |error: &dyn std::fmt::Display| t!("it is no Excel workbook (.xlsx): {error}", error);
     let mut book = Xlsx::new(Cursor::new(bytes)).map_err(|error| no_book(&error))?;

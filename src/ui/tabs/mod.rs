@@ -264,17 +264,21 @@ impl Tabs {
     }
     /// What a window asks of the tab below it, which then asks for what it shows.
     pub fn on_asked(&mut self, cx: &ViewContext, asked: Asked) -> Next {
-        let (prompt, change): (_, Box<dyn FnOnce(&mut dyn ListPage)>) = match asked {
+        let list = self.shown_mut().list_mut(cx);
+        let prompt = match asked {
             Asked::Take(prompt) => match self.shown_mut().on_text(cx, &prompt.line.text()) {
                 Ok(actions) => return Next::Do(actions),
                 Err(problem) => return prompt.refused(problem),
             },
-            Asked::Filter(prompt, text) => (prompt, Box::new(move |list| list.set_filter(cx, &text))),
-            Asked::Step(prompt, motion) => (Some(prompt), Box::new(move |list| list.step(cx, motion))),
+            Asked::Filter(prompt, text) => {
+                list.into_iter().for_each(|list| list.set_filter(cx, &text));
+                prompt
+            }
+            Asked::Step(prompt, motion) => {
+                list.into_iter().for_each(|list| list.step(cx, motion));
+                Some(prompt)
+            }
         };
-        if let Some(list) = self.shown_mut().list_mut(cx) {
-            change(list);
-        }
         let actions = self.shown_mut().on_snapshot(cx);
         match prompt {
             Some(prompt) => Next::Both(Modal::Prompt(prompt), actions),

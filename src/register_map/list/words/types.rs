@@ -28,9 +28,11 @@ const SIGNED: Option<Sign> = Some(Sign::Is(true));
 const UNSIGNED: Option<Sign> = Some(Sign::Is(false));
 const AS_INT: Option<Sign> = Some(Sign::Usual(true));
 const AS_WORD: Option<Sign> = Some(Sign::Usual(false));
-/// The words of types, and what each says.
+/// A word of a type, and what it says: kind, sign and bits.
+type Word = (&'static str, Option<Kind>, Option<Sign>, Option<u16>);
+
 #[rustfmt::skip]
-const WORDS: [(&str, Option<Kind>, Option<Sign>, Option<u16>); 48] = [
+const WORDS: [Word; 48] = [
     ("unsigned", None, UNSIGNED, None), ("signed", None, SIGNED, None), ("u", None, UNSIGNED, None), ("s", None, SIGNED, None),
     ("int", WHOLE, AS_INT, None), ("integer", WHOLE, AS_INT, None), ("i", WHOLE, AS_INT, None), ("sint", WHOLE, SIGNED, None),
     ("uint", WHOLE, UNSIGNED, None), ("short", WHOLE, AS_INT, Some(16)), ("ushort", WHOLE, UNSIGNED, Some(16)), ("long", WHOLE, AS_INT, Some(32)),
