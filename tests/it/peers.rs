@@ -122,7 +122,8 @@ fn read_faults(units: &[(&str, u8, &str)], mode: &str, port: &str) -> Vec<String
     let file = folder.path().join("faults.toml");
     fs::write(&file, plant_with(units, mode)).unwrap();
     fs::copy(plant("number.toml"), folder.path().join("number.toml")).unwrap();
-    let said = station(&file, port, "15s");
+    // Long enough for a machine that has much else to do.
+    let said = station(&file, port, "20s");
     for (name, _, address) in units {
         let seen = printed(&said, &format!("{name}.N"));
         let value = seen.split(' ').next().unwrap();

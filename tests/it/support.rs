@@ -293,7 +293,10 @@ pub fn libmodbus_server() -> Option<LibmodbusServer> {
 }
 
 fn install(package: &str) {
-    let get = format!("apt-get install -y -qq {package}");
+    // Tests run side by side, and apt-get gives up where another one is at work.
+    static TURN: Mutex<()> = Mutex::new(());
+    let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    let get = format!("apt-get -o DPkg::Lock::Timeout=300 install -y -qq {package}");
     let _ =
         Command::new("sh").args(["-c", &format!("({get} || (apt-get update -qq && {get})) >/dev/null 2>&1")]).status();
 }
