@@ -205,7 +205,8 @@ impl Source {
             Ok(()) => client::warn_not_recorded(&format!("exported to {file}"), durability),
             Err(error) => {
                 let failed = SessionRequest::Exported { file, sha256: Err(error.to_string()) };
-                session.request(failed).await?;
+                // Where that cannot be put on record either, why nothing was written is said all the same.
+                drop(session.request(failed).await);
             }
         }
         written

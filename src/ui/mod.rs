@@ -279,7 +279,12 @@ fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
             model.tabs.of_mut(tab).on_log_failed(&why);
             Vec::new()
         }
-        Msg::Saved(tab, result) => session_lock::on_written(model, tab, result),
+        Msg::Saved(Some(tab), result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
+        Msg::Saved(None, result) => {
+            screen_dump::on_saved(model, result);
+            Vec::new()
+        }
+        Msg::ExportFailed(file, why) => vec![session_lock::export_failed(file, why)],
         Msg::Loaded(tab, result) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_loaded(cx, result)),
         Msg::Undelivered(id, why) => {
             model.note_undelivered(id, why);

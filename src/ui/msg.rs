@@ -48,6 +48,8 @@ pub enum Msg {
     Answer(QueryId, Result<Answer, HistoryError>),
     /// A file of this tab (`None`: of the screen) was written, or why not.
     Saved(Option<Tab>, Result<PathBuf, String>),
+    /// A file that is on record as an export was not written, and why.
+    ExportFailed(String, String),
     /// A log of this tab could not be written, and why.
     LogFailed(Tab, String),
     /// The text of a file that this tab wanted, or why not.

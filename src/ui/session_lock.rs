@@ -1,7 +1,7 @@
 //! The session of this terminal: what is open to its user, the idle lock and its warning, and activity messages to the station.
 
 use crate::t;
-use std::{mem, path::PathBuf, sync::Arc, time::Duration};
+use std::{mem, sync::Arc, time::Duration};
 
 use crossterm::event::{KeyCode, KeyEvent};
 
@@ -255,23 +255,10 @@ pub(super) fn on_request_done(
     Vec::new()
 }
 
-/// A file of a tab, or the screen, was written; or why not, which is put on record where the file was.
-pub(super) fn on_written(model: &mut Model, tab: Option<Tab>, result: Result<PathBuf, String>) -> Vec<UiAction> {
-    let failed = failed_export(&result);
-    let actions = match tab {
-        Some(tab) => with_tabs(model, |tabs, cx| tabs.of_mut(tab).on_saved(cx, result)),
-        None => {
-            screen_dump::on_saved(model, result);
-            Vec::new()
-        }
-    };
-    failed.into_iter().chain(actions).collect()
-}
-
-fn failed_export(result: &Result<PathBuf, String>) -> Option<UiAction> {
-    let (file, why) = result.as_ref().err()?.split_once(": ")?;
-    let request = SessionRequest::Exported { file: file.to_owned(), sha256: Err(why.to_owned()) };
-    Some(UiAction::Do(Effect::SessionRequest(QueryId { tab: None, number: 0 }, request)))
+/// A file that was on record could not be written: that is put on record too.
+pub(super) fn export_failed(file: String, why: String) -> UiAction {
+    let request = SessionRequest::Exported { file, sha256: Err(why) };
+    UiAction::Do(Effect::SessionRequest(QueryId { tab: None, number: 0 }, request))
 }
 
 fn answered(model: &Model, mut form: Box<UserForm>, answer: Result<(), RequestRefusal>) -> Option<Modal> {

@@ -138,10 +138,13 @@ impl Store {
             active.iter_mut().chain(&mut suppressing).for_each(|event| event.at = event.at.min(from));
             let sql = sql::journal(&epochs.condition(), sql::OLDEST);
             let events = self.whole_list(&sql, params![utc(begin), utc(end), ROWS_MAX + 1], AlarmRecord::read)?;
-            let of_clock = self.pauses(from, until)?.into_iter().filter(|(.., is_of_clock)| *is_of_clock);
-            let skipped = of_clock.map(|(begin, end, _)| (begin, end)).collect();
-            all.push(EventLeg { from, until, active, suppressing, events, skipped });
+            all.push(EventLeg { from, until, active, suppressing, events, skipped: Vec::new() });
         }
+        let ends = all.iter().map(|leg| leg.from).min().zip(all.iter().map(|leg| leg.until).max());
+        let pauses = ends.map_or(Ok(Vec::new()), |(from, until)| self.pauses(from, until))?;
+        let of_clock = pauses.into_iter().filter(|(.., is_of_clock)| *is_of_clock);
+        let skipped: Vec<_> = of_clock.map(|(begin, end, _)| (begin, end)).collect();
+        all.iter_mut().for_each(|leg| leg.skipped.clone_from(&skipped));
         Ok(all)
     }
 }

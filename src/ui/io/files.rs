@@ -25,7 +25,7 @@ type Failed = (PathBuf, io::Error);
 
 impl Loop {
     pub(super) fn save(&self, tab: Option<Tab>, path: PathBuf, bytes: Vec<u8>, new: bool) {
-        self.write(tab, move || {
+        self.write(tab, true, move || {
             let checksum = |saved| {
                 let wanted = tab == Some(Tab::Reports);
                 if wanted { write_checksum(&path, &bytes) } else { Ok(()) }.map(|()| saved)
@@ -36,15 +36,20 @@ impl Loop {
 
     /// Files that are not there yet, all or none.
     pub(super) fn save_new(&self, tab: Tab, files: Vec<(PathBuf, Vec<u8>)>) {
-        self.write(Some(tab), move || {
+        self.write(Some(tab), false, move || {
             write_all_new(&files)?;
             let last = files.last().map(|(path, _)| path.clone()).unwrap_or_default();
             std::path::absolute(&last).map_err(|error| (last, error))
         });
     }
 
-    /// Writes beside the screen, and answers what came of it.
-    fn write(&self, tab: Option<Tab>, write: impl FnOnce() -> Result<PathBuf, Failed> + Send + 'static) {
+    /// Writes beside the screen, and answers what came of it. An export is on record before.
+    fn write(
+        &self,
+        tab: Option<Tab>,
+        is_export: bool,
+        write: impl FnOnce() -> Result<PathBuf, Failed> + Send + 'static,
+    ) {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
         let exists = self.model.locale().within(|| t!("a file of this name is there already"));
         tokio::task::spawn_blocking(move || {
@@ -52,7 +57,11 @@ impl Loop {
                 io::ErrorKind::AlreadyExists => exists.to_owned(),
                 _ => error.to_string(),
             };
-            let saved = write().map_err(|(path, error)| format!("{}: {}", path.display(), why(error)));
+            let saved = write().map_err(|(path, error)| (path.display().to_string(), why(error)));
+            if let (true, Err((file, why))) = (is_export, &saved) {
+                let _ = outbox.blocking_send((plants, Msg::ExportFailed(file.clone(), why.clone())));
+            }
+            let saved = saved.map_err(|(file, why)| format!("{file}: {why}"));
             let _ = outbox.blocking_send((plants, Msg::Saved(tab, saved)));
         });
     }
