@@ -210,10 +210,8 @@ impl CommandTracker {
         at: Timestamp,
     ) -> Option<ActionRecord> {
         let (command, job) = self.take_write(id)?;
-        let status = self.commands.iter().find(|status| status.command.id == command);
-        let begun = status.map_or(at, |status| status.at);
-        let sent_for = status.and_then(|status| status.command.kind.written()).map(|(_, value)| value);
-        let outcome = outcome::of_write(self.def.tag(job.tag), (&job.raw, sent_for), result, image, elapsed(begun, at));
+        let begun = self.commands.iter().find(|status| status.command.id == command).map_or(at, |status| status.at);
+        let outcome = outcome::of_write(self.def.tag(job.tag), &job, result, image, elapsed(begun, at));
         self.complete(command, outcome, image, at)
     }
 

@@ -130,6 +130,7 @@ mod tests {
             verify: true,
             urgent: false,
             over: None,
+            unscaled_by: None,
         });
         for _ in 0..3 {
             let (ours, _theirs) = tokio::io::duplex(64);

@@ -31,6 +31,8 @@ pub struct WriteJob {
     pub urgent: bool,
     /// What its author saw, where that was read long ago: it is read first, and nothing is written over anything else.
     pub over: Option<TagValue>,
+    /// The decimals by which the number was unscaled, where a register of the device says them: they may be others by now.
+    pub unscaled_by: Option<i8>,
 }
 
 /// The result of a write on the wire. The plant compares it and decides the outcome.

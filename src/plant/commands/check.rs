@@ -163,6 +163,7 @@ impl CommandTracker {
             now.is_none_or(|now| !scale::same_raw(self.def.tag(*unlock_tag), now, *unlock_value))
         });
         let verify = def.access != Access::Write;
-        WriteJob { id: WriteId(self.last_write + 1), tag, raw, unlock, verify, urgent, over: None }
+        let unscaled_by = def.decimals.source().and_then(|_| image.scaling_decimals(def));
+        WriteJob { id: WriteId(self.last_write + 1), tag, raw, unlock, verify, urgent, over: None, unscaled_by }
     }
 }

@@ -3,9 +3,8 @@
 use std::time::Duration;
 
 use crate::plant::{
-    command::{NotConfirmed, Outcome, Refusal, WriteResult},
+    command::{NotConfirmed, Outcome, Refusal, WriteJob, WriteResult},
     commands::value_text,
-    exact::Exact,
     process_image::ProcessImage,
     scale,
     tag::TagDef,
@@ -13,10 +12,10 @@ use crate::plant::{
     text_value,
 };
 
-/// The outcome of a write of `raw`, which was sent for a value, accepted this long ago.
+/// The outcome of a write, accepted this long ago.
 pub(super) fn of_write(
     def: &TagDef,
-    (raw, sent_for): (&TagValue, Option<Exact>),
+    job: &WriteJob,
     result: WriteResult,
     image: &ProcessImage,
     ago: Duration,
@@ -25,26 +24,17 @@ pub(super) fn of_write(
         TagValue::Number(raw) => scale::to_value(def, raw, image.scaling_decimals(def).unwrap_or(0)).into(),
         TagValue::Text(_) => back,
     };
-    let is_held = |back: &TagValue| match (raw, back) {
+    // What scales it may be another by now: the same raw number is then another value.
+    let is_meant = job.unscaled_by.is_none_or(|by| image.scaling_decimals(def).is_none_or(|now| now == by));
+    let is_held = |back: &TagValue| match (&job.raw, back) {
+        _ if !is_meant => false,
         (TagValue::Number(raw), TagValue::Number(back)) => scale::same_raw(def, *raw, *back),
         (TagValue::Text(text), TagValue::Text(back)) => text_value::is_held(def.point.kind, text, back, ago),
         (TagValue::Number(_), TagValue::Text(_)) | (TagValue::Text(_), TagValue::Number(_)) => false,
     };
-    // The power of ten may be another than the one that it was scaled with.
-    let is_meant = |back: &TagValue| match (def.decimals.power_source().and(sent_for), back) {
-        (Some(value), TagValue::Number(back)) => {
-            let now = image.scaling_decimals(def).and_then(|decimals| scale::to_raw(def, value, decimals));
-            now.is_some_and(|now| scale::same_raw(def, now, *back))
-        }
-        (_, TagValue::Number(_) | TagValue::Text(_)) => true,
-    };
     match result {
-        WriteResult::ReadBack(back) | WriteResult::ReadBackAfterFault(_, back) if is_held(&back) && is_meant(&back) => {
-            if image.is_waiting(def.id) {
-                Outcome::NotConfirmed(NotConfirmed::NoReadBack)
-            } else {
-                Outcome::Verified
-            }
+        WriteResult::ReadBack(back) | WriteResult::ReadBackAfterFault(_, back) if is_held(&back) => {
+            if image.is_waiting(def.id) { Outcome::NotConfirmed(NotConfirmed::NoReadBack) } else { Outcome::Verified }
         }
         WriteResult::Held(back) if is_held(&back) => Outcome::Unchanged,
         WriteResult::Held(back) => Outcome::Refused(Refusal::ChangedTo(match value(back) {

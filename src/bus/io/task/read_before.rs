@@ -6,7 +6,7 @@ use crate::{
         io::link::{Link, LinkError},
         plan,
     },
-    plant::{event::WriteResult, fault::Fault, scale, tag::TagDef, tag_value::TagValue},
+    plant::{command::WriteJob, event::WriteResult, fault::Fault, scale, tag::TagDef, tag_value::TagValue},
 };
 
 /// What a tag held before its write.
@@ -23,7 +23,7 @@ impl Task<'_> {
         &mut self,
         link: &mut Link,
         tag: &TagDef,
-        raw: &TagValue,
+        job: &WriteJob,
         seen: &TagValue,
     ) -> Result<Option<ReadBefore>, LinkExit> {
         let def = self.def.clone();
@@ -37,12 +37,14 @@ impl Task<'_> {
             None => return Ok(None),
         };
         let Some(held) = held else { return ended(Fault::NotANumber) };
-        self.publish_alone(link, tag, &held).await?;
+        let scaled_by = self.publish_alone(link, tag, &held).await?;
         let is = |other: &TagValue| match (&held, other) {
             (TagValue::Number(held), TagValue::Number(other)) => scale::same_raw(tag, *held, *other),
             (held, other) => held == other,
         };
-        let may = is(seen) && !is(raw);
+        // By another power of ten the number would be another value.
+        let is_meant = scaled_by.is_none() || scaled_by == job.unscaled_by;
+        let may = is_meant && is(seen) && !is(&job.raw);
         Ok(Some(if may { ReadBefore::AsSeen } else { ReadBefore::Ended(WriteResult::Held(held)) }))
     }
 }

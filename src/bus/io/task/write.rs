@@ -54,7 +54,7 @@ impl Task<'_> {
         // One that is left alone now is not read either, and its write not sent.
         let is_left_alone = schedule.is_down(tag.device) || schedule.is_resting(tag.device, self.clock.now());
         if let Some(seen) = job.over.as_ref().filter(|_| !is_left_alone) {
-            match self.read_before(link, tag, &job.raw, seen).await? {
+            match self.read_before(link, tag, job, seen).await? {
                 Some(ReadBefore::AsSeen) => {}
                 Some(ReadBefore::Ended(result)) => return self.publish_write_result(id, result).await,
                 // A stop goes first.

@@ -104,6 +104,7 @@ async fn a_write_is_refused_when_its_host_is_unreachable() {
         verify: true,
         urgent: false,
         over: None,
+        unscaled_by: None,
     };
     line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
     let ended = |event: &Event| match event {

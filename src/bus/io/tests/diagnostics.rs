@@ -116,6 +116,7 @@ async fn stop_during_scan(serials: Vec<Serial>) -> (Duration, WriteResult, Diagn
         verify: true,
         urgent: true,
         over: None,
+        unscaled_by: None,
     });
     line.requests.send(stop).await.expect("the line runs");
     let (mut state, mut result) = (None, None);
@@ -180,6 +181,7 @@ async fn a_usual_write_waits_for_the_step_of_a_test() {
         verify: true,
         urgent: false,
         over: None,
+        unscaled_by: None,
     });
     line.requests.send(write).await.expect("the line runs");
     let mut done = None;

@@ -109,6 +109,7 @@ async fn what_is_heard_is_a_value_and_nothing_is_ever_sent() {
                 verify: true,
                 urgent: true,
                 over: None,
+                unscaled_by: None,
             }),
         ] {
             bench.line.requests.send(request).await.expect("the line runs");

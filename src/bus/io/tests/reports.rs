@@ -69,6 +69,7 @@ async fn written(
         verify: true,
         urgent: false,
         over: None,
+        unscaled_by: None,
     };
     line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
     let ended = |event: &Event| match event {
@@ -340,7 +341,16 @@ async fn a_lost_write_to_a_refusing_host_is_not_called_done() {
         });
         line.read(&def).await;
         let (id, raw) = (WriteId(7), 10.0.into());
-        let job = WriteJob { id, tag: TagId(0), raw, unlock: None, verify: true, urgent: false, over: None };
+        let job = WriteJob {
+            id,
+            tag: TagId(0),
+            raw,
+            unlock: None,
+            verify: true,
+            urgent: false,
+            over: None,
+            unscaled_by: None,
+        };
         line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
         let ended = |event: &Event| match event {
             Event::Wrote { id: WriteId(7), result, .. } => Some(result.clone()),

@@ -346,7 +346,7 @@ impl Line {
         over: Option<TagValue>,
     ) -> WriteResult {
         let (id, tag) = (WriteId(7), TagId(0));
-        let job = WriteJob { id, tag, raw: raw.into(), unlock: None, verify, urgent: false, over };
+        let job = WriteJob { id, tag, raw: raw.into(), unlock: None, verify, urgent: false, over, unscaled_by: None };
         self.requests.send(BusRequest::Write(job)).await.expect("the line runs");
         let wrote = |event: &Event| match event {
             Event::Wrote { id: WriteId(7), result, .. } => Some(result.clone()),

@@ -30,6 +30,7 @@ fn write(id: u64, tag: TagId, urgent: bool) -> BusRequest {
         verify: true,
         urgent,
         over: None,
+        unscaled_by: None,
     })
 }
 

@@ -91,6 +91,7 @@ async fn no_value_that_was_read_before_a_write_is_reported_after_it() {
             verify: true,
             urgent: false,
             over: None,
+            unscaled_by: None,
         });
         line.requests.send(request).await.expect("the line runs");
         let wrote = |event: &Event| match event {
@@ -134,6 +135,7 @@ async fn a_stop_does_not_wait_for_the_answers_of_other_units() {
         verify: false,
         urgent: true,
         over: None,
+        unscaled_by: None,
     });
     line.requests.send(request).await.expect("the line runs");
     line.until(&def, |event| matches!(event, Event::Wrote { .. }).then_some(())).await;
@@ -162,6 +164,7 @@ async fn the_gap_of_a_unit_after_a_write_does_not_hold_the_others() {
             verify: false,
             urgent: false,
             over: None,
+            unscaled_by: None,
         });
         line.requests.send(request).await.expect("the line runs");
         line.until(&def, |event| matches!(event, Event::Wrote { .. }).then_some(())).await;
@@ -207,7 +210,16 @@ async fn the_gap_of_a_device_is_kept_before_every_request() {
                 line.read(&def).await;
             }
             let (id, raw) = (WriteId(id), 10.0.into());
-            let job = WriteJob { id, tag: TagId(0), raw, unlock: None, verify: true, urgent: false, over: None };
+            let job = WriteJob {
+                id,
+                tag: TagId(0),
+                raw,
+                unlock: None,
+                verify: true,
+                urgent: false,
+                over: None,
+                unscaled_by: None,
+            };
             line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
             line.until(&def, |event| matches!(event, Event::Wrote { .. }).then_some(())).await;
         }

@@ -74,34 +74,49 @@ async fn what_was_seen_long_ago_is_read_before_it_is_written_over() {
     }
 }
 
+/// Registers hold their own address: the power of ten is 5.
 #[tokio::test(start_paused = true)]
 async fn a_power_of_ten_is_read_again_with_what_was_written() {
     for mode in Mode::ALL {
-        let mut def = plant(mode);
-        def.tags[0].decimals = Decimals::PowerFrom(TagId(1));
-        let mut line = line(def.clone());
-        line.plug(mode, |_, _| SlaveAction::Answer);
-        line.read(&def).await;
-        let job = WriteJob {
-            id: WriteId(7),
-            tag: TagId(0),
-            raw: TagValue::Number(10.0.into()),
-            unlock: None,
-            verify: true,
-            urgent: false,
-            over: None,
-        };
-        line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
-        let mut alone = Vec::new();
-        let of_event = |event: &Event| {
-            match event {
-                Event::Read { values, .. } if values.len() == 1 => alone.push(values[0].0),
-                _ => {}
-            }
-            matches!(event, Event::Wrote { .. }).then_some(())
-        };
-        line.until(&def, of_event).await;
-        assert!(alone.ends_with(&[TagId(0), TagId(1)]), "{mode:?}: {alone:?}");
+        for (seen, unscaled_by, expect) in [
+            (None, -5, (WriteResult::ReadBack(10.0.into()), 1)),
+            (Some(10.0), -5, (WriteResult::ReadBack(10.0.into()), 1)),
+            (Some(10.0), -4, (WriteResult::Held(10.0.into()), 0)),
+        ] {
+            let mut def = plant(mode);
+            (def.tags[0].decimals, def.tags[1].point.address) = (Decimals::PowerFrom(TagId(1)), 5);
+            let mut line = line(def.clone());
+            let writes = Arc::new(AtomicUsize::new(0));
+            let count = writes.clone();
+            line.plug(mode, move |_, message| {
+                count.fetch_add(usize::from(message[1] == 6), Ordering::Relaxed);
+                SlaveAction::Answer
+            });
+            line.read(&def).await;
+            let job = WriteJob {
+                id: WriteId(7),
+                tag: TagId(0),
+                raw: TagValue::Number(11.0.into()),
+                unlock: None,
+                verify: true,
+                urgent: false,
+                over: seen.map(|seen: f64| TagValue::Number(seen.into())),
+                unscaled_by: Some(unscaled_by),
+            };
+            line.requests.send(BusRequest::Write(job)).await.expect("the line runs");
+            let mut alone = Vec::new();
+            let of_event = |event: &Event| match event {
+                Event::Read { values, .. } if values.len() == 1 => {
+                    alone.push(values[0].0);
+                    None
+                }
+                Event::Wrote { result, .. } => Some(result.clone()),
+                _ => None,
+            };
+            let result = line.until(&def, of_event).await;
+            assert!(alone.ends_with(&[TagId(0), TagId(1)]), "{mode:?}: {alone:?}");
+            assert_eq!((result, writes.load(Ordering::Relaxed)), expect, "{mode:?} {seen:?} {unscaled_by}");
+        }
     }
 }
 
@@ -173,6 +188,7 @@ async fn a_late_refusal_is_not_the_answer_to_the_next_write() {
             verify: true,
             urgent: false,
             over: None,
+            unscaled_by: None,
         });
         line.requests.send(request).await.expect("the line runs");
     }
@@ -213,6 +229,7 @@ async fn a_stop_waits_for_nothing_but_the_transaction_under_way() {
             verify: true,
             urgent,
             over: None,
+            unscaled_by: None,
         })
     };
     for tag in 0..4u16 {
@@ -262,6 +279,7 @@ async fn an_unlock_is_reported_and_read_again_after_a_refusal() {
         verify: true,
         urgent: false,
         over: None,
+        unscaled_by: None,
     });
     line.requests.send(request).await.expect("the line runs");
     let is_result = |event: &Event| match event {
@@ -296,6 +314,7 @@ async fn a_write_that_loses_the_port_counts_no_other_exchange() {
         verify: true,
         urgent: false,
         over: None,
+        unscaled_by: None,
     });
     line.requests.send(request).await.expect("the line runs");
     let mut lost = false;
