@@ -251,14 +251,14 @@ async fn ask(link: &mut Link, step: &Step, is_again: bool) -> Result<StepResult,
                 if is_ambiguous(link) { Err(LinkError::Fault(Fault::BackedOff)) } else { link.exchange(message).await };
             // Absent units are what a scan asks for: they say nothing of the connection.
             link.unanswered = unanswered;
-            let answer = match sent {
-                Ok(answer) => Ok(Ok(answer)),
-                Err(LinkError::Fault(fault)) => Ok(Err(fault)),
-                Err(gone) => Err(gone),
-            };
             link.set_timeout(usual);
+            let answer = match sent {
+                Ok(answer) => Ok(answer),
+                Err(LinkError::Fault(fault)) => Err(fault),
+                Err(gone) => return Err(gone),
+            };
             let exchange = link.last.clone().ok_or(LinkError::Fault(Fault::Timeout))?;
-            Ok(StepResult::Answer(answer?, exchange))
+            Ok(StepResult::Answer(answer, exchange))
         }
     }
 }

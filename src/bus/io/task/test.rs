@@ -73,7 +73,9 @@ impl Task<'_> {
                 if in_sync { Ok(()) } else { Err(LinkExit::Reopen) }
             }
             (Err(LinkError::Gone(why)), _) => Err(LinkExit::Gone(why)),
-            (Ok(_), None) | (Err(LinkError::Fault(_)), _) => Ok(()),
+            // It would be asked again at once, for ever.
+            (Err(LinkError::Fault(fault)), _) => self.end_diagnostic(LineTrouble::Fault(fault)).await,
+            (Ok(_), None) => Ok(()),
         }
     }
 
@@ -139,7 +141,8 @@ impl Task<'_> {
                     self.end_diagnostic(why).await?;
                     break;
                 }
-                (Ok(_), None) | (Err(LinkError::Fault(_)), _) => {}
+                (Err(LinkError::Fault(fault)), _) => self.end_diagnostic(LineTrouble::Fault(fault)).await?,
+                (Ok(_), None) => {}
             }
             self.publish_diagnostic().await?;
             open = Some(link);

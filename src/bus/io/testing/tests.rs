@@ -167,3 +167,29 @@ async fn what_changes_something_is_never_sent_twice() {
     let (found, _) = at_deaf(Diagnostic::Send(write), 1, Framing::Mbap).await;
     assert_eq!(found, [Finding::Bytes { bytes: Vec::new(), response_time: None }], "a second one would be answered");
 }
+
+#[tokio::test]
+async fn a_connection_that_the_other_side_closes_is_called_closed() {
+    for framing in [Framing::Mbap, Framing::Rtu, Framing::Ascii] {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
+        let port = listener.local_addr().expect("it listens").port();
+        tokio::spawn(async move {
+            while let Ok((mut stream, _)) = listener.accept().await {
+                let _ = stream.read(&mut [0; 64]).await;
+            }
+        });
+        let transport =
+            Transport::Network { protocol: crate::plant::def::Protocol::Tcp, host: "127.0.0.1".into(), port, framing };
+        let line = LineDef::new(LineId(0), "line", transport);
+        for diagnostic in [
+            Diagnostic::Read { unit: 1, table: crate::plant::tag::Table::Holding, address: 0, count: 1 },
+            Diagnostic::Loopback { unit: 1, data: 0xA55A, count: 20 },
+            Diagnostic::Send(frame::wrap(framing, 1, &[1, 3, 0, 0, 0, 1])),
+            Diagnostic::Scan(Scan { first: 1, last: 3, serials: Vec::new(), timeout: line.timeout }),
+        ] {
+            let job = Job::new(CommandId::default(), "test".into(), diagnostic.clone(), Timestamp::UNIX_EPOCH);
+            let run = Bench::new(&line).run(job, |_| true).await;
+            assert_eq!(run.state, DiagnosticState::Failed(LineTrouble::Closed), "{framing:?} {diagnostic:?}");
+        }
+    }
+}
