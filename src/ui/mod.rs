@@ -246,8 +246,7 @@ pub fn update(model: &mut Model, msg: Msg) -> Vec<Effect> {
 fn on_msg(model: &mut Model, msg: Msg) -> Vec<Effect> {
     let event = TourEvent::of(&msg);
     let keyed = matches!(msg, Msg::Key(_) | Msg::Pointer(_)) && model.is_as_drawn();
-    if matches!(msg, Msg::Snapshot(_) | Msg::SessionStatus(_) | Msg::Answer(..) | Msg::Extension(_) | Msg::Tick { .. })
-    {
+    if msg.is_news() {
         model.note_news();
     }
     let actions = match msg {

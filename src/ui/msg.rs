@@ -67,6 +67,16 @@ pub enum Msg {
     },
 }
 
+impl Msg {
+    /// Whether it may change what is shown without the user.
+    pub const fn is_news(&self) -> bool {
+        matches!(
+            self,
+            Self::Snapshot(_) | Self::SessionStatus(_) | Self::Answer(..) | Self::Extension(_) | Self::Tick { .. }
+        )
+    }
+}
+
 /// What the tab of the registers begins with.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Start {
