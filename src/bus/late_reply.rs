@@ -354,18 +354,28 @@ impl LineReplies {
 
     /// For a unit that no probe can resynchronise: how much longer it must rest before its outstanding replies may be forgotten,
     /// `None` once it is forgotten. For each outstanding reply it is left alone twice as long as it has ever been late, ten
-    /// timeouts at the least: a delay, not a proof, and needed only for devices that do not answer a loopback at all.
+    /// timeouts at the least: a delay, not a proof, and needed only for devices that do not answer a loopback at all. While no
+    /// unit answers, the line itself may stand still, as behind a gateway with a queue, and the delay says nothing.
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
         let timeout = self.timeout;
         let settled = self.settles_in(unit, now) == Some(Duration::ZERO);
+        let stands_still = self.stands_still_for(unit);
         let unit = &mut self.units[usize::from(unit)];
-        let rest = (unit.quarantine(timeout) * to_u32(unit.outstanding.count().max(1))).min(REST_MAX);
+        let outstanding = to_u32(unit.outstanding.count().max(1));
+        let rest = if stands_still { REST_MAX } else { (unit.quarantine(timeout) * outstanding).min(REST_MAX) };
         let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
         if waited < rest && !settled {
             return Some(rest - waited);
         }
         unit.resynchronise();
         None
+    }
+
+    /// Has no unit of the line answered since this one has not, though there are others?
+    fn stands_still_for(&self, unit: u8) -> bool {
+        let is_polled = |other: &Unit| !other.outstanding.usual.is_empty();
+        let others = (0..).zip(&self.units).any(|(other, known)| other != unit && is_polled(known));
+        others && self.units.iter().filter_map(|unit| unit.proved_at).max() <= self.units[usize::from(unit)].failed_at
     }
 }
 

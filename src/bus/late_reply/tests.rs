@@ -73,6 +73,26 @@ fn a_unit_that_was_late_must_rest_longer() {
 }
 
 #[test]
+fn a_unit_rests_while_the_line_may_stand_still() {
+    let s = Duration::from_secs;
+    let blocks = plan::blocks(&fixture::plant(), LineId(0), &plan::UnreadableRanges::default());
+    let at = |unit: u8| Block { unit, ..blocks[0].clone() };
+    let mut replies = LineReplies::new(s(1), 0);
+    replies.expect(&[at(1), at(2)]);
+    let (request, probe, probed) = ([1, 3, 0, 0, 0, 2], [2, 3, 0, 0, 0, 1], [2, 3, 2, 0, 1]);
+    replies.answered(&probe, &probed, true, s(99));
+    replies.failed(&request, s(100));
+    assert_eq!(replies.forget(1, s(110)), Some(s(590)), "nothing has answered since");
+    replies.answered(&probe, &probed, false, s(111));
+    assert_eq!(replies.forget(1, s(111)), Some(s(589)), "that may have been an older answer");
+    replies.answered(&probe, &probed, true, s(112));
+    assert_eq!(replies.forget(1, s(112)), None, "ten timeouts, and the line goes on");
+    replies.failed(&request, s(200));
+    replies.expect(&[at(1)]);
+    assert_eq!(replies.forget(1, s(210)), None, "there is no other unit to tell");
+}
+
+#[test]
 fn answers_that_overtake_each_other_prove_nothing() {
     let s = Duration::from_secs;
     let mut replies = LineReplies::new(s(1), 0);

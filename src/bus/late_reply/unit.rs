@@ -37,6 +37,8 @@ pub(super) struct Unit {
     pub late_max: Duration,
     /// When it last failed to answer in time.
     pub failed_at: Option<Duration>,
+    /// When it last answered in time what cannot have been answered before.
+    pub proved_at: Option<Duration>,
     /// When it last sent what it was not asked for, unless it has been resynchronised since.
     pub unsolicited_at: Option<Duration>,
     /// Its last good answer, and whether that came again.
@@ -92,6 +94,7 @@ impl Unit {
 
     /// It has given an answer that cannot have been an older one.
     pub fn prove(&mut self, quarantine: Duration, now: Duration) {
+        self.proved_at = Some(now);
         let (signatures, arrived) =
             (std::mem::take(&mut self.outstanding.signatures), std::mem::take(&mut self.arrived));
         let (failed_at, is_unsure) = (self.failed_at, self.is_unsure);
