@@ -3,13 +3,17 @@
 
 use std::{
     fs::File,
+    io::ErrorKind,
     os::unix::fs::FileExt,
     path::{Path, PathBuf},
 };
 
 use jiff::Timestamp;
 
-use crate::profile::io::{atomic::with_suffix, regular};
+use crate::profile::io::{
+    atomic::{with_suffix, write_atomic},
+    regular,
+};
 
 /// A commit as both the database and the file beside it know it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,18 +45,22 @@ pub fn path(db: &Path) -> PathBuf {
     with_suffix(db, ".last")
 }
 
-/// Writes the last commit down, on disk when it returns. It overwrites its one line, so that a full disk hinders it least.
+/// Writes the last commit down, on disk when it returns. It overwrites its one line, so that a full disk hinders it least; the
+/// first line is there whole or not at all, because an empty file would say that commits may be missing.
 pub fn write(db: &Path, last: &LastCommit) -> std::io::Result<()> {
-    let file = regular::open_with(File::options().write(true).create(true), &path(db))?;
-    file.write_all_at(line(last).as_bytes(), 0)?;
-    file.sync_data()
+    let (path, line) = (path(db), line(last));
+    match regular::open_with(File::options().write(true), &path) {
+        Ok(file) => file.write_all_at(line.as_bytes(), 0).and_then(|()| file.sync_data()),
+        Err(error) if error.kind() == ErrorKind::NotFound => write_atomic(&path, line.as_bytes(), 0o640),
+        Err(error) => Err(error),
+    }
 }
 
 /// Reads what was written down.
 pub fn read(db: &Path) -> Noted {
     match regular::read_text(&path(db), BYTES_MAX) {
         Ok(text) => parse(&text).map_or(Noted::Unreadable, Noted::Commit),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Noted::Nothing,
+        Err(error) if error.kind() == ErrorKind::NotFound => Noted::Nothing,
         Err(_) => Noted::Unreadable,
     }
 }
@@ -127,6 +135,23 @@ mod tests {
             std::fs::write(path(&db), flipped).unwrap();
             assert_eq!(read(&db), Noted::Unreadable, "flipped at {place}");
         }
+    }
+
+    #[test]
+    fn the_first_note_is_there_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let db = folder.path().join("x.duckdb");
+        // As on a full disk, nothing can be written beside it.
+        let beside = with_suffix(&path(&db), &format!(".new-{}", std::process::id()));
+        std::fs::create_dir(&beside).unwrap();
+        assert!(write(&db, &LAST).is_err());
+        assert_eq!(read(&db), Noted::Nothing);
+        std::fs::remove_dir(&beside).unwrap();
+        write(&db, &LAST).unwrap();
+        std::fs::create_dir(&beside).unwrap();
+        let later = LastCommit { number: 301, ..LAST };
+        write(&db, &later).unwrap();
+        assert_eq!(read(&db), Noted::Commit(later), "in place");
     }
 
     #[test]
