@@ -32,6 +32,9 @@ const OUTSTANDING_MAX: usize = 16;
 /// Usual signatures that are remembered of a unit; one with more is resynchronised by a loopback.
 const USUAL_MAX: usize = 64;
 
+/// A unit is left alone so many times as long while no other unit of its line answers either.
+const STANDSTILL_FACTOR: u32 = 10;
+
 /// A unit is left alone no longer than this, however late it seems to have been.
 const REST_MAX: Duration = Duration::from_secs(600);
 
@@ -355,14 +358,15 @@ impl LineReplies {
     /// For a unit that no probe can resynchronise: how much longer it must rest before its outstanding replies may be forgotten,
     /// `None` once it is forgotten. For each outstanding reply it is left alone twice as long as it has ever been late, ten
     /// timeouts at the least: a delay, not a proof, and needed only for devices that do not answer a loopback at all. While no
-    /// unit answers, the line itself may stand still, as behind a gateway with a queue, and the delay says nothing.
+    /// unit answers, the line itself may stand still, as behind a gateway with a queue, and the delay says little.
     pub fn forget(&mut self, unit: u8, now: Duration) -> Option<Duration> {
         let timeout = self.timeout;
         let settled = self.settles_in(unit, now) == Some(Duration::ZERO);
         let stands_still = self.stands_still_for(unit);
         let unit = &mut self.units[usize::from(unit)];
         let outstanding = to_u32(unit.outstanding.count().max(1));
-        let rest = if stands_still { REST_MAX } else { (unit.quarantine(timeout) * outstanding).min(REST_MAX) };
+        let factor = if stands_still { STANDSTILL_FACTOR } else { 1 };
+        let rest = (unit.quarantine(timeout) * outstanding * factor).min(REST_MAX);
         let waited = unit.failed_at.map_or(rest, |failed_at| now.saturating_sub(failed_at));
         if waited < rest && !settled {
             return Some(rest - waited);

@@ -82,9 +82,9 @@ fn a_unit_rests_while_the_line_may_stand_still() {
     let (request, probe, probed) = ([1, 3, 0, 0, 0, 2], [2, 3, 0, 0, 0, 1], [2, 3, 2, 0, 1]);
     replies.answered(&probe, &probed, true, s(99));
     replies.failed(&request, s(100));
-    assert_eq!(replies.forget(1, s(110)), Some(s(590)), "nothing has answered since");
+    assert_eq!(replies.forget(1, s(110)), Some(s(90)), "nothing has answered since");
     replies.answered(&probe, &probed, false, s(111));
-    assert_eq!(replies.forget(1, s(111)), Some(s(589)), "that may have been an older answer");
+    assert_eq!(replies.forget(1, s(111)), Some(s(89)), "that may have been an older answer");
     replies.answered(&probe, &probed, true, s(112));
     assert_eq!(replies.forget(1, s(112)), None, "ten timeouts, and the line goes on");
     replies.failed(&request, s(200));
