@@ -28,6 +28,7 @@ pub enum Right {
 
 impl Right {
     /// Every right.
+    #[cfg(test)]
     pub const ALL: [Right; 6] =
         [Right::View, Right::Operate, Right::Export, Right::Engineer, Right::ManageUsers, Right::Station];
 

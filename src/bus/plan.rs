@@ -22,7 +22,7 @@ mod alternatives;
 #[cfg(test)]
 mod tests;
 
-pub use bisection::{AddressRange, RangeBisection, Refused, split};
+pub use bisection::{AddressRange, RangeBisection, split};
 pub use cost::{Wire, cost};
 pub use gaps::{UnreadableRanges, may_be_cut};
 

@@ -19,7 +19,7 @@ mod model;
 mod tests;
 
 pub use budget::{Budget, LIVE_SHARE, WRITE_SHARE};
-pub use device::{FAILURES_MAX, Failure, Patience};
+pub use device::{Failure, Patience};
 pub use overload::{Demand, FACTOR_MAX, Load};
 pub use poll::{PollInfo, Served};
 

@@ -83,6 +83,7 @@ pub enum Figure {
     Unknown,
 }
 
+#[cfg(test)]
 impl Figure {
     /// The time, if it is known.
     pub fn known(self) -> Option<Duration> {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-pub use super::diagnostic_request::{Diagnostic, LOOPBACKS_MAX, PATTERNS_MAX, RegisterWrite, Scan};
+pub use super::diagnostic_request::{Diagnostic, PATTERNS_MAX, RegisterWrite, Scan};
 use super::{id::CommandId, line_trouble::LineTrouble};
 
 pub use conclusion::{Conclusion, PatternTally, SweepEnd};

@@ -77,6 +77,7 @@ pub enum Compare {
 
 impl Expr {
     /// A tag is compared with a fixed value.
+    #[cfg(test)]
     pub fn test(tag: TagId, compare: Compare, value: impl Into<Exact>) -> Expr {
         Expr::Test(Box::new(Expr::Tag(tag)), compare, Box::new(Expr::Number(value.into())))
     }

@@ -20,7 +20,7 @@ use std::{fmt, sync::Arc};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
-pub use super::procedure_def::{ProcedureDef, ProcedureStep, Reference};
+pub use super::procedure_def::{ProcedureDef, ProcedureStep};
 use super::{
     command::{CommandId, CommandKind, NotConfirmed, Outcome},
     def::PlantDef,

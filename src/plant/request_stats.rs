@@ -123,12 +123,11 @@ impl RequestStats {
 const BUCKETS: usize = 64;
 const LEAST_S: f64 = 1e-4;
 
-/// Durations: the last, the greatest, the mean, and percentiles to about a fifth of their value.
+/// Durations: the last, the greatest, and percentiles to about a fifth of their value.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     last: Duration,
     max: Duration,
-    sum: Duration,
     count: u64,
     #[serde(with = "serde_big_array::BigArray")]
     buckets: [u32; BUCKETS],
@@ -136,7 +135,7 @@ pub struct Spread {
 
 impl Default for Spread {
     fn default() -> Self {
-        Spread { last: Duration::ZERO, max: Duration::ZERO, sum: Duration::ZERO, count: 0, buckets: [0; BUCKETS] }
+        Spread { last: Duration::ZERO, max: Duration::ZERO, count: 0, buckets: [0; BUCKETS] }
     }
 }
 
@@ -144,7 +143,6 @@ impl Spread {
     /// Takes one more.
     pub fn add(&mut self, span: Duration) {
         (self.last, self.max) = (span, self.max.max(span));
-        self.sum += span;
         self.count += 1;
         let bucket = &mut self.buckets[bucket_of(span)];
         *bucket = bucket.saturating_add(1);
@@ -160,7 +158,7 @@ impl Spread {
         }
         let greatest = buckets.iter().rposition(|count| 0 < *count);
         let max = greatest.map_or(Duration::ZERO, |bucket| end_of(bucket).min(self.max));
-        Spread { last: self.last.min(max), max, sum: self.sum.saturating_sub(before.sum), count, buckets }
+        Spread { last: self.last.min(max), max, count, buckets }
     }
 
     /// Adds what another has taken.
@@ -168,16 +166,10 @@ impl Spread {
         if 0 < other.count {
             (self.last, self.max) = (other.last, self.max.max(other.max));
         }
-        self.sum += other.sum;
         self.count += other.count;
         for (bucket, other) in self.buckets.iter_mut().zip(other.buckets) {
             *bucket = bucket.saturating_add(other);
         }
-    }
-
-    /// How many there were.
-    pub fn count(&self) -> u64 {
-        self.count
     }
 
     /// The last; `None` before the first.
@@ -188,11 +180,6 @@ impl Spread {
     /// The greatest.
     pub fn max(&self) -> Option<Duration> {
         (0 < self.count).then_some(self.max)
-    }
-
-    /// The mean.
-    pub fn mean(&self) -> Option<Duration> {
-        (0 < self.count).then(|| self.sum.div_f64(self.count as f64))
     }
 
     /// 99 of 100 were not longer than this (the upper end of a bucket, at most a fifth too much).
@@ -263,6 +250,5 @@ mod tests {
         assert_eq!(spread.max(), Some(Duration::from_millis(400)));
         spread.add(Duration::from_millis(400));
         assert_eq!(spread.p99(), Some(Duration::from_millis(400)));
-        assert_eq!(spread.mean().map(|mean| mean.as_micros()), Some((990 + 800) * 1000 / 101));
     }
 }

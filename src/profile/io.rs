@@ -46,6 +46,7 @@ impl Search {
         Search::default()
     }
     /// These folders, the first one first.
+    #[cfg(test)]
     pub fn folders(folders: Vec<PathBuf>) -> Search {
         Search { folders }
     }

@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, time::Duration};
 use jiff::Timestamp;
 
 pub use self::{
-    syntax::{InjectedFault, PanelSwitch, Position, TargetKind, Valve},
+    syntax::{InjectedFault, TargetKind},
     target::{AvailableFaults, FaultTarget, available_faults, why_not_applicable},
 };
 use super::{

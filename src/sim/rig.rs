@@ -163,13 +163,6 @@ impl Rig {
         self.plc.device.set_switch(switch, on);
     }
 
-    /// Takes the power away and gives it back: the controller loses what it did not save, the PLC stops.
-    pub fn power_cycle(&mut self) {
-        self.pxr.device.power_cycle();
-        self.pxr = Slave::new(self.pxr.device.clone());
-        self.plc = Slave::new(Dl06::new());
-    }
-
     /// The actual state.
     pub fn state(&self) -> RigState {
         RigState {

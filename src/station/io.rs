@@ -37,7 +37,7 @@ use crate::{
 };
 
 pub use self::begin::{start, start_guarded, start_observed};
-pub use self::reload::{PreparedReload, Reloaded};
+pub use self::reload::Reloaded;
 use self::{begin::Guarded, lines::Line, outlet::Outlet, reports::ReportTask};
 use super::{
     audit_queue::AuditMessage,

@@ -206,11 +206,6 @@ struct Connections<'a> {
 }
 
 impl Listener {
-    /// Where it listens.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Lets terminals in until the station behind this acceptor has ended. Can be called again with another station.
     pub async fn serve(&mut self, acceptor: &SessionAcceptor) {
         let mut snapshots = acceptor.snapshots.clone();

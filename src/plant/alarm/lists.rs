@@ -38,6 +38,7 @@ pub struct ActiveAlarm {
 
 impl ActiveAlarm {
     /// An alarm without value, actions and first-out group.
+    #[cfg(test)]
     pub fn new(id: AlarmId, state: AlarmState, raised_at: Timestamp) -> ActiveAlarm {
         let (returned_at, value, acknowledged, steps, times, first_out) = (None, None, None, Vec::new(), 1, None);
         let annunciated_at = raised_at;
@@ -83,6 +84,7 @@ impl AlarmManager {
     }
 
     /// What an operator should see and answer to.
+    #[cfg(test)]
     pub fn active(&self) -> &[ActiveAlarm] {
         &self.lists().active
     }

@@ -8,10 +8,10 @@ mod pty;
 mod serving;
 mod tcp;
 
-pub use drill::{Journal, Port, Trainer, journal};
+pub use drill::{Port, Trainer, journal};
 pub use line::{Wire, serve_line};
 pub use memory::in_memory;
-pub use owner::{LineHandle, Report, SimulatorHandle};
+pub use owner::{LineHandle, SimulatorHandle};
 pub use pty::{Pty, open_pty};
 pub use serving::{Endpoint, Mode, Service, Serving, SimError, serve, serve_simulator};
 pub use tcp::{TcpFraming, serve_stream, serve_tcp};

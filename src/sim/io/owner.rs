@@ -15,7 +15,6 @@ use crate::{
     sim::{
         faults::{ActiveFault, Answer, FaultTarget, Faults, InjectedFault},
         ground_truth::GroundTruth,
-        rig::{Rig, RigState},
         scenario::judge::ActualValues,
         simulator::Simulator,
     },
@@ -133,35 +132,9 @@ impl SimulatorHandle {
         .await
     }
 
-    /// Breaks or repairs the wire of the temperature sensor in the tank rig, if there is one.
-    pub async fn set_sensor_open(&self, open: bool) {
-        self.put(move |owned| owned.simulator.rig_mut().map(|rig| rig.set_sensor_open(open))).await;
-    }
-
-    /// Turns a panel switch X0–X3 of the rig's PLC, if there is one.
-    pub async fn set_switch(&self, switch: u16, on: bool) {
-        self.put(move |owned| owned.simulator.rig_mut().map(|rig| rig.set_switch(switch, on))).await;
-    }
-
-    /// Takes the power from all devices and gives it back.
-    pub async fn power_cycle(&self) {
-        self.put(|owned| owned.simulator.power_cycle()).await;
-    }
-
-    /// The state of the tank rig now; `None` if the simulator has no rig, or once its task has ended.
-    pub async fn rig_state(&self) -> Option<RigState> {
-        self.put(|owned| owned.simulator.rig().map(Rig::state)).await.flatten()
-    }
-
     /// What a modelled device holds for a tag now, in the tag's unit; `None` for a tag of the rig.
     pub async fn value(&self, tag: TagId) -> Option<f64> {
         self.put(move |owned| owned.simulator.value(tag)).await.flatten()
-    }
-
-    /// Puts a value into the registers of a modelled device, as if the device had found it so: a fault code, a reading.
-    /// `false` if it cannot hold it.
-    pub async fn set_value(&self, tag: TagId, value: f64) -> bool {
-        self.put(move |owned| owned.simulator.set_value(tag, value)).await.unwrap_or(false)
     }
 
     /// Does the work in the task and returns its result. The task lives as long as this handle, except while its runtime
@@ -223,14 +196,21 @@ async fn run(mut owned: Owned, clock: Clock, mut inbox: mpsc::Receiver<Request>)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::dl06::sequence::Step;
+    use crate::sim::{
+        dl06::sequence::Step,
+        rig::{Rig, RigState},
+    };
+
+    async fn rig_state(simulator: &SimulatorHandle) -> RigState {
+        simulator.put(|owned| owned.simulator.rig().map(Rig::state)).await.flatten().expect("the task runs")
+    }
 
     #[tokio::test(start_paused = true)]
     async fn the_rig_lives_in_plant_time() {
         let simulator =
             SimulatorHandle::spawn(Simulator::tank(Rig::demo()), Clock::starting_at(Timestamp::UNIX_EPOCH, 60.0));
         tokio::time::advance(Duration::from_secs(5)).await;
-        let state = simulator.rig_state().await.expect("the task runs");
+        let state = rig_state(&simulator).await;
         // Five real seconds are five minutes of plant: filled, and about 270 s of heating done.
         assert_eq!(state.step, Step::Heat);
         assert!((40.0..50.0).contains(&state.probe_c), "{state:?}");
@@ -243,12 +223,9 @@ mod tests {
         simulator.inject_into_unit(LineId(0), 1, InjectedFault::Silent).await;
         assert_eq!(simulator.ask(LineId(0), 1, &[3, 3, 0xEA, 0, 1]).await, None);
         assert!(simulator.ask(LineId(0), 2, &[3, 4, 0, 0, 1]).await.is_some());
-        simulator.set_sensor_open(true).await;
+        simulator.inject(FaultTarget::Unit(LineId(0), 1), InjectedFault::SensorBurnout).await;
         tokio::time::advance(Duration::from_secs(1)).await;
-        let state = simulator.rig_state().await.expect("the task runs");
+        let state = rig_state(&simulator).await;
         assert!(state.pv_c > 190.0 && state.mv_percent == 0.0, "{state:?}");
-        simulator.power_cycle().await;
-        tokio::time::advance(Duration::from_secs(1)).await;
-        assert_eq!(simulator.rig_state().await.map(|state| state.step), Some(Step::Idle));
     }
 }

@@ -51,7 +51,6 @@ pub struct Models {
 struct Signal {
     tag: TagId,
     how: Arc<Simulate>,
-    start: SignalGenerator,
     generator: SignalGenerator,
     /// The register value after the last step: a different one now was written by a master.
     written: Option<f64>,
@@ -73,9 +72,9 @@ impl Models {
             let Some(how) = &tag.simulate else { continue };
             let idle = || how.motion.as_ref().and_then(|Motion { idle, .. }| *idle);
             let start = how.start.or_else(idle).or(models.value(tag.id)).unwrap_or(0.0);
-            let start = SignalGenerator::new(&tag.name, start);
+            let generator = SignalGenerator::new(&tag.name, start);
             let written = models.value(tag.id);
-            models.signals.push(Signal { tag: tag.id, how: how.clone(), generator: start.clone(), start, written });
+            models.signals.push(Signal { tag: tag.id, how: how.clone(), generator, written });
             models.inputs.extend(how.sources());
         }
         models.inputs.sort_unstable();
@@ -115,19 +114,6 @@ impl Models {
     pub fn set_value(&mut self, tag: TagId, value: f64) -> bool {
         let place = self.place(tag);
         place.and_then(|place| self.devices.get_mut(place)).is_some_and(|slave| slave.device.set_value(tag, value))
-    }
-
-    /// Switches every model off and on.
-    pub fn power_cycle(&mut self) {
-        for slave in &mut self.devices {
-            *slave = Slave::new(slave.device.restarted());
-        }
-        let mut signals = std::mem::take(&mut self.signals);
-        for signal in &mut signals {
-            (signal.generator, signal.written) = (signal.start.clone(), self.value(signal.tag));
-        }
-        self.signals = signals;
-        self.initialise();
     }
 
     /// Computes derived values before the first request.

@@ -108,11 +108,6 @@ impl Model {
         model
     }
 
-    /// The same device switched off and on.
-    pub fn restarted(&self) -> Model {
-        Model::new(self.chart.clone())
-    }
-
     /// What the registers hold for a tag, in its unit; `None` for a tag of another device or what is not a number.
     pub fn value(&self, tag: TagId) -> Option<f64> {
         let tag = self.chart.tag(tag)?;

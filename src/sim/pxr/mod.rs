@@ -64,7 +64,6 @@ pub enum Sensor {
 #[derive(Debug, Clone)]
 pub struct Pxr {
     settings: [i16; map::COUNT],
-    saved: [i16; map::COUNT],
     saves: u32,
     /// Samples until the settings are saved; 0 while nothing is being saved.
     saving: u32,
@@ -83,18 +82,13 @@ pub struct Pxr {
 }
 
 impl Pxr {
-    /// As it leaves the workshop of the thesis: SV 70.0 °C, P 5.0 %, I 240 s, D 60 s, running, everything saved.
+    /// As it leaves the workshop of the thesis: SV 70.0 °C, P 5.0 %, I 240 s, D 60 s, running.
     pub fn new(start_c: f64) -> Pxr {
-        Pxr::with(map::initial(), start_c)
-    }
-
-    fn with(settings: [i16; map::COUNT], pv_c: f64) -> Pxr {
         Pxr {
-            settings,
-            saved: settings,
+            settings: map::initial(),
             saves: 0,
             saving: 0,
-            pv_c,
+            pv_c: start_c,
             sv_c: 70.0,
             mv_percent: 0.0,
             heater_a: 0.0,
@@ -144,16 +138,6 @@ impl Pxr {
         self.saves
     }
 
-    /// Loses power and comes back: settings are those last saved (a saving that was under way is lost), tuning is off, and
-    /// the programme too, unless its mode starts it at power-on.
-    pub fn power_cycle(&mut self) {
-        let saves = self.saves;
-        *self = Pxr { saves, ..Pxr::with(self.saved, self.pv_c) };
-        if self.mode().start_at_power_on {
-            self.settings[map::PROGRAM] = 1;
-        }
-    }
-
     fn saving(&self) -> bool {
         self.saving > 0
     }
@@ -162,15 +146,12 @@ impl Pxr {
         self.saving = SAVING_SAMPLES;
     }
 
-    /// Carries on with a saving. Commands themselves are not saved.
+    /// Carries on with a saving.
     fn save(&mut self) {
         let was_saving = self.saving();
         self.saving = self.saving.saturating_sub(1);
         if was_saving && !self.saving() {
             self.settings[map::FIX] = 0;
-            self.saved = self.settings;
-            self.saved[map::TUNE] = 0;
-            self.saved[map::PROGRAM] = 0;
             self.saves = self.saves.saturating_add(1);
         }
     }

@@ -46,15 +46,13 @@ pub struct Mode {
     pub standby_at_off: bool,
     /// Bit 2: begin again at the end.
     pub repeat: bool,
-    /// Bit 3: run from power-on.
-    pub start_at_power_on: bool,
 }
 
 impl Mode {
     /// From the word of 41081.
     pub fn from_word(word: i16) -> Mode {
         let bit = |number: u8| word >> number & 1 == 1;
-        Mode { standby_at_end: bit(0), standby_at_off: bit(1), repeat: bit(2), start_at_power_on: bit(3) }
+        Mode { standby_at_end: bit(0), standby_at_off: bit(1), repeat: bit(2) }
     }
 }
 

@@ -69,12 +69,11 @@ impl Registers for Pxr {
 pub const DECIMALS_AT: (Table, u16) = (Table::Holding, 1_000 + map::DECIMALS as u16);
 
 impl Pxr {
-    /// Begins with other decimals, which are saved: numbers change, temperatures do not.
+    /// Begins with other decimals: numbers change, temperatures do not.
     pub fn start_with_decimals(&mut self, decimals: u8) {
         let to = Display::new(self.settings[map::UNIT], i16::from(decimals));
         if self.show_as(to).is_ok() {
             self.settings[map::DECIMALS] = i16::from(to.decimals);
-            self.saved = self.settings;
         }
     }
 

@@ -239,15 +239,6 @@ proptest! {
 }
 
 #[test]
-fn after_a_power_cut_the_plant_stands_still() {
-    let rig = &mut Rig::demo();
-    rig.advance(Duration::from_secs(300));
-    rig.power_cycle();
-    rig.advance(Duration::from_secs(60));
-    assert_eq!((rig.state().step, rig.state().outputs), (Step::Idle, Outputs::default()));
-}
-
-#[test]
 fn only_the_first_device_of_a_profile_belongs_to_the_rig() {
     let check = |simulation: Option<&str>, profiles: [&str; 2], expect: [Option<RigDevice>; 2]| {
         let mut def = crate::plant::fixture::plant();

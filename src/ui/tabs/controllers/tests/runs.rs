@@ -5,7 +5,7 @@ use crate::{
     history::{Answer, Bucket, Query, Series},
     plant::{
         control_run::{ControlRun, Figure, RunCause},
-        procedure::Reference,
+        def::Reference,
     },
     report::procedures,
     ui::QueryId,
