@@ -144,8 +144,8 @@ impl Named {
         })
     }
 
-    /// The same of a type that holds a text: not every one can be written.
-    pub fn as_text(self) -> Named {
+    /// The same with the access of a type that holds a text: not every one can be written.
+    pub fn with_text_access(self) -> Named {
         let access = if text_value::is_writable(self.kind) { self.access } else { Access::Read };
         Named { access, ..self }
     }

@@ -94,7 +94,7 @@ fn entity(table: Table, key: &str, item: &Node) -> Result<Named, String> {
     let kind = kind_of(item)?;
     let order = swapped(item.word("swap").unwrap_or("none")).ok_or_else(|| unsaid("swap"))?;
     if kind.is_text() {
-        return Ok(Named { kind, order, ..named }.as_text());
+        return Ok(Named { kind, order, ..named }.with_text_access());
     }
     let named = Named { kind, order, field: field(item, kind)?, ..named };
     numbers(item, named)

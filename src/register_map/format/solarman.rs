@@ -211,7 +211,7 @@ fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Resul
     let kind = if table.is_bits() { DataType::Bool } else { kind };
     let named = Named { access: access(item, table), ..Named::new(table, first, kind, order, name) };
     if kind.is_text() || table.is_bits() || rule == 6 {
-        return Ok(named.as_text());
+        return Ok(named.with_text_access());
     }
     let named = part(item, named, rule)?;
     let named = match item.get("lookup") {

@@ -166,7 +166,7 @@ fn point_of(point: &Node, prefix: &str, at: u32, factors: &Factors) -> Result<Na
     let access = if point.word("access") == Some("RW") { Access::ReadWrite } else { Access::Read };
     let named = Named { access, ..Named::new(Table::Holding, address, kind, ByteOrder::Abcd, &name) };
     if kind.is_text() {
-        return Ok(named.as_text());
+        return Ok(named.with_text_access());
     }
     let bad = bad.and_then(|pattern| named.point().raw_number(pattern, true).number());
     let mut named = Named { bad_if: bad.into_iter().map(Into::into).collect(), ..named };
