@@ -139,21 +139,25 @@
 //! # Modules, in reading order
 //!
 //! They form a line, not a graph: a module uses only what stands above it, and so does each room of it, in the order of its
-//! `mod.rs`. A test holds this and law 4.
+//! `mod.rs`. A test holds this and law 4. They are private, so that the compiler finds what nothing uses: the program calls
+//! [`main`], and tests, benches and fuzz targets use what the last one, [`api`], lists.
 
 #![cfg_attr(test, allow(clippy::cast_lossless, clippy::cast_possible_truncation, clippy::cast_sign_loss))]
 
-pub mod text;
-pub mod plant;
-pub mod profile;
-pub mod bus;
-pub mod register_map;
-pub mod sim;
-pub mod report;
-pub mod history;
-pub mod access;
-pub mod north;
-pub mod station;
-pub mod attach;
-pub mod ui;
-pub mod cli;
+mod text;
+mod plant;
+mod profile;
+mod bus;
+mod register_map;
+mod sim;
+mod report;
+mod history;
+mod access;
+mod north;
+mod station;
+mod attach;
+mod ui;
+mod cli;
+pub mod api;
+
+pub use cli::main;

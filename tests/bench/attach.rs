@@ -21,21 +21,15 @@ use std::{
 use jiff::Timestamp;
 use many::{TAGS_EACH, plant, tags_of};
 use rustix::time::{ClockId, clock_gettime};
-use sightglass::{
+use sightglass::api::{
     access::{Completion, Durability, SessionRequest, SessionStatus},
     attach::{
-        io::{connect::connect, serve::listen},
+        connect, listen,
         protocol::{self, HANDSHAKE_BYTES_MAX, Handshake, TerminalOrigin},
     },
     plant::{
-        Plant, PlantDef,
-        def::{DeviceId, Framing},
-        event::Event,
-        line_report::{LineReport, PollReport},
-        line_state::LineState,
-        request_stats::RequestStats,
-        tag::{Poll, PollClass, Table},
-        traffic::{Exchange, Frame, FrameResult},
+        DeviceId, Event, Exchange, Frame, FrameResult, Framing, LineReport, LineState, Plant, PlantDef, Poll,
+        PollClass, PollReport, RequestStats, Table,
     },
     station::{Request, SessionAcceptor},
 };
@@ -146,7 +140,7 @@ fn station(devices: u16, lines: u16) {
 }
 
 /// Each tag has another value every second, a tenth of the devices at a time; a snapshot after each tenth.
-async fn live(mut plant: Plant, def: Arc<PlantDef>, publish: watch::Sender<Arc<sightglass::plant::Snapshot>>) {
+async fn live(mut plant: Plant, def: Arc<PlantDef>, publish: watch::Sender<Arc<sightglass::api::plant::Snapshot>>) {
     let mut tick = interval(Duration::from_millis(100));
     let mut reports: Vec<LineReport> = def.lines.iter().map(|line| LineReport::new(line.clone())).collect();
     for line in &def.lines {

@@ -18,15 +18,13 @@ use std::{
 
 use jiff::Timestamp;
 use rustix::time::{ClockId, clock_gettime};
-use sightglass::{
-    bus::io::{clock::Clock, live_reads::LiveReads, requests::Requests, task, transport::Connector},
+use sightglass::api::{
+    bus::{Clock, Connector, LiveReads, Requests, task},
     plant::{
-        PlantDef,
-        def::{DeviceDef, DeviceId, Limits, LineDef, LineId, Serial, TagId, Transport},
-        event::Event,
-        tag::{ByteOrder, DataType, Point, Poll, Table, TagDef},
+        ByteOrder, DataType, DeviceDef, DeviceId, Event, Limits, LineDef, LineId, PlantDef, Point, Poll, Serial, Table,
+        TagDef, TagId, Transport,
     },
-    station::io as station,
+    station,
 };
 use support::{PacedSlave, TcpSlave};
 use tokio::sync::{mpsc, watch};
@@ -139,8 +137,8 @@ fn plant(lines: Vec<Transport>, devices: u16, blocks: u16, period: Duration, in_
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("bench.toml"), toml).unwrap();
     fs::write(folder.path().join("number.toml"), include_str!("../peers/number.toml")).unwrap();
-    let search = sightglass::profile::Search::usual();
-    let base = sightglass::profile::load(&folder.path().join("bench.toml"), &search).unwrap();
+    let search = sightglass::api::profile::Search::usual();
+    let base = sightglass::api::profile::load(&folder.path().join("bench.toml"), &search).unwrap();
     let mut def = PlantDef::clone(&base);
     let device = def.devices[0].clone();
     def.alarms.clear();

@@ -25,14 +25,9 @@ use std::{hint::black_box, path::Path, sync::Arc, time::Duration, time::Instant}
 
 use criterion::{Criterion, criterion_group};
 use jiff::Timestamp;
-use sightglass::{
-    history::{Query, io::store::Store},
-    plant::{
-        def::{DeviceId, PlantDef, TagId},
-        record::Record,
-        sample::Sample,
-        tag::{ByteOrder, DataType, Decimals, Point, Table, TagDef},
-    },
+use sightglass::api::{
+    history::{Query, Store},
+    plant::{ByteOrder, DataType, Decimals, DeviceId, PlantDef, Point, Record, Sample, Table, TagDef, TagId},
     report::Period,
 };
 

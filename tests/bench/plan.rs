@@ -12,12 +12,11 @@ use std::{
 };
 
 use dice::Dice;
-use sightglass::{
+use sightglass::api::{
     bus::plan::{Block, UnreadableRanges, Wire, blocks, single},
     plant::{
-        PlantDef,
-        def::{DeviceDef, DeviceId, Limits, LineDef, LineId, Serial, TagId, Transport},
-        tag::{ByteOrder, DataType, Point, Table, TagDef},
+        ByteOrder, DataType, DeviceDef, DeviceId, Limits, LineDef, LineId, PlantDef, Point, Serial, Table, TagDef,
+        TagId, Transport,
     },
 };
 

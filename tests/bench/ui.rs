@@ -14,16 +14,10 @@ use crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
 use jiff::Timestamp;
 use many::{TAGS_EACH, plant, tags_of};
 use ratatui::{Terminal, backend::TestBackend};
-use sightglass::{
+use sightglass::api::{
     access::{LoggedInUser, SessionStatus},
-    plant::{
-        Plant, PlantDef,
-        def::{Pen, TrendGroup},
-        event::Event,
-        line_state::LineState,
-        role::Role,
-    },
-    ui::{Model, Msg, theme::Theme, update, view},
+    plant::{Event, LineState, Pen, Plant, PlantDef, Role, TrendGroup},
+    ui::{Model, Msg, Theme, update, view},
 };
 
 const ROUNDS: usize = 300;

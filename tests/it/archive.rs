@@ -3,14 +3,9 @@
 use std::{path::Path, process::Command, sync::Arc};
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
-    history::io::{archive::LeftOut, store::Store},
-    plant::{
-        PlantDef,
-        def::{HistoryDef, ParquetVersion},
-        record::Record,
-        sample::Sample,
-    },
+use sightglass::api::{
+    history::{LeftOut, Store},
+    plant::{HistoryDef, ParquetVersion, PlantDef, Record, Sample},
     profile::{self, Search},
 };
 

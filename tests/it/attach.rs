@@ -8,28 +8,19 @@ use std::{
     time::Duration,
 };
 
-use sightglass::{
+use sightglass::api::{
     access::{Completion, Durability, SessionRequest, SessionStatus},
     attach::{
-        callers::TERMINALS_MAX,
-        io::{
-            connect::{AttachError, connect},
-            find::SocketFolders,
-            serve::{ListenError, listen},
-        },
+        AttachError, ListenError, SocketFolders, TERMINALS_MAX, connect, listen,
         protocol::{
             self, ClientMessage, HANDSHAKE_BYTES_MAX, Handshake, LENGTH_BYTES, REQUEST_BYTES_MAX,
             SERVER_MESSAGE_BYTES_MAX, ServerMessage, TerminalOrigin,
         },
     },
-    history::{HistoryError, Query, io::QueryRequest},
-    plant::alarm::AlarmCommand,
+    history::{HistoryError, Query, QueryRequest},
     plant::{
-        PlantDef, Snapshot,
-        command::{Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome},
-        def::TagId,
-        request_refusal::RequestRefusal,
-        sample::{Cause, Sample},
+        AlarmCommand, Cause, Command, CommandId, CommandKind, CommandStatus, NotConfirmed, Outcome, PlantDef,
+        RequestRefusal, Sample, Snapshot, TagId,
     },
     profile::{self, Search},
     station::{Request, Session, SessionAcceptor},

@@ -8,10 +8,10 @@ use std::{
 };
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
-    access::io::own_user,
-    history::io::store::Store,
-    plant::{record::Record, sample::Sample},
+use sightglass::api::{
+    access::own_user,
+    history::Store,
+    plant::{Record, Sample},
     profile::{self, Search},
 };
 

@@ -3,13 +3,9 @@
 use std::{fs, process::Command, sync::Arc};
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
+use sightglass::api::{
     bus::{ascii, capture, frame},
-    plant::{
-        fault::Fault,
-        line::Framing,
-        traffic::{Frame, FrameFault, FrameResult},
-    },
+    plant::{Fault, Frame, FrameFault, FrameResult, Framing},
 };
 
 use crate::support::{folder, have};

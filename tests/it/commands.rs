@@ -2,13 +2,9 @@
 
 use std::{fs, path::Path, process::Output};
 
-use sightglass::{
-    history::io::store::Store,
-    plant::{
-        def::Priority,
-        record::{AlarmEvent, AlarmRecord, Record},
-        sample::Sample,
-    },
+use sightglass::api::{
+    history::Store,
+    plant::{AlarmEvent, AlarmRecord, Priority, Record, Sample},
     profile::{self, Search},
 };
 

@@ -8,23 +8,11 @@ use std::{
 };
 
 use jiff::Timestamp;
-use sightglass::{
-    bus::{
-        frame::with_crc,
-        io::{clock::Clock, transport::Connector},
-    },
-    plant::{
-        PlantDef, Snapshot,
-        command::CommandKind,
-        def::{LineDef, LineId, TagId},
-        tag::{Access, Poll},
-    },
+use sightglass::api::{
+    bus::{Clock, Connector, frame::with_crc},
+    plant::{Access, CommandKind, LineDef, LineId, PlantDef, Poll, Snapshot, TagId},
     profile::{self, Kind, Search},
-    sim::{
-        faults::{InjectedFault, TargetKind},
-        io::{Service, SimulatorHandle, serve_stream},
-        simulator::Simulator,
-    },
+    sim::{InjectedFault, Service, Simulator, SimulatorHandle, TargetKind, serve_stream},
     station::{self, Session},
 };
 use tokio::{
@@ -116,7 +104,7 @@ struct Plant {
     polled: Vec<TagId>,
     /// What each modelled tag truly was, lowest and highest, since it was last forgotten.
     truth: BTreeMap<TagId, (f64, f64)>,
-    _station: station::io::Station,
+    _station: station::Station,
 }
 
 impl Plant {
@@ -124,9 +112,8 @@ impl Plant {
         let clock = Clock::starting_at(Timestamp::UNIX_EPOCH, 1.0);
         let simulator = SimulatorHandle::spawn(Simulator::new(def).unwrap(), clock);
         let connectors = def.lines.iter().map(|line| plug(&simulator, line)).collect();
-        let options =
-            station::io::Options { def: def.clone(), clock, history: history.to_owned(), connectors, file: None };
-        let station = station::io::start(options).unwrap();
+        let options = station::Options { def: def.clone(), clock, history: history.to_owned(), connectors, file: None };
+        let station = station::start(options).unwrap();
         let every = def.tags.iter().filter(|tag| matches!(tag.poll, Poll::Every(_))).map(|tag| tag.id).collect();
         let session = station.session("test");
         Plant { def: def.clone(), simulator, session, polled: every, truth: BTreeMap::new(), _station: station }
@@ -256,14 +243,14 @@ async fn check(golden: Golden<'_>) {
     let recorded = golden.reply.map(|(request, reply, ..)| (bytes(request), with_crc(&bytes(reply))));
     tokio::spawn(listen(theirs, simulator, recorded, asked.clone()));
     let folder = folder();
-    let options = station::io::Options {
+    let options = station::Options {
         def: def.clone(),
         clock,
         history: folder.path().join("history.duckdb"),
         connectors: vec![Connector::Memory(streams)],
         file: None,
     };
-    let station = station::io::start(options).unwrap();
+    let station = station::start(options).unwrap();
     let session = station.session("test");
     tokio::time::sleep(Duration::from_secs(5)).await;
     for (number, (short, value)) in golden.writes.iter().enumerate() {

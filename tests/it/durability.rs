@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use jiff::Timestamp;
-use sightglass::{
-    history::{HistoryError, io::store::Store},
-    plant::{record::AlarmEvent, station_fault::StationFault},
+use sightglass::api::{
+    history::{HistoryError, Store},
+    plant::{AlarmEvent, StationFault},
     profile::{self, Search},
 };
 

@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use sightglass::access::io::own_user;
+use sightglass::api::access::own_user;
 
 use crate::{
     pty::Terminal,

@@ -273,9 +273,9 @@ fn a_number_of_64_bits_has_all_its_digits_wherever_it_is_given() {
 
     // Another history takes them back as they are.
     fs::rename(stand.path("c.duckdb"), stand.path("before.duckdb")).unwrap();
-    let def = sightglass::profile::load(&stand.plant, &sightglass::profile::Search::shipped()).unwrap();
+    let def = sightglass::api::profile::load(&stand.plant, &sightglass::api::profile::Search::shipped()).unwrap();
     let hour_ago = jiff::Timestamp::now() - jiff::SignedDuration::from_hours(1);
-    drop(sightglass::history::io::store::Store::open(&history, &def, hour_ago).unwrap());
+    drop(sightglass::api::history::Store::open(&history, &def, hour_ago).unwrap());
     let (raw, history) = (raw.to_str().unwrap(), history.to_str().unwrap());
     let (code, said) = stand.run(&["history", "import", plant, raw, "--history", history]);
     assert_eq!(code, Some(0), "{said}");

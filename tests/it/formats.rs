@@ -3,14 +3,9 @@
 use std::{path::Path, process::Command};
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
-    history::io::store::Store,
-    plant::{
-        PlantDef,
-        def::Priority,
-        record::{AlarmEvent, AlarmRecord, Record},
-        sample::{Cause, Sample},
-    },
+use sightglass::api::{
+    history::Store,
+    plant::{AlarmEvent, AlarmRecord, Cause, PlantDef, Priority, Record, Sample},
     profile::{self, Search},
 };
 

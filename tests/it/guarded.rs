@@ -6,30 +6,22 @@ use std::{
     time::Duration,
 };
 
-use sightglass::{
+use sightglass::api::{
     access::{
-        Credentials, Peer, SessionRequest, Users,
-        audit_log::{Check, Entry, Summary},
-        io::{audit_log, users, users_beside},
+        Credentials, Peer, SessionRequest, User, Users,
+        audit_log::{self, Check, Entry, Summary},
         password::{SALT_BYTES, hash},
-        user::User,
+        users, users_beside,
     },
-    attach::io::{connect::connect, serve::listen},
-    bus::io::{clock::Clock, transport::Connector},
+    attach::{connect, listen},
+    bus::{Clock, Connector},
     plant::{
-        PlantDef, Snapshot,
-        command::{Command, CommandId, CommandKind, CommandStatus},
-        def::{TagId, Transport},
-        line_state::DeviceState,
-        request_refusal::RequestRefusal,
-        role::Role,
+        Command, CommandId, CommandKind, CommandStatus, DeviceState, PlantDef, RequestRefusal, Role, Snapshot, TagId,
+        Transport,
     },
     profile::{self, Search},
-    sim::io::{Endpoint, Mode, Service, Serving, serve},
-    station::{
-        Request, Session,
-        io::{Options, Station, start_guarded},
-    },
+    sim::{Endpoint, Mode, Service, Serving, serve},
+    station::{Options, Request, Session, Station, start_guarded},
 };
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},

@@ -7,7 +7,7 @@ use std::{
     process::Stdio,
 };
 
-use sightglass::plant::visible::is_control_or_bidi;
+use sightglass::api::plant::is_control_or_bidi;
 
 use crate::support::{folder, sightglass};
 

@@ -16,31 +16,21 @@ use tokio::{
     sync::watch,
 };
 
-use sightglass::{
+use sightglass::api::{
     access::{
-        Durability, SessionRequest, Users,
-        audit_log::{Check, Entry},
-        io::{audit_log, sealing, users, users_beside},
-        sealing::VerificationKey,
-        user::UserChange,
+        Durability, SessionRequest, UserChange, Users,
+        audit_log::{self, Check, Entry},
+        sealing::{self, VerificationKey},
+        users, users_beside,
     },
-    attach::io::connect::connect,
+    attach::connect,
     history::{
-        Query,
-        io::{
-            QueryRequest,
-            alarm_file::{self, AlarmFile},
-            store::Store,
-        },
+        Query, QueryRequest, Store,
+        alarm_file::{self, AlarmFile},
     },
     plant::{
-        Snapshot,
-        alarm::{ActiveAlarm, AlarmCommand},
-        command::{Command, CommandId, CommandKind, Outcome},
-        def::AlarmId,
-        record::{AlarmEvent, AlarmRecord},
-        recorded_action::RecordedAction,
-        role::Role,
+        ActiveAlarm, AlarmCommand, AlarmEvent, AlarmId, AlarmRecord, Command, CommandId, CommandKind, Outcome,
+        RecordedAction, Role, Snapshot,
     },
     profile::{self, Search},
     report::Period,
@@ -137,7 +127,7 @@ impl Place {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let (port, slow) = (listener.local_addr().unwrap().to_string(), Arc::default());
         tokio::spawn(pass_on(listener, devices, Arc::clone(&slow)));
-        let hash: Arc<str> = sightglass::access::password::hash(PASSWORD, [3; 16]).unwrap().into();
+        let hash: Arc<str> = sightglass::api::access::password::hash(PASSWORD, [3; 16]).unwrap().into();
         let mut all = Users::default();
         for (user, change) in [
             ("sue", UserChange::First { user: "sue".into(), hash: hash.clone() }),

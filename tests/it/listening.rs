@@ -11,11 +11,11 @@ use std::{
     thread::JoinHandle,
 };
 
-use sightglass::{
-    access::io::own_user,
-    attach::io::connect::connect,
-    plant::{Snapshot, line_state::LineState},
-    station::session::Session,
+use sightglass::api::{
+    access::own_user,
+    attach::connect,
+    plant::{LineState, Snapshot},
+    station::Session,
 };
 
 use crate::{

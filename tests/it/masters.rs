@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use sightglass::bus::frame::{with_crc, with_mbap};
+use sightglass::api::bus::frame::{with_crc, with_mbap};
 
 use crate::support::{Process, have, python, sightglass};
 

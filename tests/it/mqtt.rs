@@ -11,9 +11,9 @@ use std::{
 
 use jiff::Timestamp;
 use serde_json::Value;
-use sightglass::{
-    access::io::own_user,
-    history::{Answer, Query, io::store::Store},
+use sightglass::api::{
+    access::own_user,
+    history::{Answer, Query, Store},
     profile::{self, Search},
 };
 
@@ -160,7 +160,7 @@ impl Place {
         let store = Store::open_read_only(&self.path("tank.duckdb"), &def).unwrap();
         let query = Query::Samples { epoch: None, from: Timestamp::UNIX_EPOCH, to: Timestamp::now() };
         let Answer::Samples(samples) = store.answer(&query, Timestamp::now()).unwrap() else { panic!("other answer") };
-        let row = |(tag, sample): (_, sightglass::plant::sample::Sample)| {
+        let row = |(tag, sample): (_, sightglass::api::plant::Sample)| {
             (def.tag(tag).name.clone(), sample.at, sample.value.map(|value| value.to_string()))
         };
         samples.samples.into_iter().map(row).collect()

@@ -12,10 +12,10 @@ use std::{
 };
 
 use jiff::Timestamp;
-use sightglass::{
+use sightglass::api::{
     bus::frame,
-    plant::sample::Quality,
-    sim::io::{Pty, open_pty},
+    plant::Quality,
+    sim::{Pty, open_pty},
 };
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 

@@ -9,7 +9,7 @@ use std::{
 };
 
 use serde_json::Value;
-use sightglass::access::io::own_user;
+use sightglass::api::access::own_user;
 
 use crate::support::{Cable, Process, folder, free_port, have, libmodbus_server, python, sightglass, sockets};
 

@@ -12,13 +12,10 @@ use std::{
     },
 };
 
-use sightglass::{
-    access::io::own_user,
-    attach::io::connect::connect,
-    plant::{
-        Snapshot,
-        sample::{Cause, Quality},
-    },
+use sightglass::api::{
+    access::own_user,
+    attach::connect,
+    plant::{Cause, Quality, Snapshot},
     station::Session,
 };
 use tokio::net::TcpSocket;
@@ -116,7 +113,7 @@ fn is_good(snapshot: &Snapshot, tags: &[&str]) -> bool {
     tags.iter().all(good)
 }
 
-fn sample(snapshot: &Snapshot, tag: &str) -> sightglass::plant::sample::Sample {
+fn sample(snapshot: &Snapshot, tag: &str) -> sightglass::api::plant::Sample {
     snapshot.sample(snapshot.def.tag_named(tag).unwrap())
 }
 

@@ -3,19 +3,13 @@
 use std::{path::Path, process::Output, sync::Arc, time::Instant};
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
-    access::io::{
+use sightglass::api::{
+    access::{
         audit_log::{AuditLog, beside},
         own_user,
     },
-    history::io::store::Store,
-    plant::{
-        PlantDef,
-        def::Priority,
-        record::{ActionRecord, AlarmEvent, AlarmRecord, Record},
-        recorded_action::RecordedAction,
-        sample::Sample,
-    },
+    history::Store,
+    plant::{ActionRecord, AlarmEvent, AlarmRecord, PlantDef, Priority, Record, RecordedAction, Sample},
     profile::{self, Search},
 };
 

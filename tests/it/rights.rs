@@ -6,17 +6,10 @@ mod commands;
 use std::time::Duration;
 
 use jiff::Timestamp;
-use sightglass::{
+use sightglass::api::{
     access::{Peer, SessionRequest, audit_log::Entry},
-    history::{Query, io::QueryRequest},
-    plant::{
-        PlantDef,
-        command::{CommandStatus, Outcome, Refusal},
-        def::LineId,
-        live::{AddressSpan, LiveRead},
-        request_refusal::RequestRefusal,
-        role::Role,
-    },
+    history::{Query, QueryRequest},
+    plant::{AddressSpan, CommandStatus, LineId, LiveRead, Outcome, PlantDef, Refusal, RequestRefusal, Role},
     report::Period,
     station::{self, Session},
 };

@@ -4,22 +4,15 @@
 use std::{fs, path::Path, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use sightglass::{
-    attach::io::{connect::connect, serve::listen},
-    bus::io::{clock::Clock, transport::Connector},
+use sightglass::api::{
+    attach::{connect, listen},
+    bus::{Clock, Connector},
     plant::{
-        PlantDef, Snapshot,
-        command::{CommandId, CommandKind, Outcome, Refusal},
-        def::{LineDef, LineId, Serial, Transport},
-        line_state::DeviceState,
-        request_refusal::RequestRefusal,
+        CommandId, CommandKind, DeviceState, LineDef, LineId, Outcome, PlantDef, Refusal, RequestRefusal, Serial,
+        Snapshot, Transport,
     },
     profile::{self, PlantFile, Search},
-    sim::{
-        io::{SimulatorHandle, Wire, serve_line},
-        rig::Rig,
-        simulator::Simulator,
-    },
+    sim::{Rig, Simulator, SimulatorHandle, Wire, serve_line},
     station::{self, Request, Session},
 };
 use tokio::sync::mpsc;
@@ -29,11 +22,11 @@ use crate::support::folder;
 const L1: LineId = LineId(0);
 
 /// The tank on a simulated rig whose port can be opened three times.
-fn start(def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::io::Station {
+fn start(def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::Station {
     start_at(Timestamp::UNIX_EPOCH, def, file, history)
 }
 
-fn start_at(base: Timestamp, def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::io::Station {
+fn start_at(base: Timestamp, def: &Arc<PlantDef>, file: Option<PlantFile>, history: &Path) -> station::Station {
     let clock = Clock::starting_at(base, 1.0);
     let (ports, streams) = mpsc::channel(3);
     let simulator = SimulatorHandle::spawn(Simulator::tank(Rig::demo()), clock);
@@ -43,14 +36,14 @@ fn start_at(base: Timestamp, def: &Arc<PlantDef>, file: Option<PlantFile>, histo
         let wire = Wire { serial: Serial::USUAL, ascii: false };
         tokio::spawn(serve_line(theirs, simulator.line(L1), wire, Duration::from_secs(86_400)));
     }
-    let options = station::io::Options {
+    let options = station::Options {
         def: def.clone(),
         clock,
         history: history.to_owned(),
         connectors: vec![Connector::Memory(streams)],
         file,
     };
-    station::io::start(options).unwrap()
+    station::start(options).unwrap()
 }
 
 /// Waits, in virtual time, until the plant is so.

@@ -4,24 +4,13 @@
 use std::{path::Path, process::Command, sync::Arc, time::Duration};
 
 use jiff::{Timestamp, civil::date, tz::TimeZone};
-use sightglass::{
-    bus::io::{clock::Clock, transport::Connector},
-    history::{
-        Answer, Query,
-        io::{QueryRequest, store::Store},
-    },
-    plant::{
-        PlantDef,
-        command::{CommandKind, Outcome},
-        def::LineId,
-    },
+use sightglass::api::{
+    bus::{Clock, Connector},
+    history::{Answer, Query, QueryRequest, Store},
+    plant::{CommandKind, LineId, Outcome, PlantDef},
     profile::{self, Search},
     report::{self, FORMATS, Style, period_parser},
-    sim::{
-        io::{SimulatorHandle, Wire, serve_line},
-        rig::Rig,
-        simulator::Simulator,
-    },
+    sim::{Rig, Simulator, SimulatorHandle, Wire, serve_line},
     station::{self, Session},
 };
 use tokio::sync::{mpsc, oneshot};
@@ -117,7 +106,7 @@ fn check(file: &Path) {
 }
 
 /// The station on a simulated rig, over a line in memory at the line's own pace.
-fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> station::io::Station {
+fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> station::Station {
     let (ours, theirs) = tokio::io::duplex(1024);
     let (ports, streams) = mpsc::channel(1);
     ports.try_send(ours).unwrap();
@@ -126,14 +115,8 @@ fn start_on_simulation(def: &Arc<PlantDef>, clock: Clock, history: &Path) -> sta
         (SimulatorHandle::spawn(Simulator::tank(Rig::demo()), clock), Wire { serial, ascii: false });
     tokio::spawn(serve_line(theirs, simulator.line(LineId(0)), wire, Duration::from_secs(86_400)));
     let connectors = vec![Connector::Memory(streams)];
-    station::io::start(station::io::Options {
-        def: def.clone(),
-        clock,
-        history: history.to_owned(),
-        connectors,
-        file: None,
-    })
-    .unwrap()
+    station::start(station::Options { def: def.clone(), clock, history: history.to_owned(), connectors, file: None })
+        .unwrap()
 }
 
 /// Lets plant time pass. Virtual time must not run away from the thread that stores: once a plant minute this waits, in

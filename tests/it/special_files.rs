@@ -7,7 +7,7 @@ use std::{
     process::Command,
 };
 
-use sightglass::{access::SessionRequest, attach::io::connect::connect};
+use sightglass::api::{access::SessionRequest, attach::connect};
 
 use crate::support::{Process, folder, sightglass, simulated_tank, sockets};
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use sightglass::plant::def::ParquetVersion;
+use sightglass::api::plant::ParquetVersion;
 
 use crate::{
     archive::archived,
@@ -86,8 +86,8 @@ fn raw_samples_are_exported_whole() {
     assert!(code == Some(2) && said.contains("--bom and --separator are of CSV"), "{said}");
     // A history that lacks them takes them back.
     let other = folder.path().join("other.duckdb");
-    let def = sightglass::profile::load(Path::new("tank"), &sightglass::profile::Search::shipped()).unwrap();
-    drop(sightglass::history::io::store::Store::open(&other, &def, "2026-03-01T00:00:00Z".parse().unwrap()).unwrap());
+    let def = sightglass::api::profile::load(Path::new("tank"), &sightglass::api::profile::Search::shipped()).unwrap();
+    drop(sightglass::api::history::Store::open(&other, &def, "2026-03-01T00:00:00Z".parse().unwrap()).unwrap());
     let (code, text) = run_at(&other, &["history", "import", "tank", out.to_str().unwrap()]);
     assert_eq!(code, Some(0), "{text}");
     assert!(text.contains("imported 7204 rows"), "{text}");

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use sightglass::access::audit_log::{Check, Entry, START, head_text, line};
+use sightglass::api::access::audit_log::{Check, Entry, START, head_text, line};
 
 use crate::support::{Process, folder, sightglass};
 

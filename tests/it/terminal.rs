@@ -57,7 +57,7 @@ fn a_new_plant_is_made_of_what_answers() {
     terminal.wait_for("saved");
     assert_eq!(terminal.end(), 0);
     let text = std::fs::read_to_string(&file).unwrap();
-    let def = sightglass::profile::load(&file, &sightglass::profile::Search::shipped()).unwrap();
+    let def = sightglass::api::profile::load(&file, &sightglass::api::profile::Search::shipped()).unwrap();
     let names: Vec<&str> = def.devices.iter().map(|device| device.name.as_str()).collect();
     assert_eq!((def.title.as_str(), names, def.shifts.len()), ("Works", vec!["TIC-1", "PLC-1"], 2));
     for part in ["# The word is 0 while all is well", "{ name = \"CT\", poll = \"never\" }", "replies took"] {

@@ -41,7 +41,7 @@ pub fn run(args: &[&str]) -> (Option<i32>, String) {
 }
 
 fn with_crc(message: &[u8]) -> Vec<u8> {
-    sightglass::bus::frame::wrap(sightglass::plant::line::Framing::Rtu, 0, message)
+    sightglass::api::bus::frame::wrap(sightglass::api::plant::Framing::Rtu, 0, message)
 }
 
 #[test]

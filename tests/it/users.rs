@@ -4,15 +4,10 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use sightglass::{
+use sightglass::api::{
     access::{Credentials, SessionRequest},
     plant::{
-        PlantDef, Snapshot,
-        command::{Command, CommandKind, Outcome, Refusal},
-        def::Reauthentication,
-        request_refusal::RequestRefusal,
-        role::Role,
-        sample::Cause,
+        Cause, Command, CommandKind, Outcome, PlantDef, Reauthentication, Refusal, RequestRefusal, Role, Snapshot,
     },
     station::Session,
 };

@@ -13,27 +13,18 @@ use std::{
 };
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
-    access::io::audit_log,
-    bus::io::{clock::Clock, worker},
-    history::{
-        Answer, Query,
-        io::{QueryRequest, store::Store},
-    },
+use sightglass::api::{
+    access::audit_log,
+    bus::{Clock, worker},
+    history::{Answer, Query, QueryRequest, Store},
     plant::{
-        PlantDef, Snapshot,
-        alarm::AlarmState,
-        command::{CommandId, CommandKind},
-        def::{AlarmId, ProcedureId, TagId},
-        procedure::{ProcedureRun, ProcedureState},
-        sample::{Quality, Sample},
-        station_fault::StationFault,
-        tag::Poll,
+        AlarmId, AlarmState, CommandId, CommandKind, PlantDef, Poll, ProcedureId, ProcedureRun, ProcedureState,
+        Quality, Sample, Snapshot, StationFault, TagId,
     },
     profile::{self, Search},
     report::{self, FORMATS, Period, Style},
-    sim::{io::SimulatorHandle, simulator::Simulator},
-    station::{self, Session, io::Station},
+    sim::{Simulator, SimulatorHandle},
+    station::{self, Session, Station},
 };
 use tokio::sync::oneshot;
 
@@ -115,8 +106,8 @@ impl Life {
         let simulator = SimulatorHandle::spawn_for(&def, Simulator::new(&def).unwrap(), clock);
         let trouble = if self.is_last { 0.0 } else { [0.0, 0.02, 0.2][self.dice.place(3)] };
         let connectors = connectors(&def, &simulator, trouble, &mut self.dice);
-        let options = station::io::Options { def: def.clone(), clock, history: self.history(), connectors, file: None };
-        let station = match station::io::start(options) {
+        let options = station::Options { def: def.clone(), clock, history: self.history(), connectors, file: None };
+        let station = match station::start(options) {
             Ok(station) => station,
             Err(why) => return wrong(format!("starts: {why}")),
         };

@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use sightglass::{
-    bus::io::transport::Connector,
+use sightglass::api::{
+    bus::Connector,
     plant::PlantDef,
-    sim::io::{Service, SimulatorHandle, TcpFraming, serve_line, serve_stream},
+    sim::{Service, SimulatorHandle, TcpFraming, serve_line, serve_stream},
 };
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex},
@@ -24,7 +24,7 @@ const FOR_EVER: Duration = Duration::from_secs(86_400);
 
 /// What a station opens the lines of a plant with; `trouble` is the share of answers that something happens to.
 pub fn connectors(def: &PlantDef, simulator: &SimulatorHandle, trouble: f64, dice: &mut Dice) -> Vec<Connector> {
-    let connector = |line: &sightglass::plant::def::LineDef| {
+    let connector = |line: &sightglass::api::plant::LineDef| {
         let (streams, opened) = mpsc::channel(OPENINGS);
         for _ in 0..OPENINGS {
             let ((master, ours), (theirs, slave)) = (duplex(BYTES), duplex(BYTES));

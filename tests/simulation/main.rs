@@ -25,7 +25,7 @@ use std::{
     process::{Command, ExitCode},
 };
 
-use sightglass::history::io::probe;
+use sightglass::api::history::probe;
 
 /// What of a campaign runs with the other tests.
 const SEEDS: &str = "0-99";

@@ -3,17 +3,11 @@
 use std::{collections::BTreeMap, path::PathBuf, sync::Arc, time::Duration};
 
 use jiff::SignedDuration;
-use sightglass::{
+use sightglass::api::{
     access::{Completion, Durability, Secret, SessionRequest},
     history::Query,
     plant::{
-        PlantDef,
-        alarm::AlarmCommand,
-        command::{Command, CommandId, CommandKind},
-        def::{ProcedureId, TagId},
-        diagnostics::Diagnostic,
-        request_refusal::RequestRefusal,
-        role::Role,
+        AlarmCommand, Command, CommandId, CommandKind, Diagnostic, PlantDef, ProcedureId, RequestRefusal, Role, TagId,
     },
     station::{Request, Session},
 };

@@ -9,11 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use sightglass::plant::{
-    PlantDef,
-    def::{Serial, Transport},
-    tag::{Poll, PollClass},
-};
+use sightglass::api::plant::{PlantDef, Poll, PollClass, Serial, Transport};
 
 use super::{WORDS, plant, support::PacedSlave, with_station};
 

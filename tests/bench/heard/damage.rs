@@ -1,6 +1,6 @@
 //! What may happen to the bytes between the line and the listener.
 
-use sightglass::plant::line::Framing;
+use sightglass::api::plant::Framing;
 
 use super::{
     dice::Dice,

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use sightglass::{
+use sightglass::api::{
     bus::frame::{self, wrap},
-    plant::{fault::Fault, line::Framing},
+    plant::{Fault, Framing},
 };
 
 use super::dice::Dice;

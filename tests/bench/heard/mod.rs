@@ -10,14 +10,11 @@ mod line;
 use std::sync::Arc;
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
+use sightglass::api::{
     bus::listen::{Heard, Listener, Losses, events},
     plant::{
-        Plant, PlantDef,
-        def::{DeviceDef, DeviceId, Framing, LineDef, LineId, Protocol, Serial, TagId, Transport},
-        event::Event,
-        line::Rs485,
-        tag::{ByteOrder, DataType, Point, Table, TagDef},
+        ByteOrder, DataType, DeviceDef, DeviceId, Event, Framing, LineDef, LineId, Plant, PlantDef, Point, Protocol,
+        Rs485, Serial, Table, TagDef, TagId, Transport,
     },
 };
 

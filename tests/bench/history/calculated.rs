@@ -14,13 +14,13 @@ use std::{
 };
 
 use rustix::time::{ClockId, clock_gettime};
-use sightglass::{
-    bus::io::{clock::Clock, transport::Connector},
-    history::io::thread::{self as history, offer},
-    plant::{def::Limits, fault::ExceptionCode, record::Record, tag::Table},
+use sightglass::api::{
+    bus::{Clock, Connector},
+    history::thread::{self as history, offer},
+    plant::{ExceptionCode, Limits, Record, Table},
     profile::{self, Search},
     sim::pdu::{self, Registers},
-    station::io as station,
+    station,
 };
 
 use super::{

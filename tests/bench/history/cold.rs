@@ -8,9 +8,9 @@ use std::{
 };
 
 use rustix::fs::{Advice, fadvise};
-use sightglass::{
-    history::{Query, io::store::Store},
-    plant::def::TagId,
+use sightglass::api::{
+    history::{Query, Store},
+    plant::TagId,
 };
 
 use super::{

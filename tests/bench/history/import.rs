@@ -12,9 +12,9 @@ use std::{
 };
 
 use jiff::Timestamp;
-use sightglass::{
-    bus::io::clock::Clock,
-    history::io::{HistoryJob, JobRequest, thread as history},
+use sightglass::api::{
+    bus::Clock,
+    history::{HistoryJob, JobRequest, thread as history},
 };
 use tokio::sync::oneshot;
 

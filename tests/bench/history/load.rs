@@ -15,13 +15,10 @@ use std::{
 };
 
 use jiff::Timestamp;
-use sightglass::{
-    bus::io::clock::Clock,
-    history::{
-        Answer, Query,
-        io::{HistoryJob, JobRequest, QueryRequest, store::Store, thread as history},
-    },
-    plant::{PlantDef, def::TagId, record::Record, sample::Sample},
+use sightglass::api::{
+    bus::Clock,
+    history::{Answer, HistoryJob, JobRequest, Query, QueryRequest, Store, thread as history},
+    plant::{PlantDef, Record, Sample, TagId},
     report::Period,
 };
 use tokio::sync::oneshot;

@@ -15,24 +15,17 @@ use std::{
 use super::load::memory_kb;
 use duckdb::Connection;
 use jiff::Timestamp;
-use sightglass::{
-    bus::io::{clock::Clock, worker},
+use sightglass::api::{
+    bus::{Clock, worker},
     history::{
-        ArchiveFile,
-        io::{
-            archive::sync_and_hash,
-            store::Store,
-            thread::{offer, start_with},
-        },
+        ArchiveFile, Store, sync_and_hash,
+        thread::{offer, start_with},
         tiers::{HOUR, Tier, in_milliseconds},
     },
-    plant::{PlantDef, def::HistoryDef, record::Record},
+    plant::{HistoryDef, PlantDef, Record},
     profile::{self, Search},
-    sim::{
-        io::{SimulatorHandle, in_memory},
-        simulator::Simulator,
-    },
-    station::io as station,
+    sim::{Simulator, SimulatorHandle, in_memory},
+    station,
 };
 
 /// 20 January 2026, midnight in UTC: some days before the end of a month.

@@ -7,13 +7,9 @@ use std::{path::Path, process::Command, time::Instant};
 
 use duckdb::Connection;
 use jiff::{Timestamp, tz::TimeZone};
-use sightglass::{
-    history::{
-        Query,
-        io::{archive::LeftOut, sql, store::Store},
-        tiers::Tier,
-    },
-    plant::def::{ParquetVersion, TagId},
+use sightglass::api::{
+    history::{LeftOut, Query, Store, sql, tiers::Tier},
+    plant::{ParquetVersion, TagId},
     report::Period,
 };
 

@@ -2,12 +2,8 @@
 
 use std::{path::Path, sync::Arc, time::Duration};
 
-use sightglass::{
-    plant::{
-        PlantDef,
-        def::{DeviceDef, DeviceId, LineDef, LineId, TagId},
-        tag::{ByteOrder, DataType, Point, Poll, Table, TagDef},
-    },
+use sightglass::api::{
+    plant::{ByteOrder, DataType, DeviceDef, DeviceId, LineDef, LineId, PlantDef, Point, Poll, Table, TagDef, TagId},
     profile::{self, Search},
 };
 

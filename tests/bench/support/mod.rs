@@ -7,8 +7,8 @@ mod tcp;
 pub use paced::PacedSlave;
 pub use tcp::TcpSlave;
 
-use sightglass::{
-    plant::{def::Limits, fault::ExceptionCode, tag::Table},
+use sightglass::api::{
+    plant::{ExceptionCode, Limits, Table},
     sim::pdu::{self, Registers},
 };
 

@@ -23,7 +23,7 @@ use rustix::{
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
     termios::{OptionalActions, tcgetattr, tcsetattr},
 };
-use sightglass::{bus::frame::with_crc, plant::def::Serial, sim::wire::Receiver};
+use sightglass::api::{bus::frame::with_crc, plant::Serial, sim::Receiver};
 
 /// Characters that the UART hands over at once.
 const FIFO: usize = 8;

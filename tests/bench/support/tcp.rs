@@ -6,7 +6,7 @@ use std::{
     thread,
 };
 
-use sightglass::bus::frame::{Mbap, mbap};
+use sightglass::api::bus::frame::{Mbap, mbap};
 
 /// Serves until the process ends, each client on a thread of its own.
 pub struct TcpSlave;

@@ -1,8 +1,8 @@
 //! The alarm-state file: a damaged one is not taken for a whole one, and whatever is written is read again.
 
-use sightglass::{
+use sightglass::api::{
     history::alarm_state::{HEADER, LatestEvents, is_cut, line, parse},
-    plant::record::AlarmRecord,
+    plant::AlarmRecord,
 };
 
 /// A file; of its lines those that are events, with or without their checksum, are written once more.

@@ -1,11 +1,11 @@
 //! Modbus ASCII: frames among any characters, and their digits.
 
-use sightglass::{
+use sightglass::api::{
     bus::{
         ascii,
         framing::{self, FrameMatch},
     },
-    plant::line::Framing,
+    plant::Framing,
 };
 
 /// A byte for the length of the request message, the message, then what came.

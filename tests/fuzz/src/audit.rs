@@ -1,14 +1,11 @@
 //! The audit log: a damaged one is not taken for a whole one, and whatever is written is read again.
 
-use sightglass::{
+use sightglass::api::{
     access::{
         audit_log::{Check, Entry, START, fit, head, head_text, line},
         sealing::{Key, SealCheck, VerificationKey},
     },
-    plant::{
-        record::{ActionRecord, ChainHash},
-        visible::is_control_or_bidi,
-    },
+    plant::{ActionRecord, ChainHash, is_control_or_bidi},
 };
 
 /// A log; of its lines those that are entries are written once more.

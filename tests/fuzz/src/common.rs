@@ -7,14 +7,8 @@ use std::{
 };
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
-    plant::{
-        Plant, PlantDef,
-        event::Event,
-        exact::Exact,
-        line::{Framing, LineDef, Serial, Transport},
-        tag::TagDef,
-    },
+use sightglass::api::{
+    plant::{Event, Exact, Framing, LineDef, Plant, PlantDef, Serial, TagDef, Transport},
     profile::{self, Errors, OwnProfiles, Search},
 };
 
@@ -44,7 +38,7 @@ pub fn line(framing: Framing) -> LineDef {
             Transport::Serial { port: "p".into(), serial: Serial::USUAL, framing, rs485: Default::default() }
         }
     };
-    LineDef { timeout: Duration::from_millis(500), ..LineDef::new(sightglass::plant::def::LineId(0), "L", transport) }
+    LineDef { timeout: Duration::from_millis(500), ..LineDef::new(sightglass::api::plant::LineId(0), "L", transport) }
 }
 
 /// The plant of a text; what is wrong with it can be shown.

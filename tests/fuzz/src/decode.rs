@@ -3,17 +3,15 @@
 use std::sync::{Arc, LazyLock};
 
 use jiff::Timestamp;
-use sightglass::{
+use sightglass::api::{
     bus::{
-        dissect::{
-            Direction, Dissection, dissect,
-            paste::{self, Asked},
-        },
+        check_request,
+        dissect::{Direction, Dissection, dissect},
         frame, framing, meaning,
-        request_lint::check_request,
+        paste::{self, Asked},
         source_frame,
     },
-    plant::{Plant, Snapshot, def::LineId, line::Framing, traffic::Exchange},
+    plant::{Exchange, Framing, LineId, Plant, Snapshot},
 };
 
 use super::common::{TANK, framing as framing_of};

@@ -1,7 +1,7 @@
 //! Samples of other programs: what is read is in order and of the past, and is the same when it is written and read again.
 
 use jiff::Timestamp;
-use sightglass::history::{import::Rows, io::import::parse};
+use sightglass::api::history::import::{Rows, parse};
 
 use super::common::{TANK, now};
 

@@ -1,9 +1,9 @@
 //! A line that is listened to: the same is heard however the bytes come in pieces, and every byte is heard once.
 
 use jiff::{SignedDuration, Timestamp};
-use sightglass::{
+use sightglass::api::{
     bus::listen::{Follower, Heard, Listener, Losses, events},
-    plant::def::LineId,
+    plant::LineId,
 };
 
 use super::common::{TANK, framing, line, now};

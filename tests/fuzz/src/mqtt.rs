@@ -1,12 +1,8 @@
 //! Requests from outside: a message is a request or refused in words, and its answer goes where no value stands.
 
-use sightglass::{
+use sightglass::api::{
     north::request::{self, Received},
-    plant::{
-        Plant,
-        command::{Command, CommandId, CommandKind, CommandStatus},
-        visible::is_control_or_bidi,
-    },
+    plant::{Command, CommandId, CommandKind, CommandStatus, Plant, is_control_or_bidi},
 };
 
 use super::common::{TANK, now};
@@ -36,7 +32,7 @@ pub fn run(data: &[u8]) {
             let Ok(tag) = request::check(&TANK, mqtt, &received.topic, &request, now()) else { return };
             let mut plant = Plant::new(TANK.clone(), now(), 1.0);
             let kind = CommandKind::Write { tag, value: request.value };
-            sightglass::access::right::needs(&TANK, &kind);
+            sightglass::api::access::right::needs(&TANK, &kind);
             let id = CommandId { terminal: 1, number: 1 };
             let command = Command { expected_value: request.expected, ..plant.snapshot().command(id, kind) };
             plant.on_command(CommandStatus::new(command, "mes", now()), now());

@@ -1,7 +1,7 @@
 //! The file of a parameter set: what is read is the same when it is written and read again.
 
-use sightglass::{
-    plant::{def::DeviceId, exact::Exact, parameter_set::compare},
+use sightglass::api::{
+    plant::{DeviceId, Exact, parameter_set::compare},
     profile::{read_set, text_of_set},
 };
 

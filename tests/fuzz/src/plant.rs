@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use sightglass::{
+use sightglass::api::{
     attach::protocol::{Handshake, HandshakeReply, LENGTH_BYTES, encode, handshake_reply},
     plant::PlantDef,
-    ui::{preview, theme::Theme},
+    ui::{Theme, preview},
 };
 
 use super::common::{checked, run_plant};

@@ -1,14 +1,9 @@
 //! Register maps of other programs and makers: a file is refused with its reason, or becomes a profile that can run, and the
 //! profile's own list, read again, is the same registers.
 
-use sightglass::{
-    plant::{PlantDef, address::AddressBase, tag::TagDef},
-    register_map::{
-        export::{Target, export},
-        list::{List, ListContext},
-        profile::written,
-        read,
-    },
+use sightglass::api::{
+    plant::{AddressBase, PlantDef, TagDef},
+    register_map::{List, ListContext, Target, export, read, written},
 };
 
 use super::common::run_plant;

@@ -3,26 +3,22 @@
 use std::sync::{Arc, LazyLock};
 
 use jiff::SignedDuration;
-use sightglass::{
+use sightglass::api::{
     access::right,
     attach::{
         check,
         protocol::{
             ClientMessage, LENGTH_BYTES, ServerMessage, client_handshake, decode, encode, handshake_reply, length,
         },
-        redaction::redact,
+        redact,
     },
-    plant::{
-        Plant,
-        command::{Command, CommandStatus},
-        visible::is_control_or_bidi,
-    },
+    plant::{Command, CommandStatus, Plant, is_control_or_bidi},
 };
 
 use super::common::{TANK, now};
 
 static MAX: usize = 1 << 20;
-static FRESH: LazyLock<Arc<sightglass::plant::PlantDef>> = LazyLock::new(|| TANK.clone());
+static FRESH: LazyLock<Arc<sightglass::api::plant::PlantDef>> = LazyLock::new(|| TANK.clone());
 
 /// A byte for the kind of message, then the message.
 pub fn run(data: &[u8]) {

@@ -1,8 +1,8 @@
 //! What people type and paste: bytes in hex, the filter of frames, periods and instants.
 
-use sightglass::{
-    bus::{filter::Filter, frame::hex, hex_input},
-    plant::line::Framing,
+use sightglass::api::{
+    bus::{Filter, frame::hex, hex_input},
+    plant::Framing,
     report::period_parser,
 };
 

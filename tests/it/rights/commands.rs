@@ -3,17 +3,9 @@
 use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use sightglass::plant::{
-    PlantDef,
-    alarm::AlarmCommand,
-    command::CommandKind,
-    def::{AlarmId, DeviceId, LineId, ProcedureId, Serial},
-    diagnostics::{Diagnostic, Scan},
-    parameter_set::ParameterSet,
-    port_signals::{OutputSignal, SignalTest},
-    restore::RestoreRequest,
-    sweep::Sweep,
-    tag::Table,
+use sightglass::api::plant::{
+    AlarmCommand, AlarmId, CommandKind, DeviceId, Diagnostic, LineId, OutputSignal, PlantDef, ProcedureId,
+    RestoreRequest, Scan, Serial, SignalTest, Sweep, Table, parameter_set::ParameterSet,
 };
 
 use super::{Row, look, row};
