@@ -1,5 +1,7 @@
 //! The command line: one file a subcommand, one place for exit codes.
 
+#![allow(rustdoc::broken_intra_doc_links, reason = "a comment of an argument is its help, whose brackets are no links")]
+
 mod output;
 mod client;
 mod procedure;

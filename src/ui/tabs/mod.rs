@@ -66,7 +66,7 @@ impl Outgoing {
     }
 }
 
-/// What every tab answers. A new tab is a file with this trait and [`KeyTable`], and a row of [`tabs!`] and of [`Tab`].
+/// What every tab answers. A new tab is a file with this trait and [`KeyTable`], and a row of `tabs!` and of [`Tab`].
 pub trait TabView: Keyed {
     /// The tab as it is at the start.
     fn new(snapshot: &Snapshot) -> Self

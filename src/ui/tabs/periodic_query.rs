@@ -25,7 +25,7 @@ const REST: i32 = 4;
 /// where it cannot.
 const LOST: i32 = 4;
 
-/// One kind of query of a tab. All times are steady, see [`ViewContext::steady`](crate::ui::ViewContext::steady).
+/// One kind of query of a tab. All times are those of [`monotonic_now`](crate::ui::ViewContext::monotonic_now).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct PeriodicQuery {
     on_way: Option<(u32, Timestamp)>,
