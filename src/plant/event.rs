@@ -11,6 +11,7 @@ use super::{
     exact::Exact,
     fault::Fault,
     id::{DeviceId, LineId, TagId, WriteId},
+    identity::IdentityObject,
     line_report::LineReport,
     line_state::LineState,
     north_status::NorthStatus,
@@ -49,6 +50,15 @@ pub enum Event {
         fault: Fault,
         /// The exchange, if anything was sent.
         exchange: Option<Arc<Exchange>>,
+    },
+    /// A device was asked what it is, because a profile has a condition on that.
+    Identified {
+        /// When it had said all that was asked.
+        at: Timestamp,
+        /// The device.
+        device: DeviceId,
+        /// What it says; nothing where it does not tell.
+        objects: Vec<(IdentityObject, String)>,
     },
     /// Another master has written these tags, or tried to: they are uncertain until they are read.
     ForeignWrite {

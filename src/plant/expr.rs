@@ -5,7 +5,8 @@ use std::ops::Add;
 
 use serde::{Deserialize, Serialize};
 
-use super::{exact::Exact, id::TagId, keyword::keyword_enum};
+pub use super::compare::Compare;
+use super::{exact::Exact, id::TagId, identity::IdentityTest, keyword::keyword_enum};
 
 /// An expression over tags. As a number, true is 1 and false 0; as a condition, every number but 0 is true.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,6 +21,8 @@ pub enum Expr {
     Call(Function, Vec<Expr>),
     /// Two numbers are compared.
     Test(Box<Expr>, Compare, Box<Expr>),
+    /// What a device says of itself is compared with a text.
+    Identity(IdentityTest),
     /// The other way round.
     Not(Box<Expr>),
     /// All of these.
@@ -58,23 +61,6 @@ keyword_enum! {
     }
 }
 
-/// How two numbers are compared.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Compare {
-    /// `=`
-    Equal,
-    /// `!=`
-    Differs,
-    /// `<`
-    Below,
-    /// `<=`
-    AtMost,
-    /// `>`
-    Above,
-    /// `>=`
-    AtLeast,
-}
-
 impl Expr {
     /// A tag is compared with a fixed value.
     #[cfg(test)]
@@ -85,24 +71,45 @@ impl Expr {
     /// Whether it is true; `None` if the known tags do not decide it. `value` gives the good value of a
     /// tag.
     pub fn holds(&self, value: &impl Fn(TagId) -> Option<Exact>) -> Option<bool> {
+        self.holds_for(value, &|_| None)
+    }
+
+    /// The same where it is known what devices say of themselves; `identity` evaluates a test of that.
+    pub fn holds_for(
+        &self,
+        value: &impl Fn(TagId) -> Option<Exact>,
+        identity: &impl Fn(&IdentityTest) -> Option<bool>,
+    ) -> Option<bool> {
+        let number = |expr: &Expr| expr.number_for(value, identity);
+        let decided = |parts: &[Expr], decisive| decided(parts, &|part| part.holds_for(value, identity), decisive);
         match self {
-            Expr::Test(left, compare, right) => Some(compare.holds(left.number(value)?, right.number(value)?)),
-            Expr::Not(inner) => inner.holds(value).map(|holds| !holds),
-            Expr::All(parts) => decided(parts, value, false),
-            Expr::Any(parts) => decided(parts, value, true),
+            Expr::Test(left, compare, right) => Some(compare.fits(number(left)?.partial_cmp(&number(right)?))),
+            Expr::Identity(test) => identity(test),
+            Expr::Not(inner) => inner.holds_for(value, identity).map(|holds| !holds),
+            Expr::All(parts) => decided(parts, false),
+            Expr::Any(parts) => decided(parts, true),
             Expr::Number(_) | Expr::Tag(_) | Expr::Arithmetic(..) | Expr::Call(..) => {
-                self.number(value).map(|number| number != 0.0)
+                number(self).map(|number| number != 0.0)
             }
         }
     }
 
     /// Its value; `None` where a tag is unknown, and for a division by zero and an overflow.
     pub fn number(&self, value: &impl Fn(TagId) -> Option<Exact>) -> Option<Exact> {
+        self.number_for(value, &|_| None)
+    }
+
+    fn number_for(
+        &self,
+        value: &impl Fn(TagId) -> Option<Exact>,
+        identity: &impl Fn(&IdentityTest) -> Option<bool>,
+    ) -> Option<Exact> {
+        let of_part = |part: &Expr| part.number_for(value, identity);
         let number = match self {
             Expr::Number(number) => *number,
             Expr::Tag(tag) => value(*tag)?,
             Expr::Arithmetic(left, operator, right) => {
-                let (left, right) = (left.number(value)?, right.number(value)?);
+                let (left, right) = (of_part(left)?, of_part(right)?);
                 match operator {
                     Operator::Add => left + right,
                     Operator::Subtract => left - right,
@@ -112,7 +119,7 @@ impl Expr {
             }
             Expr::Call(function, of) => {
                 let count = Exact::from(of.len() as f64);
-                let mut numbers = of.iter().map(|part| part.number(value)).collect::<Option<Vec<Exact>>>()?.into_iter();
+                let mut numbers = of.iter().map(of_part).collect::<Option<Vec<Exact>>>()?.into_iter();
                 match function {
                     Function::Min => numbers.reduce(|least, next| if next < least { next } else { least })?,
                     Function::Max => numbers.reduce(|most, next| if most < next { next } else { most })?,
@@ -120,8 +127,8 @@ impl Expr {
                     Function::Abs => numbers.next()?.abs(),
                 }
             }
-            Expr::Test(..) | Expr::Not(_) | Expr::All(_) | Expr::Any(_) => {
-                f64::from(u8::from(self.holds(value)?)).into()
+            Expr::Test(..) | Expr::Identity(_) | Expr::Not(_) | Expr::All(_) | Expr::Any(_) => {
+                f64::from(u8::from(self.holds_for(value, identity)?)).into()
             }
         };
         Some(number).filter(|number| number.is_finite())
@@ -130,33 +137,35 @@ impl Expr {
     /// Every tag in it, in the order in which they are written.
     pub fn tags(&self) -> Vec<TagId> {
         match self {
-            Expr::Number(_) => Vec::new(),
+            Expr::Number(_) | Expr::Identity(_) => Vec::new(),
             Expr::Tag(tag) => vec![*tag],
             Expr::Not(inner) => inner.tags(),
             Expr::Arithmetic(left, _, right) | Expr::Test(left, _, right) => [left.tags(), right.tags()].concat(),
             Expr::Call(_, parts) | Expr::All(parts) | Expr::Any(parts) => parts.iter().flat_map(Expr::tags).collect(),
         }
     }
-}
 
-impl Compare {
-    fn holds(self, value: Exact, with: Exact) -> bool {
+    /// Every test in it of what a device says of itself.
+    pub fn identity_tests(&self) -> Vec<&IdentityTest> {
         match self {
-            Compare::Equal => value == with,
-            Compare::Differs => value != with,
-            Compare::Below => value < with,
-            Compare::AtMost => value <= with,
-            Compare::Above => value > with,
-            Compare::AtLeast => value >= with,
+            Expr::Number(_) | Expr::Tag(_) => Vec::new(),
+            Expr::Identity(test) => vec![test],
+            Expr::Not(inner) => inner.identity_tests(),
+            Expr::Arithmetic(left, _, right) | Expr::Test(left, _, right) => {
+                [left.identity_tests(), right.identity_tests()].concat()
+            }
+            Expr::Call(_, parts) | Expr::All(parts) | Expr::Any(parts) => {
+                parts.iter().flat_map(Expr::identity_tests).collect()
+            }
         }
     }
 }
 
 /// One part that is `decisive` decides, whatever is unknown beside it.
-fn decided(parts: &[Expr], value: &impl Fn(TagId) -> Option<Exact>, decisive: bool) -> Option<bool> {
+fn decided(parts: &[Expr], holds: &impl Fn(&Expr) -> Option<bool>, decisive: bool) -> Option<bool> {
     let mut unknown = false;
     for part in parts {
-        match part.holds(value) {
+        match holds(part) {
             Some(holds) if holds == decisive => return Some(decisive),
             Some(_) => {}
             None => unknown = true,

@@ -10,6 +10,8 @@
 pub(crate) mod number;
 pub mod exact;
 pub mod id;
+pub(crate) mod compare;
+pub mod identity;
 pub(crate) mod expr;
 pub mod procedure_def;
 pub mod fault;

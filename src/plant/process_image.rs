@@ -9,10 +9,13 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use self::fault_effect::{FaultEffect, effect_of};
+use self::{
+    fault_effect::{FaultEffect, effect_of},
+    presence::Identities,
+};
 use super::{
     calculation::Calculator,
-    def::{DeviceId, PlantDef, TagId},
+    def::{PlantDef, TagId},
     exact::Exact,
     fault::Fault,
     heard::{Heard, Stated},
@@ -54,6 +57,7 @@ pub struct ProcessImage {
     /// Tags whose value depends on this one (decimals, fault word), by tag.
     dependents: Vec<Vec<TagId>>,
     calculator: Calculator,
+    identities: Identities,
 }
 
 /// A raw number, when it was read, and what has made it uncertain since.
@@ -93,6 +97,7 @@ impl ProcessImage {
             touched: def.tags.iter().map(|tag| tag.id).collect(),
             dependents,
             calculator: Calculator::new(&def.tags),
+            identities: Identities::default(),
             def: def.clone(),
         };
         let stated = def.tags.iter().filter(|tag| tag.stated.is_some());
@@ -172,27 +177,6 @@ impl ProcessImage {
                 }
             }
             Quality::Good | Quality::Uncertain(_) => self.mark_uncertain(tag, cause),
-        }
-    }
-
-    /// Everything of a device is gone at once.
-    pub fn gone(&mut self, device: DeviceId, cause: Cause, at: Timestamp) {
-        let def = self.def.clone();
-        for tag in def.tags_of(device).filter(|tag| tag.calculation.is_none()) {
-            if self.sample(tag.id).quality != Quality::Bad(cause) {
-                self.drop_value(tag.id, cause, at);
-            }
-        }
-    }
-
-    /// Nothing is heard of a device any more: its values may be others by now.
-    pub fn not_heard(&mut self, device: DeviceId) {
-        let def = self.def.clone();
-        let good = |image: &ProcessImage, tag| image.sample(tag).quality.is_good();
-        for tag in def.tags_of(device).filter(|tag| tag.calculation.is_none()) {
-            if good(self, tag.id) {
-                self.mark_uncertain(tag.id, Cause::NotHeard);
-            }
         }
     }
 

@@ -183,6 +183,10 @@ impl Plant {
                 self.keep_source_frames(without.into_iter(), exchange);
                 (at, None)
             }
+            Event::Identified { at, device, objects } => {
+                self.image.identified(device, objects, at);
+                (at, None)
+            }
             Event::ForeignWrite { at, tags, fault } => {
                 tags.iter().for_each(|tag| self.image.written(*tag, fault, at));
                 (at, None)

@@ -1,10 +1,12 @@
-//! What a failed request means for the values that were asked for.
+//! What a failed request means for the values that were asked for, and a device that is gone for all of its values.
 
 use jiff::Timestamp;
 
+use super::ProcessImage;
 use crate::plant::{
+    def::DeviceId,
     fault::{ExceptionCode, Fault, FaultKind},
-    sample::{Cause, Sample},
+    sample::{Cause, Quality, Sample},
 };
 
 /// What a fault does to a value.
@@ -21,6 +23,31 @@ impl Sample {
         match effect_of(fault) {
             FaultEffect::Uncertain(cause) => Sample { at, ..self }.uncertain(cause),
             FaultEffect::Gone(cause) => Sample::bad(cause, at),
+        }
+    }
+}
+
+impl ProcessImage {
+    /// Everything of a device is gone at once.
+    pub fn gone(&mut self, device: DeviceId, cause: Cause, at: Timestamp) {
+        let def = self.def.clone();
+        // Another one may come back.
+        self.identities.forget(device);
+        for tag in def.tags_of(device).filter(|tag| tag.calculation.is_none()) {
+            if self.sample(tag.id).quality != Quality::Bad(cause) {
+                self.drop_value(tag.id, cause, at);
+            }
+        }
+    }
+
+    /// Nothing is heard of a device any more: its values may be others by now.
+    pub fn not_heard(&mut self, device: DeviceId) {
+        let def = self.def.clone();
+        let good = |image: &ProcessImage, tag| image.sample(tag).quality.is_good();
+        for tag in def.tags_of(device).filter(|tag| tag.calculation.is_none()) {
+            if good(self, tag.id) {
+                self.mark_uncertain(tag.id, Cause::NotHeard);
+            }
         }
     }
 }

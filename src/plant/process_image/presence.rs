@@ -1,20 +1,71 @@
-//! What a device does not have, as another of its values says: it has no value, and that is no trouble.
+//! What a device does not have, as another of its values or its identification says: it has no value, and that is no trouble.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
+
+use jiff::Timestamp;
 
 use super::ProcessImage;
 use crate::plant::{
-    id::TagId,
+    exact::Exact,
+    expr::Expr,
+    id::{DeviceId, TagId},
+    identity::IdentityObject,
     sample::{Cause, Quality, Sample},
 };
 
 const ABSENT: Quality = Quality::Bad(Cause::NotPresent);
 
+/// What devices say of themselves, as far as it was read since they were last lost.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Identities(HashMap<DeviceId, Vec<(IdentityObject, String)>>);
+
+impl Identities {
+    /// It is gone.
+    pub fn forget(&mut self, device: DeviceId) {
+        self.0.remove(&device);
+    }
+
+    /// Takes over what was known under another definition of the devices that are the same; `was` is the id of before.
+    pub fn take_over(&mut self, before: &mut Identities, devices: impl Iterator<Item = (DeviceId, DeviceId)>) {
+        self.0.extend(devices.filter_map(|(now, was)| Some((now, before.0.remove(&was)?))));
+    }
+}
+
 impl ProcessImage {
+    /// A device has said of itself what of it is asked; nothing where it does not tell.
+    pub fn identified(&mut self, device: DeviceId, objects: Vec<(IdentityObject, String)>, at: Timestamp) {
+        let objects = Some(objects).filter(|objects| !objects.is_empty());
+        let before = match objects.clone() {
+            Some(objects) => self.identities.0.insert(device, objects),
+            None => self.identities.0.remove(&device),
+        };
+        if before == objects {
+            return;
+        }
+        let def = self.def.clone();
+        let asks = |when: &Arc<Expr>| !when.identity_tests().is_empty();
+        for tag in def.tags_of(device).filter(|tag| tag.when.as_ref().is_some_and(asks)) {
+            let has_changed = (self.sample(tag.id).quality == ABSENT) != self.is_absent(tag.id);
+            match has_changed && self.raw[tag.id.index()].is_none() {
+                true => self.set(tag.id, Sample::bad(Cause::NotRead, at)),
+                false => self.recompute_sample(tag.id),
+            }
+        }
+    }
+
+    /// Does a condition hold, by the values that count and by what devices say of themselves? `None`: it is not known.
+    pub fn holds(&self, condition: &Expr, value: &impl Fn(TagId) -> Option<Exact>) -> Option<bool> {
+        condition.holds_for(value, &|test| {
+            let objects = self.identities.0.get(&test.device)?;
+            let found = objects.iter().find(|(object, _)| *object == test.object);
+            found.and_then(|(_, text)| test.holds(text))
+        })
+    }
+
     /// Does its device say that it does not have it? While it has said nothing the tag is as any other.
     fn is_absent(&self, tag: TagId) -> bool {
         let known = |of: TagId| self.sample(of).exact().filter(|_| self.sample(of).scaling_value().is_some());
-        self.def.tag(tag).when.as_ref().is_some_and(|when| when.holds(&known) == Some(false))
+        self.def.tag(tag).when.as_ref().is_some_and(|when| self.holds(when, &known) == Some(false))
     }
 
     /// The sample of a tag, whatever was read or failed at its place; none where its device does not have it.
@@ -41,13 +92,12 @@ impl ProcessImage {
 
 #[cfg(test)]
 mod tests {
-    use jiff::Timestamp;
-
     use super::*;
     use crate::plant::{
-        expr::{Compare, Expr},
+        expr::Compare,
         fault::Fault,
         fixture::{self, DP, PV},
+        identity::IdentityTest,
     };
 
     /// PV is there while DP is 2 or more.
@@ -90,5 +140,52 @@ mod tests {
         assert_eq!(image.sample(PV).quality, ABSENT);
         image.read(&[(DP, 3.0)], at(2));
         assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::NotRead));
+    }
+
+    /// PV is there from revision 2.10 on.
+    fn image_by_revision() -> (ProcessImage, DeviceId) {
+        let mut def = fixture::plant();
+        let device = def.tags[PV.index()].device;
+        let (object, compare) = (IdentityObject::of("revision").expect("an object"), Compare::AtLeast);
+        let test = IdentityTest { device, object, compare, with: "2.10".to_owned() };
+        let tag = &mut def.tags[PV.index()];
+        (tag.when, tag.quality_from) = (Some(Arc::new(Expr::Identity(test))), None);
+        tag.decimals = crate::plant::tag::Decimals::Fixed(0);
+        (ProcessImage::new(Arc::new(def), Timestamp::UNIX_EPOCH), device)
+    }
+
+    #[test]
+    fn the_identification_of_a_device_says_what_it_has() {
+        let (mut image, device) = image_by_revision();
+        let says = |text: &str| vec![(IdentityObject::of("revision").expect("an object"), text.to_owned())];
+        image.read(&[(PV, 70.0)], at(1));
+        assert_eq!(image.sample(PV).quality, Quality::Good, "not read: as any other");
+        image.identified(device, says("V2.9"), at(2));
+        assert_eq!((image.sample(PV).quality, image.sample(PV).value), (ABSENT, None));
+        image.failed(&[PV], Fault::Exception(crate::plant::fault::ExceptionCode::ILLEGAL_ADDRESS), at(3));
+        assert_eq!(image.sample(PV).quality, ABSENT, "refused or not");
+        image.identified(device, says("V2.10"), at(4));
+        assert_eq!((image.sample(PV).quality, image.sample(PV).at), (Quality::Bad(Cause::NotRead), at(4)), "updated");
+        image.read(&[(PV, 71.0)], at(5));
+        assert_eq!(image.sample(PV).good_value(), Some(71.0));
+        image.identified(device, says("2.9"), at(6));
+        image.gone(device, Cause::DeviceDown, at(7));
+        assert_eq!(image.sample(PV).quality, Quality::Bad(Cause::DeviceDown), "another one may come back");
+        image.read(&[(PV, 72.0)], at(8));
+        assert_eq!(image.sample(PV).good_value(), Some(72.0));
+    }
+
+    #[test]
+    fn what_a_device_does_not_tell_decides_nothing() {
+        for objects in
+            [vec![], vec![(IdentityObject(2), "Rev A".to_owned())], vec![(IdentityObject(1), "9".to_owned())]]
+        {
+            let (mut image, device) = image_by_revision();
+            image.identified(device, vec![(IdentityObject(2), "2.9".to_owned())], at(1));
+            assert_eq!(image.sample(PV).quality, ABSENT);
+            image.identified(device, objects.clone(), at(2));
+            image.read(&[(PV, 72.0)], at(3));
+            assert_eq!(image.sample(PV).good_value(), Some(72.0), "{objects:?}");
+        }
     }
 }

@@ -162,7 +162,7 @@ fn facts(image: &ProcessImage, ill: Option<bool>, alarm: &AlarmDef) -> Facts {
         Subject::Device(_) | Subject::Line(_) | Subject::Station => None,
     };
     let reference = alarm.condition.reference().and_then(trusted);
-    let enabled = alarm.enabled_when.as_ref().and_then(|expr| expr.holds(&trusted));
+    let enabled = alarm.enabled_when.as_ref().and_then(|expr| image.holds(expr, &trusted));
     Facts { value, reference, ill, enabled }
 }
 
