@@ -7,8 +7,12 @@ use crate::plant::{
     calculation,
     calculation_def::OverTime,
     def::TagId,
+    expr::Expr,
     tag::{Access, Calculation, Poll, TagDef},
 };
+
+/// Encapsulated interface transport: read device identification (V1.1b3, 6.21).
+const IDENTIFY: u8 = 43;
 
 /// Expressions over tags as they are written, by the tag that has them.
 pub(super) struct Exprs {
@@ -37,7 +41,7 @@ fn conditions(written: &[(TagId, At<String>)], tags: &mut [TagDef], defs: &Defs,
     let mut found = Vec::new();
     for (id, words) in written {
         let tag = &tags[id.index()];
-        let Some(when) = expr::near(words, device_of(tag), &Defs { tags: &*tags, ..*defs }, problems) else { continue };
+        let Some(when) = expr::of_tag(words, tag, &Defs { tags: &*tags, ..*defs }, problems) else { continue };
         for source in when.tags().into_iter().map(|source| &tags[source.index()]) {
             let is_unread = source.poll == Poll::Never || source.access == Access::Write;
             if written.iter().any(|(of, _)| *of == source.id) {
@@ -51,10 +55,26 @@ fn conditions(written: &[(TagId, At<String>)], tags: &mut [TagDef], defs: &Defs,
                 problem.label("it decides nothing").help(format!("give {} poll = \"slow\"", source.short));
             }
         }
+        check_identification(words, &when, tag, defs, problems);
         found.push((*id, Arc::new(when)));
     }
     for (id, when) in found {
         tags[id.index()].when = Some(when);
+    }
+}
+
+/// What a device never says decides nothing.
+fn check_identification(words: &At<String>, when: &Expr, tag: &TagDef, defs: &Defs, problems: &mut Problems) {
+    let Some(device) = defs.devices.get(tag.device.index()).filter(|_| !when.identity_tests().is_empty()) else {
+        return;
+    };
+    if !device.functions.is_empty() && !device.functions.contains(&IDENTIFY) {
+        let problem = problems.add(words.at, format!("{} has no function 43, by which it would say this", device.name));
+        problem.label("expected 43 in `functions`, or a tag that says it");
+    } else if defs.lines.get(device.line.index()).is_some_and(|line| line.listens) {
+        let problem =
+            problems.warn(words.at, format!("nobody asks {} for this: nothing is sent on its line", device.name));
+        problem.label("the device counts as having it");
     }
 }
 

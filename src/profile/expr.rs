@@ -1,6 +1,7 @@
 //! Reads an expression over tags: `PLC-1.HEATER = ON and (PLC-1.LT-1 > 5 cm or not PLC-1.AUTO = AUTO)`,
 //! `max(TIC-1.PV, TIC-2.PV) - 5`. A name may hold `-`, `+` and `/`, so that these are operators only between spaces.
 
+mod identity;
 mod over_time;
 
 use over_time::is_over_time;
@@ -13,6 +14,7 @@ use super::{
 };
 use crate::plant::{
     calculation_def::OverTime,
+    def::DeviceId,
     delay::Edge,
     exact::Exact,
     expr::{Compare, Expr, Function, Operator},
@@ -36,12 +38,26 @@ const COMPARES: [(&str, Compare); 6] = [
 
 /// The condition that is written in a string. `None` after the problem was added.
 pub(super) fn expr(words: &At<String>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
-    near(words, None, defs, problems)
+    condition(words, None, None, defs, problems)
 }
 
-/// The same for tags of `device`, which may be named without it.
-pub(super) fn near(words: &At<String>, device: Option<&str>, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
-    let expr = read(words, device, defs, problems, |reader| reader.any())?;
+/// What must hold for a device to have a tag: its tags may be named without it, and what it says of itself counts.
+pub(super) fn of_tag(words: &At<String>, tag: &TagDef, defs: &Defs, problems: &mut Problems) -> Option<Expr> {
+    let device = tag.name.split_once('.').map(|(device, _)| device);
+    condition(words, device, Some(tag.device), defs, problems)
+}
+
+fn condition(
+    words: &At<String>,
+    device: Option<&str>,
+    identified: Option<DeviceId>,
+    defs: &Defs,
+    problems: &mut Problems,
+) -> Option<Expr> {
+    let expr = read(words, device, defs, problems, |reader| {
+        reader.identified = identified;
+        reader.any()
+    })?;
     if !is_condition(&expr) {
         no_condition(words.at, problems);
         return None;
@@ -87,8 +103,19 @@ fn read<T>(
             .label(format!("expected at most {TOKENS_MAX} words and signs"));
         return None;
     }
-    let mut reader =
-        Reader { text, starts, tokens, next: 0, depth: 0, calls: 0, end: words.at, device, defs, problems };
+    let mut reader = Reader {
+        text,
+        starts,
+        tokens,
+        next: 0,
+        depth: 0,
+        calls: 0,
+        end: words.at,
+        device,
+        identified: None,
+        defs,
+        problems,
+    };
     let found = what(&mut reader)?;
     match reader.peek() {
         None => Some(found),
@@ -114,6 +141,8 @@ fn tokens(text: &str) -> Vec<(usize, &str)> {
             continue;
         } else if "(),*".contains(first) {
             1
+        } else if let Some(length) = identity::quoted(rest) {
+            length
         } else if let Some((word, _)) = COMPARES.iter().find(|(word, _)| rest.starts_with(word)) {
             word.len()
         } else {
@@ -140,6 +169,8 @@ struct Reader<'a, 'd> {
     end: Span,
     /// Where names are looked up first.
     device: Option<&'a str>,
+    /// The device that says of itself what is compared; `None` where that does not count.
+    identified: Option<DeviceId>,
     defs: &'a Defs<'d>,
     problems: &'a mut Problems,
 }
@@ -180,6 +211,9 @@ impl<'a> Reader<'a, '_> {
     fn one(&mut self) -> Option<Expr> {
         if self.takes("not") {
             return self.nested(|reader| Some(Expr::Not(Box::new(reader.one()?))));
+        }
+        if let Some(test) = self.identity_test() {
+            return test.map(Expr::Identity);
         }
         let left = self.sum()?;
         let found = self.peek().and_then(|found| COMPARES.iter().find(|(word, _)| *word == found.value));
@@ -352,19 +386,4 @@ fn is_sign(word: &str) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_signs_and_parentheses_need_no_spaces() {
-        let check = |text: &str, expect: &[&str]| {
-            let found: Vec<&str> = tokens(text).into_iter().map(|(_, word)| word).collect();
-            assert_eq!(found, expect, "{text}");
-        };
-        check("PLC-1.RUN=RUN and(T.L>=5.5 cm)", &["PLC-1.RUN", "=", "RUN", "and", "(", "T.L", ">=", "5.5", "cm", ")"]);
-        check("a!=b ! <", &["a", "!=", "b", "!", "<"]);
-        check("ü.ß = 1", &["ü.ß", "=", "1"]);
-        check("a - b*2", &["a", "-", "b", "*", "2"]);
-        check("", &[]);
-    }
-}
+mod tests;
