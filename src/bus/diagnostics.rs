@@ -1,6 +1,6 @@
 //! Diagnostics of a line as pure step machines: which request is next, and what follows from its response.
 
-mod identify;
+pub(in crate::bus) mod identify;
 mod loopback;
 mod pattern;
 mod scan;

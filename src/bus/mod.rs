@@ -16,6 +16,7 @@
 //! | [`codec`], [`interpret`] | words to numbers and back; everything that words may mean |
 //! | [`plan`], [`admission`], [`schedule`], [`backoff`] | what is read together, whether it can all be in time, what is read next |
 //! | [`hangup`], [`in_flight`], [`request_gap`], [`other_master`] | what ended a connection; how much a unit takes at once, and how soon; who else asks |
+//! | [`identification`] | when a device is asked what it is, for the conditions of its profile |
 //! | [`line_stats`] | what is counted |
 //! | [`diagnostics`], [`live`], [`recognise`], `sunspec` | the steps of a diagnostic, of a live read and of a walk over models; which device it looks like |
 //! | [`dissect`], [`names`], [`source_frame`] | the fields of a frame and their meaning |
@@ -49,6 +50,7 @@ pub mod in_flight;
 pub mod request_gap;
 pub mod other_master;
 pub mod diagnostics;
+pub mod identification;
 pub mod live;
 pub mod recognise;
 pub(crate) mod sunspec;

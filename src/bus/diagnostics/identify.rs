@@ -17,9 +17,14 @@ const LISTS: [(u8, u8); 3] = [(1, 0), (2, 3), (3, 0x80)];
 /// The first object of a maker's own.
 const EXTENDED: u8 = 0x80;
 
+/// Most requests for the objects that a profile asks for: a list that goes on and on is none.
+const REQUESTS_MAX: usize = 12;
+
 /// What is known of a device while it is identified.
 #[derive(Debug, Clone, Default)]
-pub(super) struct IdentifyJob {
+pub(in crate::bus) struct IdentifyJob {
+    /// Only these objects are of interest, if not all.
+    wanted: Option<BTreeSet<u8>>,
     found: BTreeSet<u8>,
     /// Read code and object of each request: none is made twice.
     asked: BTreeSet<(u8, u8)>,
@@ -32,6 +37,35 @@ pub(super) struct IdentifyJob {
 }
 
 impl IdentifyJob {
+    /// Asks for these objects, and for no more than it takes.
+    pub fn wanting(wanted: BTreeSet<u8>) -> IdentifyJob {
+        IdentifyJob { wanted: Some(wanted), ..IdentifyJob::default() }
+    }
+
+    /// Takes the outcome of a request, the first of which is [`FIRST`]; gives the objects that are new, with their texts.
+    pub fn on_outcome(&mut self, asked: (u8, u8), outcome: Result<&[u8], Fault>) -> Vec<(u8, String)> {
+        self.asked.insert(asked);
+        match outcome {
+            Ok(answer) => self.on_answer(asked, answer).into_iter().map(|(id, text)| (id, text_of(text))).collect(),
+            Err(fault) => {
+                self.on_failure(asked, fault);
+                Vec::new()
+            }
+        }
+    }
+
+    /// What is asked next of the objects that are wanted.
+    pub fn next_wanted(&mut self) -> Option<(u8, u8)> {
+        let is_open = self.wanted.as_ref().is_some_and(|wanted| !wanted.is_subset(&self.found));
+        (is_open && self.asked.len() < REQUESTS_MAX).then(|| self.advance()).flatten()
+    }
+
+    /// Does the list of objects from this one on hold one that is of interest?
+    fn is_of_interest(&self, (_, first): (u8, u8)) -> bool {
+        let last = LISTS.iter().map(|(_, next)| *next).find(|next| first < *next).map_or(u8::MAX, |next| next - 1);
+        self.wanted.as_ref().is_none_or(|wanted| wanted.range(first..=last).any(|id| !self.found.contains(id)))
+    }
+
     /// Takes an answer; gives the objects that were not known.
     fn on_answer<'a>(&mut self, (code, _): (u8, u8), answer: &'a [u8]) -> Vec<(u8, &'a [u8])> {
         let (Some(pdu), [_, _, _, _, conformity, more, next, ..]) = (answer.get(1..), answer) else {
@@ -59,9 +93,10 @@ impl IdentifyJob {
             None if self.refuses_lists => (0, true),
             None => (0, false),
         };
-        let lists = LISTS.into_iter().take(usize::from(level));
+        let lists = LISTS.into_iter().take(usize::from(level)).filter(|list| self.is_of_interest(*list));
+        let lists: Vec<(u8, u8)> = lists.collect();
         // Some devices say less of themselves than they have.
-        let regular = (0 < level).then_some(LISTS[1]);
+        let regular = (0 < level && self.is_of_interest(LISTS[1])).then_some(LISTS[1]);
         let known = match level {
             0 => 0..=0,
             1 => 0..=2,
@@ -71,7 +106,11 @@ impl IdentifyJob {
         // One by one only those that no list has given.
         let is_unlisted = self.asked.contains(&(READ_ONE_OBJECT, EXTENDED)) || !self.found.contains(&EXTENDED);
         let missing = known.filter(|id| !self.found.contains(id)).chain(extended.filter(|_| is_unlisted));
-        let single = missing.filter(|_| is_single).map(|id| (READ_ONE_OBJECT, id));
+        let missing: Vec<u8> = match &self.wanted {
+            Some(wanted) => wanted.difference(&self.found).copied().collect(),
+            None => missing.collect(),
+        };
+        let single = missing.into_iter().filter(|_| is_single).map(|id| (READ_ONE_OBJECT, id));
         let next = self.next.take().into_iter().chain(lists).chain(regular).chain(single);
         let next = { next }.find(|request| !self.asked.contains(request));
         self.asked.extend(next);
@@ -79,10 +118,17 @@ impl IdentifyJob {
     }
 }
 
+/// Read code and object of the first request.
+pub(in crate::bus) const FIRST: (u8, u8) = LISTS[0];
+
+/// A request of an identification by read code and object.
+pub(in crate::bus) fn objects_from(unit: u8, (code, object): (u8, u8)) -> Step {
+    step(vec![unit, 0x2B, MEI_IDENTIFICATION, code, object])
+}
+
 /// The first request.
 pub(super) fn first(unit: u8) -> Step {
-    let (code, object) = LISTS[0];
-    step(vec![unit, 0x2B, MEI_IDENTIFICATION, code, object])
+    objects_from(unit, FIRST)
 }
 
 impl Job {
@@ -128,9 +174,7 @@ impl Job {
         objects.into_iter().for_each(|object| self.found(object));
         let identify = &mut self.identify;
         match identify.advance() {
-            Some((code, object)) => {
-                self.queued.push_back(step(vec![unit, 0x2B, MEI_IDENTIFICATION, code, object]));
-            }
+            Some(next) => self.queued.push_back(objects_from(unit, next)),
             None if identify.found.is_empty() => self.queued.push_back(step(vec![unit, 0x11])),
             None => {}
         }

@@ -5,6 +5,7 @@ mod connection;
 mod deferred_read_back;
 mod exit;
 mod hangups;
+mod identify;
 mod live;
 mod opening;
 mod poll;
@@ -38,6 +39,7 @@ use crate::{
         backoff::Backoff,
         diagnostics::Job,
         hangup::Hangups,
+        identification::Identification,
         in_flight::InFlight,
         line_stats::{LineStats, Plan},
         plan::{self, Block, RangeBisection, UnreadableRanges},
@@ -96,6 +98,7 @@ pub async fn run(
         cut: Vec::new(),
         hangups: Hangups::default(),
         in_flight,
+        identification: Identification::new(&def, line),
         recheck: Recheck::new(own().map(|(device, _)| device.id).collect(), clock.now()),
         unheard: 0,
         opened_at: clock.now(),
@@ -160,6 +163,8 @@ struct Task<'a> {
     in_flight: InFlight,
     /// When what was found of devices is tried again.
     recheck: Recheck,
+    /// Which devices are asked what they are.
+    identification: Identification,
     /// Connections in a row that were given up because nothing was ever answered.
     unheard: u32,
     /// When the present connection was opened, and whether something was answered on it.
@@ -212,6 +217,7 @@ impl Task<'_> {
                 (Some(request), _) => self.serve_request(link, schedule, request).await?,
                 (None, _) if self.is_turn_of_deferred_read_back(now) => self.deferred_read_back(link, schedule).await?,
                 (None, _) if self.recheck.is_due(now) => self.recheck(link, schedule).await?,
+                (None, next) if self.is_turn_of_identification(next) => self.identify(link, schedule).await?,
                 (None, next) if self.is_turn_of_diagnostic(next) => self.diagnostic_step(link).await?,
                 (None, next) if self.is_turn_of_live_read(next) => self.live_step(link).await?,
                 (None, Next::Run(index)) => self.poll(link, schedule, index).await?,
@@ -232,7 +238,8 @@ impl Task<'_> {
     /// Nothing is due: drops unsolicited bytes until something is.
     async fn listen(&mut self, link: &mut Link, schedule: &mut Schedule, until: Timestamp) -> Result<(), LinkExit> {
         let (clock, live_from) = (self.clock, self.live_from());
-        let until = self.diagnostic_from().map_or(until, |from| until.min(from));
+        let others = [self.diagnostic_from(), self.identification_from()];
+        let until = others.into_iter().flatten().fold(until, Timestamp::min);
         let live = async {
             clock.sleep_until(live_from).await;
             self.live.due(clock).await;
@@ -373,6 +380,9 @@ impl Task<'_> {
         fault: Fault,
         exchange: Option<Arc<Exchange>>,
     ) -> Result<(), LinkExit> {
+        if fault == Fault::BackedOff {
+            self.identification.lost(device);
+        }
         self.publish(Event::Failed { at, device, tags, fault, exchange }).await
     }
 

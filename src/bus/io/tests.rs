@@ -2,6 +2,7 @@
 //! shows the address it came from.
 
 mod connecting;
+mod identifying;
 mod listening;
 mod live;
 mod oddities;

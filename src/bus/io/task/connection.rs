@@ -24,7 +24,10 @@ impl Task<'_> {
             let exit = match self.open().await {
                 Ok(port) => {
                     self.memory.counters.opens += 1;
-                    if !is_quiet {
+                    if is_quiet {
+                        self.identification.goes_on();
+                    } else {
+                        self.identification.reopened(self.clock.now());
                         self.publish_state(LineState::Connected).await?;
                         tracing::info!(line = self.settings.name, transport = %self.settings.transport, "connected");
                     }

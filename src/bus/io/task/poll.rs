@@ -134,6 +134,7 @@ impl Task<'_> {
         if is_answer {
             let was_down = schedule.answered(index, block.device, response_time, at);
             self.recheck.answered(block.device, was_down);
+            self.identification.answered(block.device, was_down, at);
             index.into_iter().for_each(|index| schedule.spent(index, took));
             self.on_block_answered(link, block);
         }

@@ -3,6 +3,7 @@
 use super::{LinkExit, Task};
 use crate::{
     bus::{
+        identification::Identification,
         io::{
             link::Link,
             live_reads::LiveReads,
@@ -72,6 +73,7 @@ impl Task<'_> {
         *self.live = LiveReads::new(live);
         self.stats.redefine(&def, line, &renamed);
         schedule.rename(|device| renamed.device(device));
+        self.identification = Identification::new(&def, line);
         (self.def, self.line, self.settings.id) = (def, line, line);
         self.bisection.restart();
         let blocks = plan::blocks_with_unpolled(&self.def, self.line, &self.unreadable, &self.requested);
