@@ -22,7 +22,7 @@ pub trait Registers: Clone {
     fn limits(&self) -> Limits;
     /// What it says of itself, for the functions 11 and 2B.
     fn identity(&self) -> Identity {
-        Identity { server_id: 0, objects: &[] }
+        Identity { server_id: 0, objects: Vec::new() }
     }
 
     /// One coil or discrete input.

@@ -45,22 +45,19 @@ const FILL_DL: (u16, u16, u16) = (30, 50, 200);
 const V_SIGNALS: u16 = 0o2010;
 
 /// The last object is long, so that all of them do not fit into one answer.
-const IDENTITY: Identity = Identity {
-    server_id: 6,
-    objects: &[
-        (0x00, "KOYO"),
-        (0x01, "D0-06DD1"),
-        (0x02, env!("CARGO_PKG_VERSION")),
-        (0x03, "https://www.koyoele.co.jp"),
-        (0x04, "DirectLOGIC 06 (simulated)"),
-        (0x05, "DL06"),
-        (
-            0x06,
-            "water tank: fills TK-1 from TK-2 through valve SV-2, heats while agitator M-1 turns, holds at the setpoint of \
+const OBJECTS: [(u8, &str); 7] = [
+    (0x00, "KOYO"),
+    (0x01, "D0-06DD1"),
+    (0x02, env!("CARGO_PKG_VERSION")),
+    (0x03, "https://www.koyoele.co.jp"),
+    (0x04, "DirectLOGIC 06 (simulated)"),
+    (0x05, "DL06"),
+    (
+        0x06,
+        "water tank: fills TK-1 from TK-2 through valve SV-2, heats while agitator M-1 turns, holds at the setpoint of \
              TIC-1 for three minutes, drains to TK-3 through valve SV-1, cools, pumps back to TK-2 with P-1, begins again",
-        ),
-    ],
-};
+    ),
+];
 
 /// The outputs as the lamps show them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -278,7 +275,7 @@ impl Registers for Dl06 {
     }
 
     fn identity(&self) -> Identity {
-        IDENTITY
+        Identity { server_id: 6, objects: OBJECTS.map(|(id, text)| (id, text.to_owned())).to_vec() }
     }
 
     fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode> {

@@ -10,18 +10,24 @@ use crate::{
     plant::{
         def::{DeviceDef, Limits, TagId},
         fault::ExceptionCode,
+        identity::IdentityTest,
         number::to_u32,
         scale,
         tag::{Access, Bound, Table, TagDef},
     },
-    sim::pdu::Registers,
+    sim::pdu::{Identity, Registers},
 };
+
+/// Read device identification (V1.1b3, 6.21).
+const IDENTIFY: u8 = 0x2B;
 
 /// What a profile says of a device; never changes.
 #[derive(Debug, Clone)]
 pub struct Chart {
     limits: Limits,
     functions: Vec<u8>,
+    /// What it says of itself, for the conditions of its tags.
+    objects: Vec<(u8, String)>,
     tags: Vec<TagDef>,
     cells: [BTreeSet<u16>; 4],
     /// Addresses that hold two words each.
@@ -46,8 +52,12 @@ impl Chart {
         };
         let cells = of_tables(|_| true);
         let wide = of_tables(|tag| tag.point.kind.address_words() != 1);
-        let functions = if device.functions.is_empty() { functions(&tags) } else { device.functions.clone() };
-        Chart { limits: device.limits, functions, tags, cells, wide }
+        let mut functions = if device.functions.is_empty() { functions(&tags) } else { device.functions.clone() };
+        let objects = objects(&tags);
+        if !objects.is_empty() && device.functions.is_empty() {
+            functions.push(IDENTIFY);
+        }
+        Chart { limits: device.limits, functions, objects, tags, cells, wide }
     }
 
     fn tag(&self, id: TagId) -> Option<&TagDef> {
@@ -89,6 +99,21 @@ fn functions(tags: &[TagDef]) -> Vec<u8> {
         }
     }
     functions.into_iter().collect()
+}
+
+/// What a device says of itself whose tags have conditions on that: of the texts that an object is compared with, the
+/// last of those that most conditions accept.
+fn objects(tags: &[TagDef]) -> Vec<(u8, String)> {
+    let mut of_object: BTreeMap<u8, Vec<&IdentityTest>> = BTreeMap::new();
+    for test in tags.iter().filter_map(|tag| tag.when.as_ref()).flat_map(|when| when.identity_tests()) {
+        of_object.entry(test.object.0).or_default().push(test);
+    }
+    let chosen = of_object.into_iter().filter_map(|(object, tests)| {
+        let accepted = |text: &str| tests.iter().filter(|test| test.holds(text) == Some(true)).count();
+        let best = tests.iter().map(|test| &test.with).max_by_key(|text| accepted(text))?;
+        Some((object, best.clone()))
+    });
+    chosen.collect()
 }
 
 impl Model {
@@ -236,6 +261,10 @@ impl Registers for Model {
 
     fn limits(&self) -> Limits {
         self.chart.limits
+    }
+
+    fn identity(&self) -> Identity {
+        Identity { server_id: 0, objects: self.chart.objects.clone() }
     }
 
     fn bit(&self, table: Table, address: u16) -> Result<bool, ExceptionCode> {

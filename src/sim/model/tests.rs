@@ -209,3 +209,25 @@ tag = [
     let words: Vec<_> = words.iter().map(|block| (block.address, block.count, block.address_words)).collect();
     assert_eq!(words, [(3_001, 1, 1), (5_001, 3, 2)]);
 }
+
+/// It says what most conditions of its profile want to hear.
+#[test]
+fn a_device_says_of_itself_what_its_conditions_ask() {
+    let tag = |name: &str, address, when: &str| {
+        format!("{{ name = \"{name}\", table = \"holding\", address = {address}, type = \"uint16\"{when} }}")
+    };
+    let tags = [
+        tag("A", 0, ""),
+        tag("B", 1, ", when = \"revision >= '2.9'\""),
+        tag("C", 2, ", when = \"revision >= '2.10'\""),
+        tag("D", 3, ", when = \"revision < '2.1' or object_0x80 = 'X'\""),
+    ];
+    let said = |tags: &[String], request: &[u8]| {
+        let mut simulator = Simulator::new(&plant(&format!("tag = [{}]", tags.join(", ")))).expect("no rig is named");
+        simulator.respond(L1, 1, request)
+    };
+    let answer = |code, id, text: &[u8]| [&[0x2B, 0x0E, code, 0x83, 0, 0, 1, id, text.len() as u8], text].concat();
+    assert_eq!(said(&tags, &[0x2B, 0x0E, 1, 0]), Some(answer(1, 2, b"2.10")));
+    assert_eq!(said(&tags, &[0x2B, 0x0E, 3, 0x80]), Some(answer(3, 0x80, b"X")));
+    assert_eq!(said(&tags[..1], &[0x2B, 0x0E, 1, 0]), Some(vec![0xAB, 1]), "nobody asks");
+}

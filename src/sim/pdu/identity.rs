@@ -3,24 +3,26 @@
 use crate::plant::fault::ExceptionCode;
 use crate::{bus::pdu::MEI_IDENTIFICATION, plant::number::to_u8};
 
-/// Basic and regular objects, as a stream and one by one.
-const CONFORMITY: u8 = 0x82;
+/// Basic and regular objects, as a stream and one by one; with those of the maker's own.
+const CONFORMITY: [u8; 2] = [0x82, 0x83];
+/// The first object of a maker's own.
+const EXTENDED: u8 = 0x80;
 /// Room for objects: a PDU of 253 bytes less function, type, code, conformity, more, next and count.
 const ROOM: usize = 253 - 7;
 
 /// Name plate of a device.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Identity {
     /// For function 11.
     pub server_id: u8,
     /// Object id and text, ascending: 00 vendor, 01 product code, 02 revision, 03 URL, 04 product, 05 model, 06 application
     /// (V1.1b3, 6.21). Each text fits into one answer.
-    pub objects: &'static [(u8, &'static str)],
+    pub objects: Vec<(u8, String)>,
 }
 
 /// Answer to function 11: the id, the run lamp, the name of the product.
 pub(super) fn report(identity: &Identity, running: bool) -> Vec<u8> {
-    let name = identity.objects.iter().find(|(id, _)| *id == 0x01).map_or("", |(_, text)| text);
+    let name = identity.objects.iter().find(|(id, _)| *id == 0x01).map_or("", |(_, text)| text.as_str());
     let mut reply = vec![0x11, 2 + to_u8(name.len()), identity.server_id, if running { 0xFF } else { 0x00 }];
     reply.extend_from_slice(name.as_bytes());
     reply
@@ -29,12 +31,15 @@ pub(super) fn report(identity: &Identity, running: bool) -> Vec<u8> {
 /// Answer to function 2B/0E. Codes 1 to 3 stream the basic, regular or all objects from one on (from the first if there
 /// is no such object; what goes beyond our conformity is answered as far as it goes), code 4 reads one.
 pub(super) fn read(identity: &Identity, code: u8, from: u8) -> Result<Vec<u8>, ExceptionCode> {
+    let is_extended = identity.objects.iter().any(|(id, _)| EXTENDED <= *id);
+    let conformity = CONFORMITY[usize::from(is_extended)];
     let last = match code {
         1 => 0x02,
-        2 | 3 => 0x7F,
+        2 => EXTENDED - 1,
+        3 => u8::MAX,
         4 => {
             let one = identity.objects.iter().find(|(id, _)| *id == from).ok_or(ExceptionCode::ILLEGAL_ADDRESS)?;
-            return Ok(message(code, None, std::slice::from_ref(one)));
+            return Ok(message((code, conformity), None, std::slice::from_ref(one)));
         }
         _ => return Err(ExceptionCode::ILLEGAL_VALUE),
     };
@@ -46,12 +51,12 @@ pub(super) fn read(identity: &Identity, code: u8, from: u8) -> Result<Vec<u8>, E
         Some(*end)
     });
     let fitting = ends.take_while(|end| *end <= ROOM).count();
-    Ok(message(code, rest.get(fitting).map(|(id, _)| *id), &rest[..fitting]))
+    Ok(message((code, conformity), rest.get(fitting).map(|(id, _)| *id), &rest[..fitting]))
 }
 
-fn message(code: u8, next: Option<u8>, objects: &[(u8, &str)]) -> Vec<u8> {
+fn message((code, conformity): (u8, u8), next: Option<u8>, objects: &[(u8, String)]) -> Vec<u8> {
     let more = if next.is_some() { 0xFF } else { 0x00 };
-    let mut reply = vec![0x2B, MEI_IDENTIFICATION, code, CONFORMITY, more, next.unwrap_or(0), to_u8(objects.len())];
+    let mut reply = vec![0x2B, MEI_IDENTIFICATION, code, conformity, more, next.unwrap_or(0), to_u8(objects.len())];
     for (id, text) in objects {
         reply.extend_from_slice(&[*id, to_u8(text.len())]);
         reply.extend_from_slice(text.as_bytes());
@@ -76,8 +81,8 @@ mod tests {
         let (mut rest, mut seen) = (objects, Vec::new());
         while let [id, length, tail @ ..] = rest {
             let (text, tail) = tail.split_at(usize::from(*length));
-            let known =
-                Dl06::new().identity().objects.iter().find(|(known, _)| known == id).map(|(_, text)| text.as_bytes());
+            let own = Dl06::new().identity().objects;
+            let known = own.iter().find(|(known, _)| known == id).map(|(_, text)| text.as_bytes());
             assert_eq!(known, Some(text));
             seen.push(*id);
             rest = tail;
