@@ -108,7 +108,9 @@ fn because(
         },
         Cause::OnRequest => Some(t!("it is read on request only").to_owned()),
         Cause::NotPresent => {
-            let needs: Vec<String> = def.when.iter().flat_map(|when| when.tags()).map(words_of).collect();
+            let when = def.when.iter();
+            let tests = when.clone().flat_map(|when| when.identity_tests()).map(ToString::to_string);
+            let needs: Vec<String> = when.flat_map(|when| when.tags()).map(words_of).chain(tests).collect();
             Some(t!("the device does not have it: {words_of}", words_of = needs.join(", ")))
         }
         Cause::NotHeard => {
