@@ -88,6 +88,37 @@ fn the_station_reads_pymodbus_over_tcp() {
     check_all_are_read_from(&format!("127.0.0.1:{port}"));
 }
 
+/// Its revision is V2.10.
+#[test]
+fn pymodbus_says_what_it_is_and_what_it_does_not_have() {
+    let Some(python) = python() else { return };
+    let folder = folder();
+    let tag = |name: &str, when: &str| {
+        format!(
+            "{{ name = \"{name}\", table = \"holding\", address = 10, type = \"uint16\", poll = \"fast\", when = \"{when}\" }}"
+        )
+    };
+    let tags =
+        [tag("NEW", "revision >= '2.9'"), tag("NEWER", "revision >= '2.11'"), tag("OTHER", "product_code = 'B'")];
+    let head = "vendor = \"none\"\nmodel = \"slave.py\"\nstatus = \"verified\"\nsource = \"slave.py\"\n";
+    fs::write(folder.path().join("number.toml"), format!("{head}tag = [{}]\n", tags.join(", "))).unwrap();
+    for mode in ["tcp", "rtu-over-tcp"] {
+        let port = free_port();
+        let _slave = slave(&python, mode, &port.to_string());
+        let file = folder.path().join("plant.toml");
+        fs::write(
+            &file,
+            plant_with(&[("U", 3, "10")], mode).replace("[[device.tag]]\nname = \"N\"\naddress = 10\n", ""),
+        )
+        .unwrap();
+        let said = station(&file, &format!("127.0.0.1:{port}"), "12s");
+        check(
+            &said,
+            &[("U.NEW", "10 good"), ("U.NEWER", "---- bad: not present"), ("U.OTHER", "---- bad: not present")],
+        );
+    }
+}
+
 /// A unit that is well and one for each way to answer wrongly: name, unit and the register that it is asked for, which says
 /// what is wrong (`peers/slave.py`).
 const WELL: (&str, u8, &str) = ("WELL", 3, "10");

@@ -16,7 +16,7 @@ It says "ready" when it serves, then one line for each request that it answers. 
 import asyncio
 import sys
 
-from pymodbus import FramerType
+from pymodbus import FramerType, ModbusDeviceIdentification
 from pymodbus.server import ModbusSerialServer, ModbusTcpServer, ModbusUdpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
@@ -107,7 +107,8 @@ def trace_packet(sending, frame):
 async def main():
     global server
     context = [pxr(), dl06()] + [faulty(unit) for unit in range(3, 9)]
-    traces = {"trace_pdu": trace_pdu, "trace_packet": trace_packet}
+    identity = ModbusDeviceIdentification(info_name={"VendorName": "pymodbus", "ProductCode": "SLAVE", "MajorMinorRevision": "V2.10"})
+    traces = {"trace_pdu": trace_pdu, "trace_packet": trace_packet, "identity": identity}
     match KIND:
         case "tcp" | "rtu-over-tcp":
             framer = FramerType.SOCKET if KIND == "tcp" else FramerType.RTU
