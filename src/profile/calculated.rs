@@ -73,7 +73,7 @@ fn check_identification(words: &At<String>, when: &Expr, tag: &TagDef, defs: &De
         problem.label("expected 43 in `functions`, or a tag that says it");
     } else if defs.lines.get(device.line.index()).is_some_and(|line| line.listens) {
         let problem =
-            problems.warn(words.at, format!("nobody asks {} for this: nothing is sent on its line", device.name));
+            problems.warn(words.at, format!("{} is not asked for this: nothing is sent on its line", device.name));
         problem.label("the device counts as having it");
     }
 }

@@ -5,7 +5,6 @@ mod alarms;
 mod batches;
 mod calculated;
 mod foreign_maps;
-mod identities;
 mod inline;
 mod listening;
 mod interlocks;

@@ -1,5 +1,7 @@
 //! Calculated tags of plant files.
 
+mod identities;
+
 use super::*;
 use crate::plant::{
     calculation_def::OverTime,

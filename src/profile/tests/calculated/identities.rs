@@ -1,6 +1,6 @@
 //! Conditions on what a device says of itself.
 
-use super::*;
+use super::super::*;
 use crate::plant::{
     expr::{Compare, Expr},
     identity::{IdentityObject, IdentityTest},
