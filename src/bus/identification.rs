@@ -47,7 +47,7 @@ struct Reading {
     /// Not before.
     from: Timestamp,
     /// When it has said what is wanted, if it has.
-    told_at: Option<Timestamp>,
+    identified_at: Option<Timestamp>,
     next: (u8, u8),
     job: IdentifyJob,
     found: Objects,
@@ -64,7 +64,7 @@ impl Reading {
             wanted,
             is_lost: true,
             from: Timestamp::MIN,
-            told_at: None,
+            identified_at: None,
             next: identify::FIRST,
             job,
             found: Vec::new(),
@@ -107,10 +107,10 @@ impl Identification {
         }
     }
 
-    /// A connection has taken the place of one that ended without a fault: what was told stands until it is told again.
+    /// A connection has taken the place of one that ended without a fault: what was said stands until it is said again.
     pub fn goes_on(&mut self) {
         for reading in self.devices.values_mut().filter(|reading| reading.hangups == 0) {
-            let again = reading.told_at.map(|told_at| told_at + CONNECTED_EVERY);
+            let again = reading.identified_at.map(|identified_at| identified_at + CONNECTED_EVERY);
             reading.from = again.map_or(reading.from, |again| reading.from.min(again));
         }
     }
@@ -150,17 +150,17 @@ impl Identification {
     /// it does not tell.
     pub fn on_outcome(&mut self, device: DeviceId, outcome: Result<&[u8], Fault>, now: Timestamp) -> Option<Objects> {
         let reading = self.devices.get_mut(&device)?;
-        let is_told = match outcome {
+        let is_answer = match outcome {
             Ok(_) => true,
             Err(Fault::Exception(code)) => !code.is_of_gateway(),
             Err(_) => false,
         };
-        if !is_told {
+        if !is_answer {
             reading.tries += 1;
             reading.from = now + reading.backoff.fail();
             if TRIES_MAX <= reading.tries {
                 // What it was before still stands: nothing says that it is another one.
-                reading.told_at = None;
+                reading.identified_at = None;
                 reading.restart(now + EVERY);
             }
             return None;
@@ -174,7 +174,7 @@ impl Identification {
                 None
             }
             None => {
-                reading.told_at = (!reading.found.is_empty()).then_some(now);
+                reading.identified_at = (!reading.found.is_empty()).then_some(now);
                 Some(reading.restart(now + EVERY))
             }
         }

@@ -45,8 +45,8 @@ fn a_device_is_asked_once_it_answers_and_again_when_it_was_lost() {
     assert_eq!(due(&all, 5), None, "it has answered nothing");
     all.answered(U1, false, at(5));
     assert_eq!((due(&all, 5), all.from()), (FIRST, Some(at(5))));
-    let told = all.on_outcome(U1, Ok(&answer(1, 1, &[(0, "A"), (1, "B"), (2, "2.10")])), at(6));
-    assert!(told.is_some_and(|told| told.contains(&(IdentityObject(2), "2.10".to_owned()))));
+    let said = all.on_outcome(U1, Ok(&answer(1, 1, &[(0, "A"), (1, "B"), (2, "2.10")])), at(6));
+    assert!(said.is_some_and(|said| said.contains(&(IdentityObject(2), "2.10".to_owned()))));
     assert_eq!((due(&all, 3_000), due(&all, 3_606)), (None, FIRST), "it may be updated");
     all.answered(U1, false, at(7));
     assert_eq!(due(&all, 7), None, "it was not lost");
@@ -68,14 +68,14 @@ fn no_more_is_asked_than_the_objects_that_count() {
         let mut all = asking(object);
         all.answered(U1, false, at(0));
         let mut asked = Vec::new();
-        let told = loop {
+        let said = loop {
             let (code, from) = due(&all, 0).expect("a request");
             asked.push((code, from));
-            if let Some(told) = all.on_outcome(U1, Ok(&answer(code, 0x83, &[(0, "A")])), at(0)) {
-                break told;
+            if let Some(said) = all.on_outcome(U1, Ok(&answer(code, 0x83, &[(0, "A")])), at(0)) {
+                break said;
             }
         };
-        assert_eq!((asked, told.len()), (requests, 1), "of object {object}");
+        assert_eq!((asked, said.len()), (requests, 1), "of object {object}");
     }
 }
 

@@ -41,7 +41,7 @@ impl Task<'_> {
         if !gap.is_zero() {
             schedule.keep_gap(device, now + gap);
         }
-        let told = match asked {
+        let said = match asked {
             // A stop comes first; the request is made again.
             None => {
                 link.abandon();
@@ -57,7 +57,7 @@ impl Task<'_> {
                 return Err(LinkExit::Gone(why));
             }
         };
-        let Some(objects) = told else { return Ok(()) };
+        let Some(objects) = said else { return Ok(()) };
         tracing::debug!(unit, ?objects, "identified");
         self.publish(Event::Identified { at: now, device, objects }).await
     }

@@ -1,4 +1,4 @@
-//! A device is asked what it is where its profile has a condition on that, and nobody else is.
+//! A device is asked what it is where its profile has a condition on that, and no other is.
 
 use std::sync::{
     Arc,
@@ -7,15 +7,21 @@ use std::sync::{
 
 use tokio::time::Instant;
 
-use super::{
-    slave::{Line, identification},
-    *,
-};
+use super::{slave::Line, *};
 use crate::plant::{
     PlantDef,
     expr::{Compare, Expr},
     identity::{IdentityObject, IdentityTest},
 };
+
+/// The basic objects of a device with this revision.
+pub fn identification(unit: u8, revision: &str) -> Vec<u8> {
+    let mut answer = vec![unit, 0x2B, 0x0E, 1, 1, 0, 0, 3];
+    for (id, text) in (0..).zip(["ACME", "M1", revision]) {
+        answer.extend([&[id, text.len() as u8], text.as_bytes()].concat());
+    }
+    answer
+}
 
 const U1: DeviceId = DeviceId(0);
 
@@ -28,20 +34,20 @@ fn asking(mode: Mode) -> PlantDef {
     def
 }
 
-/// What was told of the first unit within a time of the line, and how many reads of each unit were good.
-async fn told_until(line: &mut Line, def: &PlantDef, second: i64) -> (Vec<String>, [usize; 2]) {
-    let (mut told, mut good) = (Vec::new(), [0; 2]);
+/// What the first unit has said within a time of the line, and how many reads of each unit were good.
+async fn identified_until(line: &mut Line, def: &PlantDef, second: i64) -> (Vec<String>, [usize; 2]) {
+    let (mut said, mut good) = (Vec::new(), [0; 2]);
     loop {
         match line.next(def).await {
             Event::Identified { device, objects, .. } => {
                 assert_eq!(device, U1);
                 let revision = objects.into_iter().find(|(object, _)| object.0 == 2);
-                told.push(revision.map(|(_, text)| text).unwrap_or_default());
+                said.push(revision.map(|(_, text)| text).unwrap_or_default());
             }
             Event::Read { at, device, .. } => {
                 good[device.index()] += 1;
                 if second <= at.as_second() {
-                    return (told, good);
+                    return (said, good);
                 }
             }
             Event::Line { state: LineState::Waiting { .. }, .. } => panic!("the connection was given up"),
@@ -61,7 +67,7 @@ fn counted(
             count.fetch_add(1, Ordering::Relaxed);
             action()
         }
-        [_, 0x2B, ..] => panic!("nobody wants to know what it is: {message:?}"),
+        [_, 0x2B, ..] => panic!("no profile asks what it is: {message:?}"),
         _ => SlaveAction::Answer,
     }
 }
@@ -72,8 +78,8 @@ async fn a_device_is_asked_once_what_it_is() {
         let (def, count) = (asking(mode), Arc::default());
         let mut line = line(def.clone());
         line.plug(mode, counted(&count, || SlaveAction::Answer));
-        let (told, good) = told_until(&mut line, &def, 1_000).await;
-        assert_eq!((told, count.load(Ordering::Relaxed)), (vec!["2.10".to_owned()], 1), "{mode:?}");
+        let (said, good) = identified_until(&mut line, &def, 1_000).await;
+        assert_eq!((said, count.load(Ordering::Relaxed)), (vec!["2.10".to_owned()], 1), "{mode:?}");
         assert!(good.iter().all(|good| 2_900 < *good), "{mode:?}: {good:?}");
     }
 }
@@ -88,8 +94,8 @@ async fn what_a_device_does_not_tell_costs_few_requests() {
             let (def, count) = (asking(mode), Arc::default());
             let mut line = line(def.clone());
             line.plug(mode, counted(&count, action));
-            let (told, good) = told_until(&mut line, &def, 1_000).await;
-            assert_eq!((told, count.load(Ordering::Relaxed)), (expect, requests), "{mode:?}");
+            let (said, good) = identified_until(&mut line, &def, 1_000).await;
+            assert_eq!((said, count.load(Ordering::Relaxed)), (expect, requests), "{mode:?}");
             assert!(good.iter().all(|good| 2_900 < *good), "{mode:?}: {good:?}");
         }
     }
@@ -110,8 +116,8 @@ async fn a_late_identification_is_taken_for_nothing_else() {
             };
             let mut line = line(def.clone());
             line.plug(mode, counted(&count, late));
-            let (told, good) = told_until(&mut line, &def, 120).await;
-            assert_eq!(told, ["2.10"], "{mode:?}, late by {late_ms} ms");
+            let (said, good) = identified_until(&mut line, &def, 120).await;
+            assert_eq!(said, ["2.10"], "{mode:?}, late by {late_ms} ms");
             assert!(good.iter().all(|good| 250 < *good), "{mode:?}, late by {late_ms} ms: {good:?}");
         }
     }
@@ -130,8 +136,8 @@ async fn a_device_that_comes_back_is_asked_again() {
             }
             _ => SlaveAction::Answer,
         });
-        let (told, _) = told_until(&mut line, &def, 400).await;
-        assert_eq!(told, ["2.9", "2.10"], "{mode:?}");
+        let (said, _) = identified_until(&mut line, &def, 400).await;
+        assert_eq!(said, ["2.9", "2.10"], "{mode:?}");
     }
 }
 
@@ -141,17 +147,17 @@ async fn a_new_connection_asks_again() {
         let def = asking(mode);
         let mut line = line(def.clone());
         let first = line.plug(mode, |_, _| SlaveAction::Answer);
-        assert_eq!(told_until(&mut line, &def, 10).await.0, ["2.10"], "{mode:?}");
+        assert_eq!(identified_until(&mut line, &def, 10).await.0, ["2.10"], "{mode:?}");
         line.plug(mode, |_, message| match message {
             [1, 0x2B, ..] => SlaveAction::Instead(identification(1, "2.11")),
             _ => SlaveAction::Answer,
         });
         first.abort();
-        let told = |event: &Event| match event {
+        let said = |event: &Event| match event {
             Event::Identified { objects, .. } => Some(objects[2].1.clone()),
             _ => None,
         };
-        assert_eq!(line.until(&def, told).await, "2.11", "{mode:?}");
+        assert_eq!(line.until(&def, said).await, "2.11", "{mode:?}");
     }
 }
 

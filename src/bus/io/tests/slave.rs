@@ -80,7 +80,8 @@ impl Mode {
         }
     }
 
-    /// Where the request at the beginning of the buffer ends, once it is whole. In RTU, but for writes of several and identifications, it has eight bytes.
+    /// Where the request at the beginning of the buffer ends, once it is whole. In RTU, but for writes of several and
+    /// identifications, it has eight bytes.
     pub fn end(self, buffer: &[u8]) -> Option<usize> {
         match self.framing() {
             Framing::Rtu => {
@@ -175,18 +176,9 @@ pub fn correct(message: &[u8]) -> Vec<u8> {
         }
         // Of several registers or coils the answer tells where and how many.
         15 | 16 => message[..6].to_vec(),
-        0x2B => identification(message[0], "2.10"),
+        0x2B => super::identifying::identification(message[0], "2.10"),
         _ => message.to_vec(),
     }
-}
-
-/// The basic objects of a device with this revision.
-pub fn identification(unit: u8, revision: &str) -> Vec<u8> {
-    let mut answer = vec![unit, 0x2B, 0x0E, 1, 1, 0, 0, 3];
-    for (id, text) in (0..).zip(["ACME", "M1", revision]) {
-        answer.extend([&[id, text.len() as u8], text.as_bytes()].concat());
-    }
-    answer
 }
 
 /// Serves until the stream closes; `script(n, message)` says what to do with the n-th request.
