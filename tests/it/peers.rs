@@ -93,29 +93,19 @@ fn the_station_reads_pymodbus_over_tcp() {
 fn pymodbus_says_what_it_is_and_what_it_does_not_have() {
     let Some(python) = python() else { return };
     let folder = folder();
-    let tag = |name: &str, when: &str| {
-        format!(
-            "{{ name = \"{name}\", table = \"holding\", address = 10, type = \"uint16\", poll = \"fast\", when = \"{when}\" }}"
-        )
-    };
-    let tags =
-        [tag("NEW", "revision >= '2.9'"), tag("NEWER", "revision >= '2.11'"), tag("OTHER", "product_code = 'B'")];
+    let row = "table = \"holding\", address = 10, type = \"uint16\", poll = \"fast\"";
+    let when = |name, when| format!("{{ name = \"{name}\", {row}, when = \"{when}\" }}");
+    let (new, newer) = (when("NEW", "revision >= '2.9'"), when("NEWER", "revision >= '2.11'"));
+    let tags = format!("tag = [{{ name = \"N\", {row} }}, {new}, {newer}]\n");
     let head = "vendor = \"none\"\nmodel = \"slave.py\"\nstatus = \"verified\"\nsource = \"slave.py\"\n";
-    fs::write(folder.path().join("number.toml"), format!("{head}tag = [{}]\n", tags.join(", "))).unwrap();
+    fs::write(folder.path().join("number.toml"), format!("{head}{tags}")).unwrap();
     for mode in ["tcp", "rtu-over-tcp"] {
         let port = free_port();
         let _slave = slave(&python, mode, &port.to_string());
         let file = folder.path().join("plant.toml");
-        fs::write(
-            &file,
-            plant_with(&[("U", 3, "10")], mode).replace("[[device.tag]]\nname = \"N\"\naddress = 10\n", ""),
-        )
-        .unwrap();
+        fs::write(&file, plant_with(&[WELL], mode)).unwrap();
         let said = station(&file, &format!("127.0.0.1:{port}"), "12s");
-        check(
-            &said,
-            &[("U.NEW", "10 good"), ("U.NEWER", "---- bad: not present"), ("U.OTHER", "---- bad: not present")],
-        );
+        check(&said, &[("WELL.N", "10 good"), ("WELL.NEW", "10 good"), ("WELL.NEWER", "---- bad: not present")]);
     }
 }
 

@@ -229,5 +229,5 @@ fn a_device_says_of_itself_what_its_conditions_ask() {
     let answer = |code, id, text: &[u8]| [&[0x2B, 0x0E, code, 0x83, 0, 0, 1, id, text.len() as u8], text].concat();
     assert_eq!(said(&tags, &[0x2B, 0x0E, 1, 0]), Some(answer(1, 2, b"2.10")));
     assert_eq!(said(&tags, &[0x2B, 0x0E, 3, 0x80]), Some(answer(3, 0x80, b"X")));
-    assert_eq!(said(&tags[..1], &[0x2B, 0x0E, 1, 0]), Some(vec![0xAB, 1]), "nobody asks");
+    assert_eq!(said(&tags[..1], &[0x2B, 0x0E, 1, 0]), Some(vec![0xAB, 1]), "no condition asks");
 }
