@@ -142,8 +142,8 @@ proptest! {
     }
 }
 
-/// The one mixture of some ten million that did: the slave stands still for 7.8 s, its 29th loopback is lost, and the delay
-/// was taken for a proof that unit 2 owes nothing.
+/// A mixture that did: the slave stands still for 7.8 s, a loopback to unit 2 is lost, and the delay after it was taken for a
+/// proof that this unit owes nothing.
 #[tokio::test(start_paused = true)]
 async fn a_delay_proves_nothing_while_the_line_stands_still() {
     #[rustfmt::skip]
