@@ -43,7 +43,7 @@ fn a_condition_on_nothing_that_a_device_says_is_refused() {
             "\"firmware >= '2.10'\"",
             &["[meter.toml:33:9]", "unknown identification object `firmware`", "object_0xFF"][..],
         ),
-        ("\"revison >= '2.10'\"", &["unknown identification object `revison`", "did you mean `revision`?"]),
+        ("\"revisions >= '2.10'\"", &["unknown identification object `revisions`", "did you mean `revision`?"]),
         ("\"object_0x07 = 'A'\"", &["unknown identification object `object_0x07`"]),
         ("\"revision >= 2.10\"", &["[meter.toml:33:9]", "the revision of a device is compared with a text"]),
         ("\"revision >= '2.10b'\"", &["[meter.toml:33:21]", "`2.10b` is no version", "as \"2.10\""]),
