@@ -25,7 +25,7 @@ pub struct Span {
 }
 
 /// A curve of more columns than these may have down to half of those asked for, where wider aggregates make it then: a week
-/// of eight pens comes from hours in a tenth of the time of minutes (bench `history -- year`).
+/// of eight pens comes from 1,344 rows in place of 80,640.
 const COLUMNS_ENOUGH: i64 = 120;
 
 /// The grid of a curve of at most `buckets` columns, and the widest aggregates that it may be made of, `finest` at least:
