@@ -27,6 +27,8 @@ pub struct Span {
 /// A curve of more columns than these may have down to half of those asked for, where wider aggregates make it then: a week
 /// of eight pens comes from 1,344 rows in place of 80,640.
 const COLUMNS_ENOUGH: i64 = 120;
+/// What asks for more than a screen draws measures them, as a step response does: it has them all.
+const COLUMNS_DRAWN: i64 = 1_000;
 
 /// The grid of a curve of at most `buckets` columns, and the widest aggregates that it may be made of, `finest` at least:
 /// where these are minutes or hours, columns begin and end with them, and the span is a little longer than asked. A single
@@ -34,7 +36,7 @@ const COLUMNS_ENOUGH: i64 = 120;
 pub fn grid(span: Span, buckets: usize, finest: Tier) -> (Span, usize, Tier) {
     let (from, to) = (span.from.as_microsecond(), span.to.as_microsecond());
     let count = i64::try_from(buckets.max(1)).unwrap_or(i64::MAX);
-    let least = count.min(COLUMNS_ENOUGH.max(count / 2));
+    let least = if count <= COLUMNS_DRAWN { count.min(COLUMNS_ENOUGH.max(count / 2)) } else { count };
     let tier = Tier::within((to - from) / least).max(finest);
     let Some(step) = (if count == 1 { finest } else { tier }).step() else { return (span, buckets, tier) };
     let from = floor(from, step);
@@ -208,6 +210,8 @@ mod tests {
             (hour, 100, 100, Tier::Raw),
             (7 * day, 200, 168, Tier::Hour),
             (15 * hour, 24, 24, Tier::Minute),
+            // Nor of more than a screen draws.
+            (day, 2_000, 2_000, Tier::Raw),
         ] {
             let got = grid(span(0, seconds), asked, Tier::Raw);
             assert_eq!((got.1, got.2), (columns, tier), "{seconds} s in {asked} columns");

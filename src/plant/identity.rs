@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{compare::Compare, id::DeviceId};
 
+/// Encapsulated interface transport, by which a device is asked.
+pub const FUNCTION: u8 = 0x2B;
+
 /// The objects that the standard names, as a profile does.
 const NAMED: [&str; 7] =
     ["vendor_name", "product_code", "revision", "vendor_url", "product_name", "model_name", "user_application_name"];

@@ -8,11 +8,9 @@ use crate::plant::{
     calculation_def::OverTime,
     def::TagId,
     expr::Expr,
+    identity,
     tag::{Access, Calculation, Poll, TagDef},
 };
-
-/// Encapsulated interface transport: read device identification (V1.1b3, 6.21).
-const IDENTIFY: u8 = 43;
 
 /// Expressions over tags as they are written, by the tag that has them.
 pub(super) struct Exprs {
@@ -68,7 +66,7 @@ fn check_identification(words: &At<String>, when: &Expr, tag: &TagDef, defs: &De
     let Some(device) = defs.devices.get(tag.device.index()).filter(|_| !when.identity_tests().is_empty()) else {
         return;
     };
-    if !device.functions.is_empty() && !device.functions.contains(&IDENTIFY) {
+    if !device.functions.is_empty() && !device.functions.contains(&identity::FUNCTION) {
         let problem = problems.add(words.at, format!("{} has no function 43, by which it would say this", device.name));
         problem.label("expected 43 in `functions`, or a tag that says it");
     } else if defs.lines.get(device.line.index()).is_some_and(|line| line.listens) {

@@ -8,6 +8,7 @@ use crate::{
     plant::{
         diagnostics::Finding,
         fault::{ExceptionCode, Fault},
+        identity,
         tag::Table,
     },
 };
@@ -123,7 +124,7 @@ pub(in crate::bus) const FIRST: (u8, u8) = LISTS[0];
 
 /// A request of an identification by read code and object.
 pub(in crate::bus) fn objects_from(unit: u8, (code, object): (u8, u8)) -> Step {
-    step(vec![unit, 0x2B, MEI_IDENTIFICATION, code, object])
+    step(vec![unit, identity::FUNCTION, MEI_IDENTIFICATION, code, object])
 }
 
 /// The first request.

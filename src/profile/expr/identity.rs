@@ -2,7 +2,10 @@
 
 use super::{COMPARES, Reader};
 use crate::{
-    plant::identity::{IdentityObject, IdentityTest, is_version},
+    plant::{
+        def::DeviceId,
+        identity::{IdentityObject, IdentityTest, is_version},
+    },
     profile::reader::At,
 };
 
@@ -42,7 +45,7 @@ impl<'a> Reader<'a, '_> {
         name: At<&'a str>,
         object: Option<IdentityObject>,
         text: Option<At<&'a str>>,
-    ) -> Option<(crate::plant::def::DeviceId, IdentityObject, &'a str)> {
+    ) -> Option<(DeviceId, IdentityObject, &'a str)> {
         let Some(object) = object else {
             let problem = self.problems.add(name.at, format!("unknown identification object `{}`", name.value));
             let known: Vec<&str> = IdentityObject::names().collect();

@@ -10,16 +10,13 @@ use crate::{
     plant::{
         def::{DeviceDef, Limits, TagId},
         fault::ExceptionCode,
-        identity::IdentityTest,
+        identity::{self, IdentityTest},
         number::to_u32,
         scale,
         tag::{Access, Bound, Table, TagDef},
     },
     sim::pdu::{Identity, Registers},
 };
-
-/// Read device identification (V1.1b3, 6.21).
-const IDENTIFY: u8 = 0x2B;
 
 /// What a profile says of a device; never changes.
 #[derive(Debug, Clone)]
@@ -55,7 +52,7 @@ impl Chart {
         let mut functions = if device.functions.is_empty() { functions(&tags) } else { device.functions.clone() };
         let objects = objects(&tags);
         if !objects.is_empty() && device.functions.is_empty() {
-            functions.push(IDENTIFY);
+            functions.push(identity::FUNCTION);
         }
         Chart { limits: device.limits, functions, objects, tags, cells, wide }
     }
