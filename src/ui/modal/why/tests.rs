@@ -147,6 +147,20 @@ fn why_in_every_case() {
 }
 
 #[test]
+fn an_answer_that_holds_no_value_is_no_old_one() {
+    for (cause, is_old) in
+        [(Cause::NotPresent, false), (Cause::SensorFault, false), (Cause::Unscaled, false), (Cause::Stale, true)]
+    {
+        let mut fixture = fixture();
+        doubt(&mut fixture, |sample| Sample::bad(cause, sample.at));
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "4w");
+        let shown = screen(&mut model, 120, 40);
+        assert_eq!(shown.contains("no good response since"), is_old, "{cause:?}\n{shown}");
+    }
+}
+
+#[test]
 fn a_small_screen_has_the_essentials_without_scrolling() {
     for (name, fixture) in cases() {
         let mut model = model(&fixture, Theme::FULL);

@@ -14,6 +14,7 @@ use crate::{
     plant::{
         def::DeviceDef,
         line_state::LineState,
+        sample::Cause,
         tag::{Access, ByteOrder, Poll, TagDef},
         time::elapsed,
         traffic::Exchange,
@@ -46,8 +47,10 @@ pub(super) fn exchange_rows(
         rows.push(hex(if n == 0 { t!("request") } else { "" }, text, theme.normal()));
     }
     let at = clock(exchange.at, &cx.def().time_zone);
-    // What was good then says nothing of now.
-    let old = !cx.snapshot.sample(def.id).quality.is_good() && exchange.outcome.is_ok();
+    // What was good then says nothing of now; of an answer that holds no value there is none newer.
+    let quality = cx.snapshot.sample(def.id).quality;
+    let holds_none = matches!(quality.cause(), Some(Cause::NotPresent | Cause::SensorFault | Cause::Unscaled));
+    let old = !quality.is_good() && !holds_none && exchange.outcome.is_ok();
     rows.push(Fact::new("", t!("{summary}, at {at}", summary = request.summary, at), theme.dim()));
     if exchange.answer.is_empty() {
         let line = settings(cx, def);
