@@ -24,6 +24,7 @@ pub use device::signal_mark;
 
 use self::{
     compare::Compare,
+    list::Devices,
     procedures::Procedures,
     program::Cell,
     runs::{ControlRuns, Runs},
@@ -59,10 +60,9 @@ pub enum Page {
 pub struct Controllers {
     /// Over each other: the last one is shown, and Esc leads to the one before it.
     pages: Vec<Page>,
-    /// The device that is shown or selected.
+    devices: List<Devices>,
+    /// The device of the pages over the list.
     device: DeviceId,
-    /// Only devices with these words are listed.
-    found: Words,
     table: ParameterTable,
     cell: Cell,
     /// The devices as faceplates or as a table; `None` as there is room.
@@ -113,7 +113,8 @@ impl TabView for Controllers {
             Page::Sets => Some(&self.sets),
             Page::Runs => self.runs.shown(),
             Page::Procedures => Some(&self.procedures),
-            Page::List | Page::Device => Some(self),
+            Page::List => Some(&self.devices),
+            Page::Device => Some(self),
             Page::Lamps | Page::Program | Page::Compare(_) | Page::Overlay | Page::Guide(_) => None,
         }
     }
@@ -123,7 +124,8 @@ impl TabView for Controllers {
             Page::Sets => Some(&mut self.sets),
             Page::Runs => self.runs.shown_mut(),
             Page::Procedures => Some(&mut self.procedures),
-            Page::List | Page::Device => Some(self),
+            Page::List => Some(&mut self.devices),
+            Page::Device => Some(self),
             Page::Lamps | Page::Program | Page::Compare(_) | Page::Overlay | Page::Guide(_) => None,
         }
     }
@@ -132,7 +134,7 @@ impl TabView for Controllers {
         while cx.is_past() && matches!(self.page(), Page::Sets | Page::Compare(_) | Page::Procedures) {
             self.pages.pop();
         }
-        let device = cx.def().devices.get(self.device.index());
+        let device = self.device(cx);
         match (self.page(), device) {
             (Page::Runs | Page::Overlay, _) => return self.runs.ask(cx, Tab::Controllers),
             (Page::Lamps, Some(device)) => return self.lamps.ask(cx, device),
@@ -142,10 +144,7 @@ impl TabView for Controllers {
         let faceplate = device.and_then(|device| device.faceplate.as_ref());
         let tags = match self.page() {
             Page::Device => faceplate.map(|faceplate| faceplate.pv).into_iter().collect(),
-            Page::List if self.is_wall(cx) => {
-                let listed = self.listed(cx);
-                wall::tags(cx, &listed, self.place(&listed))
-            }
+            Page::List if self.is_wall(cx) => wall::tags(cx, &self.devices),
             Page::List | Page::Program | Page::Sets | Page::Compare(_) => Vec::new(),
             Page::Lamps | Page::Runs | Page::Procedures | Page::Overlay | Page::Guide(_) => Vec::new(),
         };
@@ -187,19 +186,15 @@ impl TabView for Controllers {
             return overlay.view(cx, frame, area);
         }
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
-        let Some(device) = cx.def().devices.get(self.device.index()) else {
-            canvas.text(1, 1, t!("this plant has no devices"), cx.theme.normal());
-            return;
-        };
+        if *self.page() == Page::List {
+            return match self.is_wall(cx) {
+                true => wall::view(cx, &mut canvas, &self.devices, &self.trend),
+                false => self.devices.view(cx, &mut canvas),
+            };
+        }
+        let Some(device) = self.device(cx) else { return };
         match (self.page(), &device.program) {
-            (Page::List, _) => {
-                let (listed, found) = (self.listed(cx), self.found.to_string());
-                let place = self.place(&listed);
-                if self.is_wall(cx) {
-                    return wall::view(cx, &mut canvas, (&listed, place), &found, &self.trend);
-                }
-                list::view(cx, &mut canvas, (&listed, place), &found);
-            }
+            (Page::List, _) => {}
             (Page::Lamps, _) => lamps::view(cx, &mut canvas, device, &self.lamps),
             (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
             (Page::Device | Page::Program, _) => {
@@ -221,8 +216,8 @@ impl Controllers {
         let runs = Runs::new(ControlRuns { device });
         Controllers {
             pages,
+            devices: List::default(),
             device,
-            found: Words::default(),
             table,
             cell,
             wall: None,
@@ -238,19 +233,6 @@ impl Controllers {
     /// The page that is shown.
     fn page(&self) -> &Page {
         self.pages.last().unwrap_or(&Page::List)
-    }
-
-    /// The devices that the filter lets through.
-    fn listed<'a>(&self, cx: &ViewContext<'a>) -> Vec<&'a DeviceDef> {
-        let words = |device: &DeviceDef| {
-            format!("{} {} {} {}", device.name, device.model, device.title, of_plant(&device.title))
-        };
-        cx.def().devices.iter().filter(|device| self.found.fit(&words(device))).collect()
-    }
-
-    /// The place of the selected device among these.
-    fn place(&self, listed: &[&DeviceDef]) -> usize {
-        listed.iter().position(|device| device.id == self.device).unwrap_or(0)
     }
 
     /// Are the devices shown as faceplates? So they are on a wide screen, unless the operator wants the table.
@@ -273,10 +255,11 @@ impl Controllers {
 
     pub fn show(&mut self, device: DeviceId) {
         let table = ParameterTable { defaults: self.table.defaults, ..ParameterTable::default() };
-        let found = std::mem::take(&mut self.found);
+        let mut devices = std::mem::take(&mut self.devices);
+        devices.select(device);
         let pages = self.pages.iter().take(1).filter(|first| **first != Page::Device).cloned();
         let pages = pages.chain([Page::Device]).collect();
-        *self = Controllers { wall: self.wall, found, ..Controllers::on_pages(pages, device, table) };
+        *self = Controllers { wall: self.wall, devices, ..Controllers::on_pages(pages, device, table) };
     }
 
     pub fn show_procedure(&mut self, id: ProcedureId) {
@@ -293,14 +276,14 @@ impl Controllers {
     }
 }
 
-/// The list of devices, and that of the parameters of one.
+/// The list of the parameters of a device.
 impl ListPage for Controllers {
     fn step(&mut self, cx: &ViewContext, motion: Motion) {
         Controllers::step(self, cx, motion);
     }
 
     fn back(&mut self, cx: &ViewContext) -> bool {
-        let filtered = !ListPage::filter(self).is_empty();
+        let filtered = !self.table.filter.is_empty();
         if filtered {
             self.set_filter(cx, "");
         }
@@ -308,26 +291,16 @@ impl ListPage for Controllers {
     }
 
     fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        let tag = match self.page() {
-            Page::Device => self.table.tag(cx, self.device).map(|tag| tag.id),
-            _ => self.device(cx).and_then(|device| device.faceplate.as_ref()).map(|faceplate| faceplate.pv),
-        };
+        let tag = self.table.tag(cx, self.device).map(|tag| tag.id);
         tag.into_iter().map(|tag| value::line(cx, tag)).collect()
     }
 
     fn filter(&self) -> String {
-        if *self.page() == Page::Device { &self.table.filter } else { &self.found }.to_string()
+        self.table.filter.to_string()
     }
 
     fn set_filter(&mut self, cx: &ViewContext, text: &str) {
-        let words = Words::parse(text);
-        if *self.page() == Page::Device {
-            (self.table.filter, self.table.selected) = (words, 0);
-            self.table.selected = if self.table.filter.is_empty() { 0 } else { self.table.best(cx, self.device) };
-            return;
-        }
-        self.found = words;
-        let listed = self.listed(cx);
-        self.device = listed.get(self.place(&listed)).map_or(self.device, |device| device.id);
+        (self.table.filter, self.table.selected) = (Words::parse(text), 0);
+        self.table.selected = if self.table.filter.is_empty() { 0 } else { self.table.best(cx, self.device) };
     }
 }

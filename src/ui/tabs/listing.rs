@@ -8,7 +8,7 @@ mod view;
 use std::{borrow::Cow, fmt::Debug, hash::Hash};
 
 pub use self::{
-    column::{Column, left, rest, right},
+    column::{Column, fitted, left, rest, right},
     keys::{all as all_keys, filter as ask_filter},
 };
 use crate::ui::tabs::prelude::*;
@@ -252,7 +252,8 @@ impl<L: Listing> List<L> {
         self.of.words(cx, row).map_or(cells, |words| vec![words])
     }
 
-    fn place(&self, rows: &[Cow<L::Row>]) -> usize {
+    /// Place of the selected row among these.
+    pub fn place(&self, rows: &[Cow<L::Row>]) -> usize {
         let id = self.selected.as_ref();
         id.and_then(|id| rows.iter().position(|row| L::holds(row, id))).unwrap_or(0)
     }

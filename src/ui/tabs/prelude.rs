@@ -13,7 +13,7 @@ pub(super) use ratatui::{
 pub(super) use super::{
     KeyTable, Keyed, Rows, Tab, TabView,
     draw::{self, around, open, row_style},
-    listing::{self, Column, Heading, List, ListPage, Listing, left, rest, right},
+    listing::{self, Column, Heading, List, ListPage, Listing, fitted, left, rest, right},
     periodic_query::{Answered, Asked, FromAnswer, PeriodicQuery, Queries, real},
     reports::period,
 };

@@ -24,7 +24,10 @@ use crate::{
 impl Controllers {
     /// The device that is shown or selected.
     pub(super) fn device<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a DeviceDef> {
-        cx.def().devices.get(self.device.index())
+        match self.page() {
+            Page::List => self.devices.selected(cx).and_then(|device| cx.def().devices.get(device.id.index())),
+            _ => cx.def().devices.get(self.device.index()),
+        }
     }
 
     /// In the footer only for a device that has what the key is for.
@@ -82,7 +85,8 @@ impl Controllers {
     }
 
     pub(super) fn why(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        let tags = self.table.rows(cx, self.device).into_iter().map(|tag| tag.id).collect();
+        let Some(device) = self.device(cx) else { return Vec::new() };
+        let tags = self.table.rows(cx, device.id).into_iter().map(|tag| tag.id).collect();
         Why::open(Why::new(tags, self.table.selected))
     }
 

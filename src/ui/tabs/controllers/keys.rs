@@ -43,7 +43,10 @@ const PROCEDURES_PAGE: Key = Key::new(
 .when(|_, cx| Offer::footer_if(!cx.def().procedures.is_empty() && !cx.is_past()));
 
 const LIST: &[Key] = &[
-    Key::change(code(KeyCode::Enter), "open", "faceplate and parameters of the device", |tab, _| tab.show(tab.device)),
+    Key::change(code(KeyCode::Enter), "open", "faceplate and parameters of the device", |tab, cx| {
+        let id = tab.device(cx).map(|device| device.id);
+        id.into_iter().for_each(|id| tab.show(id));
+    }),
     Key::change(char('v'), "view", "devices as faceplates or as a table", |tab, cx| {
         tab.wall = Some(!tab.is_wall(cx));
     }),

@@ -1,7 +1,10 @@
 //! The first page: every device in one row, with how it stands and what it controls.
 
 use super::device::{signal_mark, status_text};
-use crate::plant::{alarm::ActiveAlarm, def::Subject};
+use crate::plant::{
+    alarm::ActiveAlarm,
+    def::{Faceplate, Subject},
+};
 use crate::ui::{modal::faceplate::unknown_text, tabs::prelude::*};
 
 /// Widths that depend on the plant and the screen.
@@ -38,23 +41,68 @@ impl DeviceColumns {
     }
 }
 
-pub fn view(cx: &ViewContext, canvas: &mut Canvas, (devices, selected): (&[&DeviceDef], usize), found: &str) {
-    let theme = cx.theme;
-    let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
-    canvas.text(1, 0, &fit_words(&summary(cx, devices.len(), found), end), theme.normal());
-    let columns = DeviceColumns::new(cx, canvas.width());
-    put(canvas, 1, heading(&columns, theme.dim()));
-    let room = usize::from(bottom.saturating_sub(3)).max(1);
-    let first = first(selected, devices.len(), room);
-    for (y, n, device) in on_screen(devices, first, room) {
-        row(cx, canvas, y + 2, &columns, device, n == selected);
+/// All devices of the plant.
+#[derive(Debug, Default)]
+pub struct Devices;
+
+impl Listing for Devices {
+    type Answer = ();
+    type Row = DeviceDef;
+    type Id = DeviceId;
+
+    const TRENDS: bool = true;
+
+    fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
+        Heading::new("", t!("this plant has no devices")).words(summary(cx), cx.theme.normal())
     }
-    let below = devices.len().saturating_sub(first + room);
-    if below > 0 {
-        canvas.text_right(end, bottom.saturating_sub(1), &t!("{below} more ▼", below), theme.normal());
+
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Vec<Cow<'a, DeviceDef>> {
+        cx.def().devices.iter().map(Cow::Borrowed).collect()
     }
-    if let Some(device) = devices.get(selected) {
-        foot(cx, canvas, device);
+
+    fn id(device: &DeviceDef) -> DeviceId {
+        device.id
+    }
+
+    fn columns(&self, cx: &ViewContext, room: u16) -> Vec<Column<DeviceDef>> {
+        let widths = DeviceColumns::new(cx, room);
+        let value = DeviceColumns::VALUE;
+        vec![
+            left(widths.name, t!("device"), |_, device: &DeviceDef| device.name.clone())
+                .styled(|cx, _| cx.theme.strong()),
+            left(widths.model, t!("model"), |_, device| device.model.clone()),
+            left(widths.line, t!("unit"), place),
+            fitted(widths.state, t!("state"), |cx, device: &DeviceDef, room| {
+                let (mark, words, _) = state(cx, device.id);
+                if room < 4 { mark } else { fit(&format!("{mark} {words}"), room) }
+            })
+            .styled(|cx, device| state(cx, device.id).2),
+            left(DeviceColumns::ALARM, t!("alarm"), |cx, device: &DeviceDef| alarm(cx, device.id).0)
+                .styled(|cx, device| alarm(cx, device.id).1),
+            right(value, "PV", pv_text).styled(|cx, device| style_of(cx, device, pv)).runs_on(),
+            right(value, "SV", |cx, device| text_of(cx, device, sv)).styled(|cx, device| style_of(cx, device, sv)),
+            right(value, "MV", |cx, device| text_of(cx, device, mv)).styled(|cx, device| style_of(cx, device, mv)),
+            left(DeviceColumns::MODE, t!("mode"), mode),
+            right(DeviceColumns::REPLY, t!("reply"), reply).dim(),
+        ]
+    }
+
+    fn searched(&self, device: &DeviceDef) -> Option<String> {
+        Some(format!("{} {} {} {}", device.name, device.model, device.title, of_plant(&device.title)))
+    }
+
+    /// What it is for, and how it stands.
+    fn details(&self, cx: &ViewContext, device: &DeviceDef, _: Option<&()>) -> Vec<(String, Style)> {
+        let (words, style) = status_text(cx, device.id);
+        let title = of_plant(&device.title);
+        let gap = if title.is_empty() { "" } else { "  " };
+        vec![(format!("{}  {title}{gap}{words}", device.name), style)]
+    }
+
+    /// The curve of what it controls, over the last hour.
+    fn trend(&self, cx: &ViewContext, device: &DeviceDef) -> Option<(TagId, (Timestamp, Timestamp))> {
+        let pv = device.faceplate.as_ref()?.pv;
+        Some((pv, (cx.now.checked_sub(SignedDuration::from_hours(1)).unwrap_or(cx.now), cx.now)))
     }
 }
 
@@ -68,8 +116,8 @@ pub fn foot(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef) {
     canvas.text(x, bottom, &fit_words(&words, end.saturating_sub(x)), style);
 }
 
-/// `31 devices   2 not responding   1 with alarms`, behind the words of the filter; where it leaves none, that.
-pub fn summary(cx: &ViewContext, shown: usize, found: &str) -> String {
+/// `31 devices   2 not responding   1 with alarms`.
+fn summary(cx: &ViewContext) -> String {
     let devices = &cx.def().devices;
     let down = devices.iter().filter(|device| {
         let status = cx.snapshot.device(device.id);
@@ -85,39 +133,7 @@ pub fn summary(cx: &ViewContext, shown: usize, found: &str) -> String {
             words.push_str(&format!("   {count} {what}"));
         }
     }
-    if shown == 0 && !found.is_empty() {
-        words = t!("No matching entries.").to_owned();
-    }
-    if found.is_empty() { words } else { t!("only \"{filter}\", Esc shows all", filter = found) + "   " + &words }
-}
-
-/// The cells of a row from the left: text, width, style. What does not fit as a whole is left out, the last first.
-type Cells = Vec<(String, u16, Style)>;
-
-fn put(canvas: &mut Canvas, y: u16, cells: Cells) {
-    let mut x = 3;
-    for (text, wide, style) in cells {
-        if x + wide <= canvas.width() {
-            canvas.text(x, y, &fit(&text, wide), style);
-        }
-        x += wide + 1;
-    }
-}
-
-fn heading(columns: &DeviceColumns, style: Style) -> Cells {
-    let value = |name| (pad_left(name, DeviceColumns::VALUE), DeviceColumns::VALUE, style);
-    vec![
-        (t!("device").to_owned(), columns.name, style),
-        (t!("model").to_owned(), columns.model, style),
-        (t!("unit").to_owned(), columns.line, style),
-        (if columns.state > 3 { t!("state") } else { "" }.to_owned(), columns.state, style),
-        (t!("alarm").to_owned(), DeviceColumns::ALARM, style),
-        value("PV"),
-        value("SV"),
-        value("MV"),
-        (t!("mode").to_owned(), DeviceColumns::MODE, style),
-        (pad_left(t!("reply"), DeviceColumns::REPLY), DeviceColumns::REPLY, style),
-    ]
+    words
 }
 
 /// `L1/1`.
@@ -125,52 +141,40 @@ fn place(cx: &ViewContext, device: &DeviceDef) -> String {
     format!("{}/{}", cx.def().line(device.line).name, device.unit)
 }
 
-fn row(cx: &ViewContext, canvas: &mut Canvas, y: u16, columns: &DeviceColumns, device: &DeviceDef, selected: bool) {
-    let theme = cx.theme;
-    let mut cells = cells(cx, columns, device);
-    if selected {
-        // A selected row is reversed as a whole; the marks keep their shapes.
-        cells.iter_mut().for_each(|(_, _, style)| *style = theme.focus());
-        canvas.run(1, y, canvas.width().saturating_sub(2), ' ', theme.focus());
-        canvas.text(1, y, theme.pick("▸", ">"), theme.focus());
-    }
-    put(canvas, y, cells);
+fn pv(faceplate: &Faceplate) -> Option<TagId> {
+    Some(faceplate.pv)
 }
 
-fn cells(cx: &ViewContext, columns: &DeviceColumns, device: &DeviceDef) -> Cells {
-    let theme = cx.theme;
-    let (mark, words, style) = state(cx, device.id);
-    let mut cells = vec![
-        (device.name.clone(), columns.name, theme.strong()),
-        (device.model.clone(), columns.model, theme.normal()),
-        (place(cx, device), columns.line, theme.normal()),
-        (if columns.state > 3 { format!("{mark} {words}") } else { mark }, columns.state, style),
-    ];
-    let (text, style) = alarm(cx, device.id);
-    cells.push((text, DeviceColumns::ALARM, style));
+fn sv(faceplate: &Faceplate) -> Option<TagId> {
+    Some(faceplate.sv_to_show())
+}
+
+fn mv(faceplate: &Faceplate) -> Option<TagId> {
+    faceplate.mv
+}
+
+/// PV of a controller; of another device how many values are good.
+fn pv_text(cx: &ViewContext, device: &DeviceDef) -> String {
+    if device.faceplate.is_some() { text_of(cx, device, pv) } else { values_good(cx, device).0 }
+}
+
+fn text_of(cx: &ViewContext, device: &DeviceDef, tag: fn(&Faceplate) -> Option<TagId>) -> String {
+    let tag = device.faceplate.as_ref().and_then(tag);
+    let Some(shown) = tag.map(|tag| value::show(cx, tag)) else { return String::new() };
+    let whole = shown.with_unit();
+    if width(&whole) <= DeviceColumns::VALUE { whole } else { shown.bare(DeviceColumns::VALUE) }
+}
+
+fn style_of(cx: &ViewContext, device: &DeviceDef, tag: fn(&Faceplate) -> Option<TagId>) -> Style {
     match &device.faceplate {
-        Some(faceplate) => {
-            for tag in [Some(faceplate.pv), Some(faceplate.sv_to_show()), faceplate.mv] {
-                let shown = tag.map(|tag| value::show(cx, tag));
-                let text = shown.as_ref().map_or(String::new(), |shown| {
-                    let whole = shown.with_unit();
-                    if width(&whole) <= DeviceColumns::VALUE { whole } else { shown.bare(DeviceColumns::VALUE) }
-                });
-                let style = shown.map_or(theme.dim(), |shown| shown.style);
-                cells.push((pad_left(&text, DeviceColumns::VALUE), DeviceColumns::VALUE, style));
-            }
-            cells.push((mode(cx, device), DeviceColumns::MODE, theme.normal()));
-        }
-        None => {
-            let (words, style) = values_good(cx, device);
-            cells.push((words, DeviceColumns::VALUE * 3 + 2, style));
-            cells.push((String::new(), DeviceColumns::MODE, style));
-        }
+        Some(faceplate) => tag(faceplate).map_or(cx.theme.dim(), |tag| value::show(cx, tag).style),
+        None => values_good(cx, device).1,
     }
+}
+
+fn reply(cx: &ViewContext, device: &DeviceDef) -> String {
     let reply = cx.snapshot.device(device.id).response_time.filter(|_| answers(cx, device.id));
-    let reply = reply.map_or(String::new(), |reply| t!("{reply} ms", reply = reply.as_millis()));
-    cells.push((pad_left(&reply, DeviceColumns::REPLY), DeviceColumns::REPLY, theme.dim()));
-    cells
+    reply.map_or(String::new(), |reply| t!("{reply} ms", reply = reply.as_millis()))
 }
 
 /// `25 of 25 values good`. What is never read by itself says nothing about the device.

@@ -4,29 +4,37 @@ use super::*;
 
 impl Controllers {
     pub(super) fn step(&mut self, cx: &ViewContext, motion: Motion) {
+        if *self.page() == Page::List {
+            return self.step_in_list(cx, motion);
+        }
         let Some(device) = self.device(cx) else { return };
-        let listed = self.listed(cx);
-        let wall =
-            (*self.page() == Page::List && self.is_wall(cx)).then(|| wall::Grid::new(cx.size, cx.area, listed.len()));
-        let room = wall.map_or(usize::from(cx.area.height.saturating_sub(4)).max(1), |grid| grid.rows * grid.columns);
+        let room = usize::from(cx.area.height.saturating_sub(4)).max(1);
         let to = |at: usize, count: usize| motion.to(at, count, room);
         match self.pages.last_mut().unwrap_or(&mut Page::List) {
-            Page::List => {
-                let (at, count) = (self.place(&listed), listed.len());
-                let place = match (motion, wall) {
-                    (Motion::Rows(by), Some(grid)) => grid.step(at, by, count),
-                    (Motion::Rows(_) | Motion::Pages(_) | Motion::First | Motion::Last, _) => to(at, count),
-                };
-                self.device = listed.get(place).map_or(self.device, |device| device.id);
-            }
             Page::Device => self.table.selected = to(self.table.selected, self.table.rows(cx, device.id).len()),
             Page::Program => {
                 let steps = device.program.as_ref().map_or(0, |program| program.steps.len());
                 self.cell.row = to(self.cell.row, steps);
             }
             Page::Compare(compare) => compare.scroll(cx, device, motion, room),
-            Page::Sets | Page::Runs | Page::Procedures | Page::Lamps | Page::Overlay | Page::Guide(_) => {}
+            Page::List | Page::Sets | Page::Runs | Page::Procedures | Page::Lamps | Page::Overlay | Page::Guide(_) => {}
         }
+    }
+
+    /// To another row, or to another faceplate.
+    fn step_in_list(&mut self, cx: &ViewContext, motion: Motion) {
+        if !self.is_wall(cx) {
+            return self.devices.step(cx, motion);
+        }
+        let devices = self.devices.rows(cx);
+        let (at, count) = (self.devices.place(&devices), devices.len());
+        let grid = wall::Grid::new(cx.size, cx.area, count);
+        let place = match motion {
+            Motion::Rows(by) => grid.step(at, by, count),
+            Motion::Pages(_) | Motion::First | Motion::Last => motion.to(at, count, grid.rows * grid.columns),
+        };
+        let id = devices.get(place).map(|device| device.id);
+        id.into_iter().for_each(|id| self.devices.select(id));
     }
 
     /// Lays the marked runs, or those of the procedures, over each other, or goes back to their list.
@@ -50,8 +58,9 @@ impl Controllers {
 
     /// Selects the faceplate so many to the right.
     pub(super) fn neighbour(&mut self, cx: &ViewContext, by: isize) {
-        let listed = self.listed(cx);
-        let place = self.place(&listed).saturating_add_signed(by).min(listed.len().saturating_sub(1));
-        self.device = listed.get(place).map_or(self.device, |device| device.id);
+        let devices = self.devices.rows(cx);
+        let place = self.devices.place(&devices).saturating_add_signed(by).min(devices.len().saturating_sub(1));
+        let id = devices.get(place).map(|device| device.id);
+        id.into_iter().for_each(|id| self.devices.select(id));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     faceplate::{self, Bars},
-    list,
+    list::{self, Devices},
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -65,30 +65,28 @@ impl Grid {
     }
 }
 
-/// The tags whose curves it shows with this device selected.
-pub fn tags(cx: &ViewContext, devices: &[&DeviceDef], selected: usize) -> Vec<TagId> {
-    let (first, count) = Grid::new(cx.size, cx.area, devices.len()).seen(selected, devices.len());
+/// The tags whose curves it shows.
+pub fn tags(cx: &ViewContext, list: &List<Devices>) -> Vec<TagId> {
+    let devices = list.rows(cx);
+    let (first, count) = Grid::new(cx.size, cx.area, devices.len()).seen(list.place(&devices), devices.len());
     let seen = devices.iter().skip(first).take(count);
     seen.filter_map(|device| Some(device.faceplate.as_ref()?.pv)).collect()
 }
 
-pub fn view(
-    cx: &ViewContext,
-    canvas: &mut Canvas,
-    (devices, selected): (&[&DeviceDef], usize),
-    found: &str,
-    curves: &Answered<Vec<Series>>,
-) {
+pub fn view(cx: &ViewContext, canvas: &mut Canvas, list: &List<Devices>, curves: &Answered<Vec<Series>>) {
     let series = curves.value.as_deref().unwrap_or_default();
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
-    let area = canvas.area();
-    let grid = Grid::new(cx.size, area, devices.len());
-    let x = canvas.text(1, 0, &fit_words(&list::summary(cx, devices.len(), found), end), cx.theme.normal());
-    if let Some(trouble) = &curves.trouble {
-        let words = t!("no curves: {trouble}", trouble);
-        canvas.text(x + 2, 0, &fit_words(&words, end.saturating_sub(x + 14)), cx.theme.trouble());
+    let devices = list.rows(cx);
+    let (selected, grid) = (list.place(&devices), Grid::new(cx.size, canvas.area(), devices.len()));
+    let heading = list.view_heading(cx, canvas);
+    if devices.is_empty() {
+        return list.view_empty(cx, canvas, &heading);
     }
-    let rows: Vec<&[&DeviceDef]> = devices.chunks(grid.columns).collect();
+    if let Some(trouble) = &curves.trouble {
+        let words = fit_words(&t!("no curves: {trouble}", trouble), end / 2);
+        canvas.text(end.saturating_sub(width(&words) + 14), 0, &words, cx.theme.trouble());
+    }
+    let rows: Vec<&[Cow<DeviceDef>]> = devices.chunks(grid.columns).collect();
     let first = grid.seen(selected, devices.len()).0 / grid.columns;
     for (y, row, devices) in on_screen(&rows, first, grid.rows) {
         for (column, device) in devices.iter().enumerate() {

@@ -13,8 +13,10 @@ pub struct Column<R: ?Sized> {
     rank: u8,
     text: Text<R>,
     order: Option<fn(&R, &R) -> Ordering>,
-    /// It is read after the others.
-    pub is_dim: bool,
+    /// How its cell looks in a row that is not selected; `None`: as the row.
+    pub style: Option<fn(&ViewContext, &R) -> Style>,
+    /// A long text goes on over the empty cells behind it.
+    runs_on: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,6 +44,11 @@ pub fn right<R: ?Sized>(width: u16, head: &'static str, text: fn(&ViewContext, &
     Column { is_right: true, ..left(width, head, text) }
 }
 
+/// A column whose text is given its width.
+pub fn fitted<R: ?Sized>(width: u16, head: &'static str, text: fn(&ViewContext, &R, u16) -> String) -> Column<R> {
+    Column::new(Width::Fixed(width), head, Text::Fitting(text))
+}
+
 /// The last column, which has what the others leave, at least so much; its text is given the room.
 pub fn rest<R: ?Sized>(least: u16, head: &'static str, text: fn(&ViewContext, &R, u16) -> String) -> Column<R> {
     Column::new(Width::Rest(least), head, Text::Fitting(text))
@@ -49,7 +56,7 @@ pub fn rest<R: ?Sized>(least: u16, head: &'static str, text: fn(&ViewContext, &R
 
 impl<R: ?Sized> Column<R> {
     fn new(width: Width, head: &'static str, text: Text<R>) -> Column<R> {
-        Column { head, width, is_right: false, rank: 0, text, order: None, is_dim: false }
+        Column { head, width, is_right: false, rank: 0, text, order: None, style: None, runs_on: false }
     }
     /// A column of words that is as wide as the widest of its texts.
     pub fn words(head: &'static str, text: fn(&ViewContext, &R) -> String) -> Column<R> {
@@ -68,8 +75,21 @@ impl<R: ?Sized> Column<R> {
         Column { order: Some(order), ..self }
     }
 
+    /// The same with cells that look as this says.
+    pub fn styled(self, style: fn(&ViewContext, &R) -> Style) -> Column<R> {
+        Column { style: Some(style), ..self }
+    }
+    /// The same, read after the others.
     pub fn dim(self) -> Column<R> {
-        Column { is_dim: true, ..self }
+        self.styled(|cx, _| cx.theme.dim())
+    }
+    /// The same with texts that may go on over the empty cells behind it.
+    pub fn runs_on(self) -> Column<R> {
+        Column { runs_on: true, ..self }
+    }
+
+    fn aligned(&self, text: &str, width: u16) -> String {
+        if self.is_right { pad_left(text, width) } else { pad(text, width) }
     }
 
     /// Its text in so many cells.
@@ -116,18 +136,42 @@ pub fn placed<R: ?Sized>(
     columns
 }
 
-/// These columns in a row, with a blank between them.
-pub fn join<R: ?Sized>(columns: &[(Column<R>, u16)], text: impl Fn(&Column<R>, u16) -> String) -> String {
-    let cell = |(column, width): &(Column<R>, u16)| {
-        let text = text(column, *width);
-        if column.is_right { pad_left(&text, *width) } else { pad(&text, *width) }
+/// A row of headings. Of one that has no room for three letters nothing is shown.
+pub fn heads<R: ?Sized>(columns: &[(Column<R>, u16)]) -> String {
+    let cell = |(column, width): &(Column<R>, u16)| match (*width, text::width(column.head)) {
+        (room @ ..3, wanted) if room < wanted => " ".repeat(usize::from(room)),
+        _ => column.aligned(column.head, *width),
     };
     columns.iter().map(cell).collect::<Vec<_>>().join(" ")
 }
 
+/// The cells of a row, each with the cell of the screen that it begins at; between them is a blank.
+pub fn cells<R: ?Sized>(cx: &ViewContext, columns: &[(Column<R>, u16)], row: &R) -> Vec<(u16, String)> {
+    let texts: Vec<String> = columns.iter().map(|(column, width)| column.text(cx, row, *width)).collect();
+    let (mut cells, mut x, mut taken) = (Vec::with_capacity(columns.len()), 0, 0);
+    for (n, ((column, width), text)) in columns.iter().zip(&texts).enumerate() {
+        let behind = columns.iter().zip(&texts).skip(n + 1).take_while(|(_, text)| text.is_empty());
+        let free: u16 = behind.map(|((_, width), _)| width + 1).sum();
+        let runs = column.runs_on && *width < text::width(text) && 0 < free;
+        let cell = match (runs, x < taken) {
+            (true, _) => pad(text, text::width(text).min(width + free)),
+            // It is covered by the one that runs on.
+            (false, true) => String::new(),
+            (false, false) => column.aligned(text, *width),
+        };
+        taken = taken.max(x + text::width(&cell));
+        cells.push((x, cell));
+        x += width + 1;
+    }
+    cells
+}
+
 /// Numbers by their size, `9:05` before `10:01`, other texts by their letters; what is no figure comes last.
 fn natural(a: &str, b: &str) -> Ordering {
-    let number = |text: &str| text.trim_start_matches(['>', '<', '≥', '≤', ' ']).parse::<f64>().ok();
+    let number = |text: &str| {
+        let figure = text.trim_start_matches(['>', '<', '≥', '≤', ' ']).split_whitespace().next()?;
+        figure.parse::<f64>().ok()
+    };
     match (number(a), number(b)) {
         (Some(a), Some(b)) => a.total_cmp(&b),
         _ => parts(a).cmp(&parts(b)),
@@ -161,6 +205,7 @@ mod tests {
             assert_eq!(texts, sorted);
         };
         check(&["-2.5", "-1", "0.5", ">1.2", "10"]);
+        check(&["-5.0 °C", "-1 °C", "20.5 °C", "100.0 °C"]);
         check(&["9:05", "10:01", "10:15", "never"]);
         check(&["anna", "Berta", "carl"]);
         check(&["hot-water-9", "hot-water-10"]);

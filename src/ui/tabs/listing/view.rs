@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use super::{
     Heading, List, Listing,
-    column::{join, placed},
+    column::{self, placed},
 };
 use crate::ui::tabs::prelude::*;
 
@@ -15,22 +15,16 @@ impl<L: Listing> List<L> {
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let (theme, width, height) = (cx.theme, canvas.width(), canvas.height());
         let rows = self.rows(cx);
-        let heading = self.of.heading(cx, self.answered.value.as_ref());
-        self.draw_heading(cx, canvas, &heading, rows.len());
+        let heading = self.view_heading(cx, canvas);
         if let Some((words, style)) = self.of.foot(cx) {
             canvas.text(1, height.saturating_sub(1), &fit_words(&words, width.saturating_sub(2)), style);
         }
         let columns = placed(self.of.columns(cx, width), width.saturating_sub(1), |column| {
             rows.iter().map(|row| text::width(&column.text(cx, row, u16::MAX))).max().unwrap_or(0)
         });
-        let heads = join(&columns, |column, _| column.head.to_owned());
-        canvas.text(1, 1, &fit(heads.trim_end(), width.saturating_sub(1)), theme.dim());
+        canvas.text(1, 1, &fit(column::heads(&columns).trim_end(), width.saturating_sub(1)), theme.dim());
         if rows.is_empty() {
-            let words = self.why_empty(cx, &heading);
-            for (y, line) in (3..).zip(wrap(&words, width.saturating_sub(4))) {
-                canvas.text(2, y, &line, theme.dim());
-            }
-            return;
+            return self.view_empty(cx, canvas, &heading);
         }
         let (place, room, head) = (self.place(&rows), self.room(cx, &rows), self.head(cx));
         let begin = first(place, rows.len(), room);
@@ -41,11 +35,15 @@ impl<L: Listing> List<L> {
                 (false, false) => " ",
             };
             let style = if n == place { theme.focus() } else { self.of.style(cx, row) };
-            let words = self.of.words(cx, row);
-            let text = words.unwrap_or_else(|| join(&columns, |column, width| column.text(cx, row, width)));
-            canvas.text(0, y + head, &pad(&fit(&format!("{mark}{text}"), width), width), style);
-            if let Some((column, wide)) = columns.first().filter(|(column, _)| column.is_dim && n != place) {
-                canvas.text(1, y + head, &fit(&column.text(cx, row, *wide), *wide), theme.dim());
+            let y = y + head;
+            canvas.text(0, y, &pad(mark, width), style);
+            if let Some(words) = self.of.words(cx, row) {
+                canvas.text(1, y, &fit(&words, width.saturating_sub(1)), style);
+                continue;
+            }
+            for ((x, text), (column, _)) in column::cells(cx, &columns, row).iter().zip(&columns) {
+                let own = column.style.filter(|_| n != place).map(|own| own(cx, row));
+                canvas.text(x + 1, y, &fit(text, width.saturating_sub(x + 1)), own.unwrap_or(style));
             }
         }
         let shown = to_u16(room.min(rows.len()));
@@ -64,8 +62,18 @@ impl<L: Listing> List<L> {
         }
     }
 
-    fn draw_heading(&self, cx: &ViewContext, canvas: &mut Canvas, heading: &Heading, count: usize) {
-        let (theme, width) = (cx.theme, canvas.width());
+    /// Why there is no row.
+    pub fn view_empty(&self, cx: &ViewContext, canvas: &mut Canvas, heading: &Heading) {
+        let words = self.why_empty(cx, heading);
+        for (y, line) in (3..).zip(wrap(&words, canvas.width().saturating_sub(4))) {
+            canvas.text(2, y, &line, cx.theme.dim());
+        }
+    }
+
+    /// Its first row, also above another picture of the same rows.
+    pub fn view_heading<'a>(&'a self, cx: &ViewContext<'a>, canvas: &mut Canvas) -> Heading<'a> {
+        let heading = self.of.heading(cx, self.answered.value.as_ref());
+        let (theme, width, count) = (cx.theme, canvas.width(), self.rows(cx).len());
         let end = width.saturating_sub(1);
         let x = canvas.text(1, 0, &fit(&heading.title, end.saturating_sub(1)), theme.strong());
         let x = if heading.title.is_empty() { x } else { x + 2 };
@@ -98,6 +106,7 @@ impl<L: Listing> List<L> {
         let right = text::width(&heading.right);
         canvas.text_right(end, 0, &heading.right, theme.dim());
         canvas.text(x, 0, &fit(&words.0, end.saturating_sub(x + if 0 < right { right + 1 } else { 0 })), words.1);
+        heading
     }
 
     fn why_empty(&self, cx: &ViewContext, heading: &Heading) -> String {

@@ -21,7 +21,10 @@ fn devices_are_found_by_their_names_as_table_and_as_faceplates() {
         screen(&mut model, width, 50);
         type_keys(&mut model, "4/tic-31");
         let shown = screen(&mut model, width, 50);
-        assert!(shown.contains("only \"tic-31\"") && shown.contains("TIC-31") && !shown.contains("TIC-30"), "{shown}");
+        assert!(
+            shown.contains("\"tic-31\": 1 of 31") && shown.contains("TIC-31") && !shown.contains("TIC-30"),
+            "{shown}"
+        );
         type_keys(&mut model, "⏎⏎");
         assert!(screen(&mut model, width, 50).contains("‹ TIC-31 ›"));
         type_keys(&mut model, "⎋⎋");
