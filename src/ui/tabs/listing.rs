@@ -2,11 +2,13 @@
 //! is said where there is nothing to show, and that keys act only on what was drawn are the [`List`]'s.
 
 mod column;
+mod filter;
 mod keys;
 mod view;
 
 use std::{borrow::Cow, fmt::Debug, hash::Hash};
 
+use self::filter::Filter;
 pub use self::{
     column::{Column, fitted, left, rest, right},
     keys::{all as all_keys, filter as ask_filter},
@@ -158,7 +160,7 @@ pub trait ListPage {
     fn set_filter(&mut self, cx: &ViewContext, text: &str);
     /// What may be typed, while nothing is.
     fn filter_hint(&self) -> &'static str {
-        t!("words that a row must have; all of them")
+        t!("words that a row must have, or a figure: minutes > 30")
     }
     /// The list that keys act on.
     fn fingerprint(&self, _cx: &ViewContext) -> Rows {
@@ -202,7 +204,8 @@ pub struct List<L: Listing> {
     /// `None`: the first one, whichever that is.
     selected: Option<L::Id>,
     marked: Vec<L::Id>,
-    filter: Words,
+    /// As it is typed.
+    filter: String,
     /// The column that it is sorted by, and whether the other way round.
     order: Option<usize>,
     reversed: bool,
@@ -216,7 +219,7 @@ impl<L: Listing + Default> Default for List<L> {
 
 impl<L: Listing> List<L> {
     pub fn new(of: L) -> List<L> {
-        let (answered, filter) = (Answered::default(), Words::default());
+        let (answered, filter) = (Answered::default(), String::new());
         List { of, answered, selected: None, marked: Vec::new(), filter, order: None, reversed: false }
     }
 
@@ -229,8 +232,11 @@ impl<L: Listing> List<L> {
     pub fn rows<'a>(&'a self, cx: &ViewContext<'a>) -> Vec<Cow<'a, L::Row>> {
         let mut rows = self.all(cx);
         if !self.filter.is_empty() {
+            let columns = self.columns(cx);
+            let filter = Filter::parse(&self.filter, &columns.iter().map(|column| column.head).collect::<Vec<_>>());
             let text = |row: &L::Row| self.of.searched(row).unwrap_or_else(|| self.cells(cx, row).join(" "));
-            rows.retain(|row| self.filter.fit(&text(row)));
+            rows.retain(|row| filter.fits_figures(cx, &columns, row));
+            rows.retain(|row| !filter.has_words() || filter.fits_text(&text(row)));
         }
         let columns = self.order.map(|_| self.columns(cx)).unwrap_or_default();
         if let Some(column) = self.order.and_then(|order| columns.get(order)) {
@@ -262,6 +268,11 @@ impl<L: Listing> List<L> {
         let mut rows = self.rows(cx);
         let place = self.place(&rows);
         (place < rows.len()).then(|| rows.swap_remove(place))
+    }
+
+    /// Selects the first row again, whichever that is.
+    pub fn rewind(&mut self) {
+        self.selected = None;
     }
 
     pub fn select(&mut self, id: L::Id) {
@@ -302,7 +313,9 @@ impl<L: Listing> ListPage for List<L> {
             return true;
         }
         if !self.filter.is_empty() {
-            self.filter = Words::default();
+            // What was found stays selected among all the others.
+            self.selected = self.selected(cx).map(|row| L::id(&row));
+            self.filter.clear();
         } else if self.order.is_some() {
             (self.order, self.reversed) = (None, false);
         } else {
@@ -323,11 +336,11 @@ impl<L: Listing> ListPage for List<L> {
     }
 
     fn filter(&self) -> String {
-        self.filter.to_string()
+        self.filter.clone()
     }
 
     fn set_filter(&mut self, _cx: &ViewContext, text: &str) {
-        self.filter = Words::parse(text);
+        self.filter = text.trim().to_owned();
     }
 
     fn fingerprint(&self, cx: &ViewContext) -> Rows {

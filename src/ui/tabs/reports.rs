@@ -70,9 +70,9 @@ const KEYS: &[Key] = &[
     Key::change(char('d'), "", "show or hide the alarm events that were not annunciated", |reports, _| {
         reports.quiet = !reports.quiet;
     }),
-    Key::change(char('u'), "", "refresh the figures", |reports, _| reports.report.query.want()),
+    Key::change(char('u'), "", "refresh the figures", |reports, _| reports.report.answered.query.want()),
     Key::new(char('w'), "", "explain its current values", |reports, cx| {
-        let rows = reports.report.value.iter().flat_map(|report| &report.tags);
+        let rows = reports.report.answered.value.iter().flat_map(|report| &report.tags);
         Why::open(Why::of_all(cx, rows.filter_map(|row| cx.def().tag_named(&row.tag)).collect()))
     }),
 ];
@@ -110,14 +110,13 @@ pub struct Reports {
     period: Option<Period>,
     /// No period is chosen: the running shift is shown.
     follow: bool,
-    /// The report of that very period.
-    report: Answered<Box<ShiftReport>>,
+    /// The report of that very period, and the list of its record.
+    report: List<RecordRows>,
     /// The row whose tag has the chart, and its curve.
     charted: usize,
     curve: Answered<Vec<Series>>,
     batches: Batches,
     made: AutomaticReportsPage,
-    rows: RecordRows,
     dialect: CsvDialect,
     format: &'static dyn ReportFormat,
     /// The report as text, while that is shown.
@@ -138,12 +137,11 @@ impl TabView for Reports {
             page: Page::Report,
             period: period::at(&snapshot.def, snapshot.at),
             follow: true,
-            report: Answered::default(),
+            report: List::default(),
             charted: 0,
             curve: Answered::default(),
             batches: Batches::new(BatchReports),
             made: AutomaticReportsPage::default(),
-            rows: RecordRows::default(),
             dialect: snapshot.def.report.csv,
             format: report::FORMATS[0],
             preview: None,
@@ -166,7 +164,7 @@ impl TabView for Reports {
     }
 
     fn queries(&mut self) -> Queries<'_> {
-        let own: Queries = vec![&mut self.report, &mut self.curve];
+        let own: Queries = vec![&mut self.report.answered, &mut self.curve];
         own.into_iter().chain(self.batches.queries()).chain(self.made.queries()).collect()
     }
 
@@ -189,10 +187,6 @@ impl TabView for Reports {
     }
 
     fn on_text(&mut self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
-        if self.page == Page::Rows {
-            self.rows.on_text(cx, self.report.value.as_deref(), text)?;
-            return Ok(Vec::new());
-        }
         let typed = period::typed(cx.def(), text, cx.now)?;
         self.show(Some(typed));
         Ok(self.ask(cx))
@@ -214,7 +208,8 @@ impl TabView for Reports {
 
     fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
         match self.page {
-            Page::Report | Page::Rows => None,
+            Page::Report => None,
+            Page::Rows => Some(&self.report),
             Page::Batches => self.batches.shown(),
             Page::Made => self.made.list(),
         }
@@ -222,7 +217,8 @@ impl TabView for Reports {
 
     fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
         match self.page {
-            Page::Report | Page::Rows => None,
+            Page::Report => None,
+            Page::Rows => Some(&mut self.report),
             Page::Batches => self.batches.shown_mut(),
             Page::Made => self.made.list_mut(),
         }
@@ -233,7 +229,7 @@ impl TabView for Reports {
             return true;
         }
         match self.page {
-            Page::Report => self.preview.take().is_some() || self.report.query.cancel(cx),
+            Page::Report => self.preview.take().is_some() || self.report.answered.query.cancel(cx),
             Page::Batches if self.batches.overlay.take().is_some() => true,
             Page::Made if self.made.open.take().is_some() => true,
             Page::Rows | Page::Batches | Page::Made => {
@@ -282,13 +278,13 @@ impl Reports {
 
     /// The chart is of the tag so many rows further on.
     fn next_tag(&mut self, by: isize) {
-        let rows = self.report.value.as_ref().map_or(0, |report| report.tags.len());
+        let rows = self.report.answered.value.as_ref().map_or(0, |report| report.tags.len());
         (self.charted, self.curve) = (around(self.charted, by, rows), Answered::default());
     }
 
     /// Sets the report that is shown as text, if it is wanted.
     fn set_preview(&mut self, cx: &ViewContext) {
-        if let (Some(lines), Some(report)) = (&mut self.preview, &self.report.value) {
+        if let (Some(lines), Some(report)) = (&mut self.preview, &self.report.answered.value) {
             let document = report::content::document(report, cx.def(), report::language(cx.def()).locale());
             *lines = report::text::lines(&document, usize::from(cx.area.width.saturating_sub(2)).clamp(60, 120));
         }
@@ -298,15 +294,15 @@ impl Reports {
     fn show(&mut self, period: Option<Period>) {
         self.preview.iter_mut().for_each(Vec::clear);
         (self.period, self.follow, self.scroll) = (period, false, Scroll::default());
-        self.rows.rewind();
-        (self.export, self.report, self.curve) = (Export::Not, Answered::default(), Answered::default());
+        self.report.rewind();
+        (self.export, self.curve, self.report.answered) = (Export::Not, Answered::default(), Answered::default());
     }
 
     /// The tag that has the chart, and the part of the period that is over, where there is room for it.
     fn chart(&self, cx: &ViewContext) -> Option<(Pen, View)> {
         let free = self.page == Page::Report && self.preview.is_none();
         let room = view::chart_columns(cx).filter(|_| free)?;
-        let rows = &self.report.value.as_ref()?.tags;
+        let rows = &self.report.answered.value.as_ref()?.tags;
         let tag = cx.def().tag_named(&rows.get(self.charted)?.tag)?;
         let period = self.period.as_ref()?;
         let view = View::since(period.from, period.to.min(cx.now), chart::dots(cx.theme, room, 1));
@@ -316,7 +312,7 @@ impl Reports {
     fn scroll(&mut self, cx: &ViewContext, motion: Motion) {
         let rows = usize::from(cx.area.height.saturating_sub(3)).max(1);
         let figures = |report: &ShiftReport| view::lines(cx, report, None, false, self.quiet).len();
-        let lines = match (&self.preview, &self.report.value) {
+        let lines = match (&self.preview, &self.report.answered.value) {
             (Some(lines), _) => lines.len(),
             (None, Some(report)) => figures(report),
             (None, None) => 0,
@@ -330,7 +326,7 @@ impl Reports {
 
     fn ask(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         // The past stays as it is; but a report that was read while its shift still ran is not the last word.
-        let closed = self.report.value.as_ref().is_some_and(|report| report.until >= report.period.to);
+        let closed = self.report.answered.value.as_ref().is_some_and(|report| report.until >= report.period.to);
         let every = if closed && !self.is_running(cx.now) { SignedDuration::MAX } else { real(cx, EVERY_S) };
         match self.page {
             Page::Report | Page::Rows => {}
@@ -338,7 +334,7 @@ impl Reports {
             Page::Made => return self.made.ask(cx),
         }
         let Some(period) = self.period.clone() else { return Vec::new() };
-        let query = self.report.ask(cx, Tab::Reports, every, real(cx, TIMEOUT_S), Query::Report { period });
+        let query = self.report.answered.ask(cx, Tab::Reports, every, real(cx, TIMEOUT_S), Query::Report { period });
         let curve = self.chart(cx).and_then(|(pen, view)| {
             let query = Query::Series { tags: vec![pen.tag], from: view.from, to: view.to, buckets: view.columns };
             self.curve.ask(cx, Tab::Reports, every, real(cx, TIMEOUT_S), query)

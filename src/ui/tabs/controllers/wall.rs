@@ -78,7 +78,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, list: &List<Devices>, curves:
     let (end, bottom) = (canvas.width().saturating_sub(1), canvas.height().saturating_sub(1));
     let devices = list.rows(cx);
     let (selected, grid) = (list.place(&devices), Grid::new(cx.size, canvas.area(), devices.len()));
-    let heading = list.view_heading(cx, canvas);
+    let heading = list.view_heading(cx, canvas, devices.len());
     if devices.is_empty() {
         return list.view_empty(cx, canvas, &heading);
     }

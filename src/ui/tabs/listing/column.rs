@@ -166,13 +166,14 @@ pub fn cells<R: ?Sized>(cx: &ViewContext, columns: &[(Column<R>, u16)], row: &R)
     cells
 }
 
+/// The figure that a text begins with.
+pub fn figure(text: &str) -> Option<f64> {
+    text.trim_start_matches(['>', '<', '≥', '≤', ' ']).split_whitespace().next()?.parse().ok()
+}
+
 /// Numbers by their size, `9:05` before `10:01`, other texts by their letters; what is no figure comes last.
 fn natural(a: &str, b: &str) -> Ordering {
-    let number = |text: &str| {
-        let figure = text.trim_start_matches(['>', '<', '≥', '≤', ' ']).split_whitespace().next()?;
-        figure.parse::<f64>().ok()
-    };
-    match (number(a), number(b)) {
+    match (figure(a), figure(b)) {
         (Some(a), Some(b)) => a.total_cmp(&b),
         _ => parts(a).cmp(&parts(b)),
     }

@@ -15,7 +15,7 @@ impl<L: Listing> List<L> {
     pub fn view(&self, cx: &ViewContext, canvas: &mut Canvas) {
         let (theme, width, height) = (cx.theme, canvas.width(), canvas.height());
         let rows = self.rows(cx);
-        let heading = self.view_heading(cx, canvas);
+        let heading = self.view_heading(cx, canvas, rows.len());
         if let Some((words, style)) = self.of.foot(cx) {
             canvas.text(1, height.saturating_sub(1), &fit_words(&words, width.saturating_sub(2)), style);
         }
@@ -71,9 +71,9 @@ impl<L: Listing> List<L> {
     }
 
     /// Its first row, also above another picture of the same rows.
-    pub fn view_heading<'a>(&'a self, cx: &ViewContext<'a>, canvas: &mut Canvas) -> Heading<'a> {
+    pub fn view_heading<'a>(&'a self, cx: &ViewContext<'a>, canvas: &mut Canvas, count: usize) -> Heading<'a> {
         let heading = self.of.heading(cx, self.answered.value.as_ref());
-        let (theme, width, count) = (cx.theme, canvas.width(), self.rows(cx).len());
+        let (theme, width) = (cx.theme, canvas.width());
         let end = width.saturating_sub(1);
         let x = canvas.text(1, 0, &fit(&heading.title, end.saturating_sub(1)), theme.strong());
         let x = if heading.title.is_empty() { x } else { x + 2 };
@@ -90,8 +90,7 @@ impl<L: Listing> List<L> {
         };
         let gap = |words: &str| if words.is_empty() { "" } else { "   " };
         if !self.filter.is_empty() {
-            let typed = self.filter.to_string();
-            let filter = t!("\"{typed}\": {count} of {all}, / changes it", typed, count, all);
+            let filter = t!("\"{typed}\": {count} of {all}, / changes it", typed = self.filter, count, all);
             words.0 = format!("{filter}{}{}", gap(&words.0), words.0);
         }
         let columns = self.order.map(|_| self.of.columns(cx, width)).unwrap_or_default();

@@ -15,7 +15,7 @@ pub const KEYS: &[key_table::Key<Reports>] = &[key_table::Key::new(
     char('x'),
     "correct",
     "correct what a counter counted, with a reason",
-    |reports: &mut Reports, cx| correct(cx, reports.report.value.as_deref(), reports.charted),
+    |reports: &mut Reports, cx| correct(cx, reports.report.answered.value.as_deref(), reports.charted),
 )
 .needs(Role::Supervisor)
 .when(|_, cx| Offer::only_if(of_plant(cx).next().is_some()))];

@@ -29,7 +29,7 @@ impl Reports {
     /// Writes exactly the figures that are shown.
     pub(super) fn export(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         let style = Style { csv: self.dialect, ..Style::of(cx.def()) };
-        let Some(report) = &self.report.value else { return self.send(None) };
+        let Some(report) = &self.report.answered.value else { return self.send(None) };
         match report::render(self.format, report, cx.def(), &style) {
             Ok(bytes) => self.send(Some((self.path(cx, report), bytes))),
             Err(why) => {

@@ -317,7 +317,7 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     stand.press("e");
     let (path, bytes) = stand.saved.pop().expect("the key writes");
     assert_eq!(path, PathBuf::from("reports/2026-11-21-afternoon-until-1402.csv"));
-    let (def, shown) = (&stand.model.snapshot.def, stand.model.tabs.reports.report.value.as_ref());
+    let (def, shown) = (&stand.model.snapshot.def, stand.model.tabs.reports.report.answered.value.as_ref());
     let csv = shown.map(|shown| report::render(report::FORMATS[0], shown, def, &report::Style::of(def)));
     assert_eq!(Some(Ok(bytes)), csv);
     stand.send(Msg::Saved(Some(Tab::Reports), Ok(path)));

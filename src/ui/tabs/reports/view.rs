@@ -29,7 +29,7 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
     draw_title(reports, cx, period, &mut canvas);
     let rows = height.saturating_sub(3);
     let left = columns.saturating_sub(chart_columns(cx).map_or(0, |beside| beside + 1));
-    match (&reports.report.value, &reports.preview) {
+    match (&reports.report.answered.value, &reports.preview) {
         (Some(report), Some(lines)) => {
             let first = reports.scroll.first(lines.len(), usize::from(rows + 1));
             for (y, line) in (1..=rows + 1).zip(lines.iter().skip(first)) {
@@ -54,9 +54,10 @@ pub fn draw(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: Rect) 
             draw_export(reports, cx, report, hidden, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
         }
         (None, _) => {
-            let waiting = reports.report.query.shown_waiting(cx);
-            let words = reports.report.trouble.as_deref().or(waiting.as_deref()).unwrap_or(t!("collecting data"));
-            let style = if reports.report.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
+            let waiting = reports.report.answered.query.shown_waiting(cx);
+            let words =
+                reports.report.answered.trouble.as_deref().or(waiting.as_deref()).unwrap_or(t!("collecting data"));
+            let style = if reports.report.answered.trouble.is_some() { cx.theme.trouble() } else { cx.theme.dim() };
             canvas.text_centred(height / 2, words, style);
         }
     }
@@ -68,18 +69,9 @@ pub fn draw_rows(reports: &Reports, cx: &ViewContext, frame: &mut Frame, area: R
     let (columns, height) = (canvas.width(), canvas.height());
     let Some(period) = &reports.period else { return };
     draw_title(reports, cx, period, &mut canvas);
-    let mut below = canvas.part(0, 1, columns, height.saturating_sub(1));
-    match (&reports.report.value, &reports.export) {
-        (Some(report), export) => {
-            reports.rows.view(cx, &mut below, report);
-            if *export != Export::Not {
-                draw_export(reports, cx, report, 0, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
-            }
-        }
-        (None, _) => {
-            let words = reports.report.trouble.as_deref().unwrap_or(t!("collecting data"));
-            below.text_centred(height / 2, words, cx.theme.dim());
-        }
+    reports.report.view(cx, &mut canvas.part(0, 1, columns, height.saturating_sub(2)));
+    if let Some(report) = reports.report.answered.value.as_deref().filter(|_| reports.export != Export::Not) {
+        draw_export(reports, cx, report, 0, &mut canvas.part(0, height.saturating_sub(1), columns, 1));
     }
 }
 
@@ -112,8 +104,8 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
     let x = canvas.text(x, 0, &period::label(&period.name), theme.strong());
     let x = canvas.text(x + 3, 0, &period::span(period, zone), theme.normal());
     let running = reports.is_running(cx.now);
-    let until = reports.report.value.as_ref().map_or(cx.now, |report| report.until);
-    let state = match (running, &reports.report.value) {
+    let until = reports.report.answered.value.as_ref().map_or(cx.now, |report| report.until);
+    let state = match (running, &reports.report.answered.value) {
         (true, _) => t!("RUNNING, until now {local}", local = cx.local(until, "%H:%M:%S")),
         (false, Some(report)) if report.until < report.period.to => {
             t!("figures until {local} only", local = cx.local(until, "%H:%M:%S"))
@@ -122,12 +114,12 @@ fn draw_title(reports: &Reports, cx: &ViewContext, period: &Period, canvas: &mut
     };
     let state = fit_words(&state, canvas.width().saturating_sub(x + 3));
     let x = canvas.text(x + 3, 0, &state, if running { theme.strong() } else { theme.normal() });
-    if reports.report.value.is_some() {
+    if reports.report.answered.value.is_some() {
         let right = canvas.width().saturating_sub(1);
-        match &reports.report.trouble {
+        match &reports.report.answered.trouble {
             Some(trouble) => canvas.text_right(right, 0, &fit(trouble, right.saturating_sub(x + 2)), theme.trouble()),
             None => {
-                let waiting = reports.report.query.shown_waiting(cx).unwrap_or_default();
+                let waiting = reports.report.answered.query.shown_waiting(cx).unwrap_or_default();
                 canvas.text_right(right, 0, &fit(&waiting, right.saturating_sub(x + 2)), theme.dim());
             }
         }

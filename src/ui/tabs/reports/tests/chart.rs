@@ -39,9 +39,9 @@ fn no_curve_is_asked_for_that_is_not_shown() {
 fn a_wide_screen_has_the_whole_state_of_an_alarm() {
     let mut stand = Stand::new(Theme::FULL, 200, 60);
     stand.answer(true);
-    let mut report = stand.model.tabs.reports.report.value.take().expect("answered");
+    let mut report = stand.model.tabs.reports.report.answered.value.take().expect("answered");
     report.alarms[0].event = AlarmEvent::SuppressedByDesign;
-    stand.model.tabs.reports.report.value = Some(report);
+    stand.model.tabs.reports.report.answered.value = Some(report);
     let shown = stand.screen();
     assert!(shown.contains("alarms, 1 not annunciated hidden, d shows them"), "{shown}");
     stand.press("d");
