@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// The number of this protocol; goes up with every change of a message.
-pub const PROTOCOL: u32 = 31;
+pub const PROTOCOL: u32 = 32;
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// A rejection that ends so may not be one a moment later: the terminal tries again by itself.

@@ -115,6 +115,13 @@ impl Identification {
         }
     }
 
+    /// An operator wants to know what a device is: so does its profile, again.
+    pub fn ask_again(&mut self, device: DeviceId, now: Timestamp) {
+        if let Some(reading) = self.devices.get_mut(&device).filter(|reading| reading.hangups == 0) {
+            reading.from = reading.from.min(now);
+        }
+    }
+
     /// A device was given up: another one may come back.
     pub fn lost(&mut self, device: DeviceId) {
         if let Some(reading) = self.devices.get_mut(&device) {

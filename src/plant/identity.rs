@@ -1,6 +1,6 @@
 //! What a device says of itself by function 43/14 (V1.1b3, 6.21), and what a profile compares it with.
 
-use std::{cmp::Ordering, fmt};
+use std::{cmp::Ordering, collections::BTreeMap, fmt, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 
@@ -40,6 +40,45 @@ impl fmt::Display for IdentityObject {
             Some(name) => f.write_str(name),
             None => write!(f, "object_0x{:02X}", self.0),
         }
+    }
+}
+
+/// What devices say of themselves, as far as it was read since they were last lost. Shared with snapshots.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Identities(Arc<BTreeMap<DeviceId, Vec<(IdentityObject, String)>>>);
+
+impl Identities {
+    /// What a device says as this object.
+    pub fn said(&self, device: DeviceId, object: IdentityObject) -> Option<&str> {
+        let objects = self.0.get(&device)?;
+        objects.iter().find(|(of, _)| *of == object).map(|(_, text)| text.as_str())
+    }
+
+    /// A device says this, or nothing; is that new?
+    pub fn set(&mut self, device: DeviceId, objects: Vec<(IdentityObject, String)>) -> bool {
+        if self.0.get(&device).map_or(&[][..], Vec::as_slice) == objects {
+            return false;
+        }
+        let all = Arc::make_mut(&mut self.0);
+        if objects.is_empty() {
+            all.remove(&device)
+        } else {
+            all.insert(device, objects)
+        };
+        true
+    }
+
+    /// It is gone.
+    pub fn forget(&mut self, device: DeviceId) {
+        if self.0.contains_key(&device) {
+            Arc::make_mut(&mut self.0).remove(&device);
+        }
+    }
+
+    /// Takes over what was known under another definition of the devices that are the same; `was` is the id of before.
+    pub fn take_over(&mut self, before: &Identities, devices: impl Iterator<Item = (DeviceId, DeviceId)>) {
+        let known = devices.filter_map(|(now, was)| Some((now, before.0.get(&was)?.clone())));
+        Arc::make_mut(&mut self.0).extend(known);
     }
 }
 

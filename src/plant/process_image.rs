@@ -9,16 +9,14 @@ use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 
-use self::{
-    fault_effect::{FaultEffect, effect_of},
-    presence::Identities,
-};
+use self::fault_effect::{FaultEffect, effect_of};
 use super::{
     calculation::Calculator,
     def::{PlantDef, TagId},
     exact::Exact,
     fault::Fault,
     heard::{Heard, Stated},
+    identity::Identities,
     record::Record,
     sample::{Cause, Quality, Sample},
     scale,
@@ -57,7 +55,7 @@ pub struct ProcessImage {
     /// Tags whose value depends on this one (decimals, fault word), by tag.
     dependents: Vec<Vec<TagId>>,
     calculator: Calculator,
-    identities: Identities,
+    pub identities: Identities,
 }
 
 /// A raw number, when it was read, and what has made it uncertain since.

@@ -17,6 +17,7 @@ use super::{
     diagnostics::DiagnosticRun,
     exact::{Exact, digits},
     fault::Fault,
+    identity::Identities,
     interlock::ActuatorTracker,
     line_report::LineReport,
     line_state::{DeviceState, LineCounters, LineState},
@@ -55,6 +56,8 @@ pub struct Snapshot {
     pub samples: Vec<Sample>,
     /// What tags that hold text say, by [`TagId`]; `None` for all others and while the quality is bad.
     pub texts: Arc<Vec<Option<Arc<str>>>>,
+    /// What devices say of themselves, where a condition of their profile asks.
+    pub identities: Identities,
     /// Decimals to show, by [`TagId`] (they may come from the device).
     pub decimals: Vec<u8>,
     /// The last request that was made for each tag, with its answer, by [`TagId`]: why a value is what it is.
@@ -112,6 +115,7 @@ impl Snapshot {
             stepped: SignedDuration::ZERO,
             samples: vec![Sample::bad(Cause::NotRead, Timestamp::UNIX_EPOCH); tags],
             texts: Arc::new(vec![None; tags]),
+            identities: Identities::default(),
             decimals: vec![0; tags],
             source_frames: Arc::new(vec![None; tags]),
             lines: vec![LineStatus::default(); def.lines.len()],

@@ -16,6 +16,7 @@ use crate::plant::{
     control_run::ControlRun,
     def::*,
     fault::Fault,
+    identity::Identities,
     line_state::{DeviceState, LineCounters, LineState},
     parameter_set::StoredSet,
     procedure::ProcedureRun,
@@ -47,6 +48,7 @@ pub struct Fixture {
     pub devices: Vec<DeviceStatus>,
     /// The last request for each tag.
     pub source_frames: Vec<Option<Arc<Exchange>>>,
+    pub identities: Identities,
     /// Sets in the station's folder.
     pub sets: Vec<StoredSet>,
     /// Details of faults of the station.
@@ -86,6 +88,7 @@ impl Fixture {
         let devices = vec![responding; def.devices.len()];
         Fixture {
             source_frames: vec![None; def.tags.len()],
+            identities: Identities::default(),
             sets: Vec::new(),
             station: BTreeMap::new(),
             restores: Vec::new(),
@@ -182,6 +185,7 @@ impl Fixture {
         Arc::new(Snapshot {
             actuators: crate::plant::interlock::ActuatorTracker::default(),
             texts: Arc::new(vec![None; self.def.tags.len()]),
+            identities: self.identities.clone(),
             source_frames: Arc::new(self.source_frames.clone()),
             at: now(),
             run: 7,

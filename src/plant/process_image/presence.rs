@@ -1,6 +1,6 @@
 //! What a device does not have, as another of its values or its identification says: it has no value, and that is no trouble.
 
-use std::{collections::HashMap, sync::Arc};
+use std::sync::Arc;
 
 use jiff::Timestamp;
 
@@ -9,37 +9,16 @@ use crate::plant::{
     exact::Exact,
     expr::Expr,
     id::{DeviceId, TagId},
-    identity::IdentityObject,
+    identity::{IdentityObject, IdentityTest},
     sample::{Cause, Quality, Sample},
 };
 
 const ABSENT: Quality = Quality::Bad(Cause::NotPresent);
 
-/// What devices say of themselves, as far as it was read since they were last lost.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Identities(HashMap<DeviceId, Vec<(IdentityObject, String)>>);
-
-impl Identities {
-    /// It is gone.
-    pub fn forget(&mut self, device: DeviceId) {
-        self.0.remove(&device);
-    }
-
-    /// Takes over what was known under another definition of the devices that are the same; `was` is the id of before.
-    pub fn take_over(&mut self, before: &mut Identities, devices: impl Iterator<Item = (DeviceId, DeviceId)>) {
-        self.0.extend(devices.filter_map(|(now, was)| Some((now, before.0.remove(&was)?))));
-    }
-}
-
 impl ProcessImage {
     /// A device has said of itself what of it is asked; nothing where it does not tell.
     pub fn identified(&mut self, device: DeviceId, objects: Vec<(IdentityObject, String)>, at: Timestamp) {
-        let objects = Some(objects).filter(|objects| !objects.is_empty());
-        let before = match objects.clone() {
-            Some(objects) => self.identities.0.insert(device, objects),
-            None => self.identities.0.remove(&device),
-        };
-        if before == objects {
+        if !self.identities.set(device, objects) {
             return;
         }
         let def = self.def.clone();
@@ -55,11 +34,8 @@ impl ProcessImage {
 
     /// Does a condition hold, by the values that count and by what devices say of themselves? `None`: it is not known.
     pub fn holds(&self, condition: &Expr, value: &impl Fn(TagId) -> Option<Exact>) -> Option<bool> {
-        condition.holds_for(value, &|test| {
-            let objects = self.identities.0.get(&test.device)?;
-            let found = objects.iter().find(|(object, _)| *object == test.object);
-            found.and_then(|(_, text)| test.holds(text))
-        })
+        let said = |test: &IdentityTest| test.holds(self.identities.said(test.device, test.object)?);
+        condition.holds_for(value, &said)
     }
 
     /// Does its device say that it does not have it? While it has said nothing the tag is as any other.
@@ -97,7 +73,6 @@ mod tests {
         expr::Compare,
         fault::Fault,
         fixture::{self, DP, PV},
-        identity::IdentityTest,
     };
 
     /// PV is there while DP is 2 or more.

@@ -18,7 +18,7 @@ impl ProcessImage {
         let mut before = std::mem::replace(self, ProcessImage::new(def.clone(), at));
         self.calculator.redefine(&mut before.calculator, change);
         let devices = def.devices.iter().filter_map(|device| Some((device.id, change.device(device.id)?)));
-        self.identities.take_over(&mut before.identities, devices);
+        self.identities.take_over(&before.identities, devices);
         let mut goes_on = vec![false; before.def.tags.len()];
         for tag in &def.tags {
             let Some(was) = change.tag(tag.id) else { continue };

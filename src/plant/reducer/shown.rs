@@ -33,6 +33,7 @@ impl Plant {
             def: self.def.clone(),
             samples: self.image.samples.clone(),
             texts: self.image.texts.clone(),
+            identities: self.image.identities.clone(),
             decimals: self.def.tags.iter().map(|tag| self.image.shown_decimals(tag)).collect(),
             source_frames: self.source_frames.clone(),
             lines: self.lines.clone(),

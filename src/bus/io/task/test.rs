@@ -55,11 +55,17 @@ impl Task<'_> {
         match (result, &mut self.job) {
             (Ok(result), Some(job)) => {
                 let (in_sync, done) = (stays_in_sync(link.framing(), &step.ask, &result), job.run().done);
+                job.on_result(result);
                 if let Diagnostic::Identify { unit } = job.run().diagnostic {
                     let own = |device: &&DeviceDef| (device.line, device.unit) == (self.line, unit);
-                    self.def.devices.iter().filter(own).for_each(|device| self.recheck.identified(device.id));
+                    let is_over = job.run().state != DiagnosticState::Running;
+                    for device in self.def.devices.iter().filter(own) {
+                        self.recheck.identified(device.id);
+                        if is_over {
+                            self.identification.ask_again(device.id, ended);
+                        }
+                    }
                 }
-                job.on_result(result);
                 if let Some((unit, holes)) = job.take_holes() {
                     self.live_budget.spent(elapsed(started, ended), ended);
                     holes

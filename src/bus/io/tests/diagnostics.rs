@@ -18,7 +18,7 @@ use crate::plant::{
     port_signals::{OutputSignal, SignalTest},
 };
 
-async fn start(line: &Line, diagnostic: Diagnostic) {
+pub async fn start(line: &Line, diagnostic: Diagnostic) {
     let id = CommandId { terminal: 1, number: 1 };
     line.requests.send(BusRequest::Test { id, by: "anna".into(), diagnostic }).await.expect("the line runs");
 }

@@ -10,6 +10,8 @@ use tokio::time::Instant;
 use super::{slave::Line, *};
 use crate::plant::{
     PlantDef,
+    def::LineId,
+    diagnostics::Diagnostic,
     expr::{Compare, Expr},
     identity::{IdentityObject, IdentityTest},
 };
@@ -26,7 +28,7 @@ pub fn identification(unit: u8, revision: &str) -> Vec<u8> {
 const U1: DeviceId = DeviceId(0);
 
 /// The first unit has its first tag from revision 2.10 on.
-fn asking(mode: Mode) -> PlantDef {
+pub fn asking(mode: Mode) -> PlantDef {
     let mut def = plant(mode);
     let object = IdentityObject::of("revision").expect("an object");
     let test = IdentityTest { device: U1, object, compare: Compare::AtLeast, with: "2.10".into() };
@@ -158,6 +160,40 @@ async fn a_new_connection_asks_again() {
             _ => None,
         };
         assert_eq!(line.until(&def, said).await, "2.11", "{mode:?}");
+    }
+}
+
+/// It was updated while it answered: an operator who asks it what it is does not wait an hour for its values.
+#[tokio::test(start_paused = true)]
+async fn an_operator_who_identifies_it_asks_for_its_profile_too() {
+    for mode in Mode::ALL {
+        let (def, since) = (asking(mode), Instant::now());
+        let mut line = line(def.clone());
+        line.plug(mode, move |_, message: &[u8]| match message {
+            [1, 0x2B, ..] => {
+                let revision = if since.elapsed().as_secs() < 60 { "2.9" } else { "2.10" };
+                SlaveAction::Instead(identification(1, revision))
+            }
+            _ => SlaveAction::Answer,
+        });
+        assert_eq!(identified_until(&mut line, &def, 100).await.0, ["2.9"], "{mode:?}");
+        diagnostics::start(&line, Diagnostic::Identify { unit: 1 }).await;
+        assert_eq!(identified_until(&mut line, &def, 200).await.0, ["2.10"], "{mode:?}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn another_plant_file_asks_again() {
+    for mode in Mode::ALL {
+        let (before, def, count) = (plant(mode), asking(mode), Arc::default());
+        let mut line = line(before.clone());
+        line.plug(mode, counted(&count, || SlaveAction::Answer));
+        line.read(&before).await;
+        assert_eq!(count.load(Ordering::Relaxed), 0, "{mode:?}: nothing depends on it");
+        for times in 1..=2 {
+            redefined::redefine(&mut line, &before, &def, LineId(0)).await;
+            assert_eq!(identified_until(&mut line, &def, 60 * times).await.0, ["2.10"], "{mode:?}");
+        }
     }
 }
 

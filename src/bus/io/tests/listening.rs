@@ -120,6 +120,21 @@ async fn what_is_heard_is_a_value_and_nothing_is_ever_sent() {
     }
 }
 
+/// The device is not asked what it is: a tag that depends on it is as any other.
+#[tokio::test(start_paused = true)]
+async fn a_device_that_is_only_heard_is_not_asked_what_it_is() {
+    for mode in [Mode::Rtu, Mode::Ascii, Mode::RtuOverTcp, Mode::Tcp] {
+        let mut bench = Bench::with(mode, |def| def.tags[0].when = identifying::asking(mode).tags[0].when.clone());
+        for _ in 0..3 {
+            bench.ask(mode, &READ, false).await;
+        }
+        let now = bench.ask(mode, &READ, false).await;
+        assert!(now.sample(FIRST).quality.is_good(), "{mode:?}: {:?}", now.sample(FIRST));
+        let mut byte = [0];
+        assert!(timeout(MS, bench.port.read(&mut byte)).await.is_err(), "{mode:?}: it has sent something");
+    }
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_silent_master_leaves_no_value_standing_as_good() {
     let mut bench = Bench::new(Mode::Rtu);

@@ -22,7 +22,7 @@ fn shifted(def: &PlantDef) -> PlantDef {
 }
 
 /// Lets the line pause, and go on under a definition; its requests are new ones.
-async fn redefine(line: &mut Line, before: &PlantDef, def: &PlantDef, at: LineId) {
+pub async fn redefine(line: &mut Line, before: &PlantDef, def: &PlantDef, at: LineId) {
     let ((paused, mut pauses), (next, definition)) = (oneshot::channel(), oneshot::channel());
     line.redefines.send(Redefine { paused, next: definition }).await.expect("the line runs");
     while pauses.try_recv().is_err() {

@@ -8,7 +8,9 @@ use crate::{
     bus::frame,
     plant::{
         def::DeviceId,
+        expr::{Compare, Expr},
         fault::{ExceptionCode, Fault},
+        identity::{IdentityObject, IdentityTest},
         line::Framing,
         line_report::{LineReport, PollReport},
         line_state::DeviceState,
@@ -157,6 +159,26 @@ fn an_answer_that_holds_no_value_is_no_old_one() {
         type_keys(&mut model, "4w");
         let shown = screen(&mut model, 120, 40);
         assert_eq!(shown.contains("no good response since"), is_old, "{cause:?}\n{shown}");
+    }
+}
+
+/// A tag that the device has from revision 2.10 on.
+#[test]
+fn what_the_device_says_of_itself_stands_beside_what_is_wanted() {
+    for (said, expect) in
+        [(Some("V2.9"), "revision >= \"2.10\", the device says \"V2.9\""), (None, "revision >= \"2.10\"")]
+    {
+        let mut fixture = fixture();
+        doubt(&mut fixture, |sample| Sample::bad(Cause::NotPresent, sample.at));
+        let (pv, device) = (fixture.tag("TIC-1.PV"), DeviceId(0));
+        let object = IdentityObject::of("revision").expect("an object");
+        let test = IdentityTest { device, object, compare: Compare::AtLeast, with: "2.10".to_owned() };
+        fixture.def.tags[pv.index()].when = Some(Arc::new(Expr::Identity(test)));
+        fixture.identities.set(device, said.map(|text| (object, text.to_owned())).into_iter().collect());
+        let mut model = model(&fixture, Theme::FULL);
+        type_keys(&mut model, "4w");
+        let shown = screen(&mut model, 120, 40);
+        assert!(shown.contains(expect) && shown.contains("the device says") == said.is_some(), "{shown}");
     }
 }
 

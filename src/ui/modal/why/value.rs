@@ -12,6 +12,7 @@ use crate::{
     plant::{
         def::TagId,
         fault::Fault,
+        identity::IdentityTest,
         line_state::LineState,
         sample::{Cause, Quality},
         scale,
@@ -72,8 +73,7 @@ fn because(
     found: Option<&TagBytes>,
 ) -> Option<String> {
     let line = cx.def().device(def.device).line;
-    let words_of =
-        |tag: TagId| t!("{name} is {whole}", name = cx.def().tag(tag).name, whole = value::show(cx, tag).whole());
+    let words_of = |tag| words_of(cx, tag);
     match cause {
         Cause::NotConnected => line_words(cx, &cx.snapshot.line(line).state),
         Cause::SensorFault => {
@@ -107,12 +107,7 @@ fn because(
             Poll::Once | Poll::Never => Some(t!("it is read on request only").to_owned()),
         },
         Cause::OnRequest => Some(t!("it is read on request only").to_owned()),
-        Cause::NotPresent => {
-            let when = def.when.iter();
-            let tests = when.clone().flat_map(|when| when.identity_tests()).map(ToString::to_string);
-            let needs: Vec<String> = when.flat_map(|when| when.tags()).map(words_of).chain(tests).collect();
-            Some(t!("the device does not have it: {words_of}", words_of = needs.join(", ")))
-        }
+        Cause::NotPresent => Some(t!("the device does not have it: {words_of}", words_of = wanted(cx, def).join(", "))),
         Cause::NotHeard => {
             let heard = exchange.map_or(cx.snapshot.sample(def.id).at, |exchange| exchange.at);
             Some(t!("not heard for {seconds} s", seconds = crate::plant::time::elapsed(heard, cx.now).as_secs()))
@@ -129,6 +124,21 @@ fn because(
         | Cause::Stated
         | Cause::Unproven => None,
     }
+}
+
+fn words_of(cx: &ViewContext, tag: TagId) -> String {
+    t!("{name} is {whole}", name = cx.def().tag(tag).name, whole = value::show(cx, tag).whole())
+}
+
+/// What a tag depends on, and what its device says of it.
+fn wanted(cx: &ViewContext, def: &TagDef) -> Vec<String> {
+    let test = |test: &IdentityTest| match cx.snapshot.identities.said(test.device, test.object) {
+        Some(said) => t!("{test}, the device says \"{said}\"", test, said),
+        None => test.to_string(),
+    };
+    let when = def.when.iter();
+    let tests = when.clone().flat_map(|when| when.identity_tests()).map(test);
+    when.flat_map(|when| when.tags()).map(|tag| words_of(cx, tag)).chain(tests).collect()
 }
 
 /// One sentence: what a technician does.
