@@ -64,7 +64,7 @@ pub trait Listing: Debug + 'static {
     }
 
     /// What a filter looks through in place of the texts of a row.
-    fn searched(&self, _row: &Self::Row) -> Option<String> {
+    fn searched(&self, _cx: &ViewContext, _row: &Self::Row) -> Option<String> {
         None
     }
 
@@ -234,7 +234,7 @@ impl<L: Listing> List<L> {
         if !self.filter.is_empty() {
             let columns = self.columns(cx);
             let filter = Filter::parse(&self.filter, &columns.iter().map(|column| column.head).collect::<Vec<_>>());
-            let text = |row: &L::Row| self.of.searched(row).unwrap_or_else(|| self.cells(cx, row).join(" "));
+            let text = |row: &L::Row| self.of.searched(cx, row).unwrap_or_else(|| self.cells(cx, row).join(" "));
             rows.retain(|row| filter.fits_figures(cx, &columns, row));
             rows.retain(|row| !filter.has_words() || filter.fits_text(&text(row)));
         }
@@ -262,6 +262,14 @@ impl<L: Listing> List<L> {
     pub fn place(&self, rows: &[Cow<L::Row>]) -> usize {
         let id = self.selected.as_ref();
         id.and_then(|id| rows.iter().position(|row| L::holds(row, id))).unwrap_or(0)
+    }
+
+    /// The rows on the screen.
+    pub fn seen<'a>(&'a self, cx: &ViewContext<'a>) -> Vec<Cow<'a, L::Row>> {
+        let rows = self.rows(cx);
+        let room = self.room(cx, &rows);
+        let begin = first(self.place(&rows), rows.len(), room);
+        rows.into_iter().skip(begin).take(room).collect()
     }
 
     pub fn selected<'a>(&'a self, cx: &ViewContext<'a>) -> Option<Cow<'a, L::Row>> {

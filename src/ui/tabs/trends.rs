@@ -37,6 +37,7 @@ use self::{
     plots::Plot,
     response::Response,
     span::{RATES, View, WINDOWS, around, midnight, nearest, pan},
+    values::StoredValues,
     window::Visited,
 };
 use crate::ui::tabs::{overlay::Overlay, prelude::*, reports::period};
@@ -66,7 +67,6 @@ const HOUR_COLUMNS: usize = 60;
 pub struct Trends {
     /// Groups of the plant, and behind them the tags that were picked in the list of values.
     group: usize,
-    picked: Vec<TagId>,
     /// A tag without a group that was opened alone; the marked ones stay.
     opened: Vec<TagId>,
     /// Scales that were typed, instead of those of the plant file.
@@ -102,9 +102,11 @@ pub struct Trends {
     between: Between,
     /// The instant of the replay that it follows.
     replayed: Option<Timestamp>,
-    /// The list of values instead of the curves: first row shown, row selected.
-    values: Option<(usize, usize)>,
-    filter: Words,
+    /// All values with their last hour, as that of the pens; they are listed in place of the curves.
+    values: List<StoredValues>,
+    listed: bool,
+    /// The tags whose last hour was asked for.
+    hours_of: Vec<TagId>,
     /// When the tab last got a snapshot.
     seen: Option<Timestamp>,
     traces: BTreeMap<TagId, Trace>,
@@ -113,7 +115,6 @@ pub struct Trends {
     /// The query for curves, and why the last one failed.
     curves: PeriodicQuery,
     trouble: Option<String>,
-    hours: Answered<Vec<Series>>,
     events: Events,
     /// Values without a unit have a scale each: nothing says that they are alike.
     apart: bool,
@@ -139,11 +140,11 @@ impl TabView for Trends {
     }
 
     fn list(&self, _cx: &ViewContext) -> Option<&dyn ListPage> {
-        self.values.map(|_| self as &dyn ListPage)
+        self.listed.then_some(&self.values as &dyn ListPage)
     }
 
     fn list_mut(&mut self, _cx: &ViewContext) -> Option<&mut dyn ListPage> {
-        self.values.map(|_| self as &mut dyn ListPage)
+        self.listed.then_some(&mut self.values as &mut dyn ListPage)
     }
 
     fn on_snapshot(&mut self, cx: &ViewContext) -> Vec<UiAction> {
@@ -154,7 +155,7 @@ impl TabView for Trends {
         if unseen {
             self.traces.clear();
             self.moved();
-            self.hours.query.want();
+            self.values.answered.query.want();
         }
         self.seen = Some(cx.present());
         self.push_live(cx);
@@ -162,7 +163,7 @@ impl TabView for Trends {
     }
 
     fn queries(&mut self) -> Queries<'_> {
-        let own: Queries = vec![&mut self.hours, self.export.asked(), self.response.asked()];
+        let own: Queries = vec![&mut self.values.answered, self.export.asked(), self.response.asked()];
         let parts = own.into_iter().chain(self.events.queries()).chain(self.between.queries());
         parts.chain(self.overlay.iter_mut().flat_map(Overlay::queries)).collect()
     }
@@ -209,8 +210,8 @@ impl TabView for Trends {
         if self.overlay.take().is_some() || self.list_mut(cx).is_some_and(|list| list.back(cx)) {
             return true;
         }
-        let cancelled = [&mut self.curves, &mut self.hours.query].map(|query| query.cancel(cx));
-        cancelled.contains(&true) || self.values.take().is_some()
+        let cancelled = [&mut self.curves, &mut self.values.answered.query].map(|query| query.cancel(cx));
+        cancelled.contains(&true) || std::mem::take(&mut self.listed)
     }
 
     fn view(&self, cx: &ViewContext, frame: &mut Frame, area: Rect) {

@@ -109,7 +109,7 @@ impl Listing for Events {
         ]
     }
 
-    fn searched(&self, row: &JournalEntry) -> Option<String> {
+    fn searched(&self, _cx: &ViewContext, row: &JournalEntry) -> Option<String> {
         Some(row.whole.clone())
     }
 

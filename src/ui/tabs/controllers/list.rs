@@ -87,7 +87,7 @@ impl Listing for Devices {
         ]
     }
 
-    fn searched(&self, device: &DeviceDef) -> Option<String> {
+    fn searched(&self, _cx: &ViewContext, device: &DeviceDef) -> Option<String> {
         Some(format!("{} {} {} {}", device.name, device.model, device.title, of_plant(&device.title)))
     }
 

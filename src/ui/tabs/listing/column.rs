@@ -148,22 +148,37 @@ pub fn heads<R: ?Sized>(columns: &[(Column<R>, u16)]) -> String {
 /// The cells of a row, each with the cell of the screen that it begins at; between them is a blank.
 pub fn cells<R: ?Sized>(cx: &ViewContext, columns: &[(Column<R>, u16)], row: &R) -> Vec<(u16, String)> {
     let texts: Vec<String> = columns.iter().map(|(column, width)| column.text(cx, row, *width)).collect();
-    let (mut cells, mut x, mut taken) = (Vec::with_capacity(columns.len()), 0, 0);
+    let aligned = columns.iter().zip(&texts).map(|((column, width), text)| column.aligned(text, *width));
+    let mut x = 0;
+    let place = |cell: String| {
+        let from = x;
+        x += text::width(&cell) + 1;
+        (from, cell)
+    };
+    let mut cells: Vec<(u16, String)> = aligned.map(place).collect();
     for (n, ((column, width), text)) in columns.iter().zip(&texts).enumerate() {
-        let behind = columns.iter().zip(&texts).skip(n + 1).take_while(|(_, text)| text.is_empty());
-        let free: u16 = behind.map(|((_, width), _)| width + 1).sum();
-        let runs = column.runs_on && *width < text::width(text) && 0 < free;
-        let cell = match (runs, x < taken) {
-            (true, _) => pad(text, text::width(text).min(width + free)),
-            // It is covered by the one that runs on.
-            (false, true) => String::new(),
-            (false, false) => column.aligned(text, *width),
-        };
-        taken = taken.max(x + text::width(&cell));
-        cells.push((x, cell));
-        x += width + 1;
+        if column.runs_on && *width < text::width(text) {
+            run_on(&mut cells[n..], text);
+        }
     }
     cells
+}
+
+/// Lays a text over the first of these cells and the blanks behind it, but one before what follows.
+fn run_on(cells: &mut [(u16, String)], text: &str) {
+    let [(from, cell), behind @ ..] = cells else { return };
+    let first = behind.iter().find(|(_, text)| !text.trim_start().is_empty());
+    let end = match (first, behind.last()) {
+        (Some((x, text)), _) => x + text::width(text) - text::width(text.trim_start()) - 1,
+        (None, Some((x, text))) => x + text::width(text),
+        (None, None) => *from + text::width(cell),
+    };
+    *cell = fit(text, end.saturating_sub(*from));
+    let taken = *from + text::width(cell);
+    for (x, text) in behind.iter_mut().take_while(|(x, _)| *x < taken) {
+        *text = text.chars().skip(usize::from(taken - *x)).collect();
+        *x = taken;
+    }
 }
 
 /// The figure that a text begins with.

@@ -56,24 +56,25 @@ impl Trends {
         };
         let series = |tags: &[TagId], from, to, buckets| Query::Series { tags: tags.to_vec(), from, to, buckets };
         let mut acts = Vec::new();
-        if self.values.is_none() && !group.is_empty() {
+        if !self.listed && !group.is_empty() {
             let curves = series(&group, view.from, view.to, view.columns);
             acts.extend(self.curves.ask(cx, Tab::Trends, often, timeout, curves));
             acts.extend(self.ask_events(cx, view, often));
         }
-        if self.values.is_none() {
+        if !self.listed {
             acts.extend(self.ask_between(cx));
             acts.extend(self.ask_export(cx));
             acts.extend(self.ask_response(cx, often.max(real(cx, 2.0))));
         }
-        let tags = match self.values {
-            Some((first, _)) => self.listed(cx).into_iter().skip(first).take(usize::from(cx.area.height)).collect(),
-            None => group,
-        };
+        let tags = if self.listed { self.seen(cx) } else { group };
+        if self.listed && tags != self.hours_of {
+            self.values.answered.query.want();
+        }
+        self.hours_of.clone_from(&tags);
         let hour = View::ending(cx.now, 3_600, HOUR_COLUMNS);
         if !tags.is_empty() {
             let hours = series(&tags, hour.from, hour.to, HOUR_COLUMNS);
-            acts.extend(self.hours.ask(cx, Tab::Trends, real(cx, 20.0), timeout, hours));
+            acts.extend(self.values.answered.ask(cx, Tab::Trends, real(cx, 20.0), timeout, hours));
         }
         acts
     }

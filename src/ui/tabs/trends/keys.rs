@@ -1,6 +1,6 @@
 //! The keys of the trends tab: of its curves, of the list of all values, and where periods lie over each other.
 
-use super::{Asking, RATES, Trends, WINDOWS, overlay, plots::Plot, window::Direction};
+use super::{Asking, RATES, Trends, WINDOWS, overlay, plots::Plot, values::StoredValues, window::Direction};
 use crate::ui::tabs::prelude::*;
 
 pub(super) type Key = crate::ui::key_table::Key<Trends>;
@@ -75,7 +75,7 @@ pub(super) const CURVES: &[Key] = &[
         .when(of_plant),
     FIND,
     Key::change(char('v'), "values", "all values with their last hour, or the curves", |trends, _| {
-        trends.show_values(Some((0, 0)));
+        trends.list_values(true);
     }),
     WHY,
     Key::change(char('m'), "mode", "moving window, or everything since the start of the day", |trends, _| {
@@ -99,7 +99,7 @@ pub(super) const VALUES: &[Key] = &[
     Key::change(code(KeyCode::Enter), "curve", "show the curve of the value, or of the marked ones", Trends::open),
     Key::change(char(' '), "mark", "mark the value as a pen, or unmark it", Trends::pick),
     FIND,
-    Key::change(char('v'), "curves", "back to the curves", |trends, _| trends.show_values(None)),
+    Key::change(char('v'), "curves", "back to the curves", |trends, _| trends.list_values(false)),
     WHY,
 ];
 
@@ -119,10 +119,10 @@ fn of_present_plant(trends: &Trends, cx: &ViewContext) -> Offer {
 
 impl KeyTable for Trends {
     fn keys(&self, _cx: &ViewContext) -> Keys<Trends> {
-        Keys::of(match (&self.overlay, self.values) {
+        Keys::of(match (&self.overlay, self.listed) {
             (Some(_), _) => &[overlay::KEYS],
-            (None, Some(_)) => &[VALUES],
-            (None, None) => &[CURVES],
+            (None, true) => &[VALUES],
+            (None, false) => &[CURVES],
         })
     }
 
@@ -168,15 +168,17 @@ impl Trends {
         open(Modal::Prompt(Prompt::new(t!("Go to a time"), t!("03:12   2026-11-20   2026-11-20 22:00-06:00"), "")))
     }
 
-    fn show_values(&mut self, values: Option<(usize, usize)>) {
-        self.values = values;
-        self.hours.query.want();
+    pub(super) fn list_values(&mut self, listed: bool) {
+        self.listed = listed;
+        self.values.rewind();
+        self.values.answered.query.want();
     }
 
     fn why(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        Why::open(match self.values {
-            Some((_, row)) => Why::new(self.listed(cx), row),
-            None => Why::new(self.pens(cx).into_iter().map(|pen| pen.tag).collect(), self.selected),
+        let rows = self.values.rows(cx);
+        Why::open(match self.listed {
+            true => Why::new(rows.iter().map(|row| StoredValues::id(row)).collect(), self.values.place(&rows)),
+            false => Why::new(self.pens(cx).into_iter().map(|pen| pen.tag).collect(), self.selected),
         })
     }
 

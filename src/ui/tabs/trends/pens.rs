@@ -51,7 +51,7 @@ impl Trends {
 
     /// The tags of the group behind those of the plant: the one that was opened alone, or those that are marked.
     pub(super) fn behind(&self) -> &[TagId] {
-        if self.opened.is_empty() { &self.picked } else { &self.opened }
+        if self.opened.is_empty() { &self.values.of.picked } else { &self.opened }
     }
 
     pub(super) fn groups(&self, cx: &ViewContext) -> usize {
@@ -82,7 +82,7 @@ impl Trends {
 
     pub(super) fn next_group(&mut self, cx: &ViewContext) {
         let next = (self.group + 1) % self.groups(cx).max(1);
-        if !self.picked.is_empty() {
+        if !self.values.of.picked.is_empty() {
             self.opened.clear();
         }
         self.show_group(cx, next, 0);
@@ -93,7 +93,7 @@ impl Trends {
         let tags: Vec<TagId> = self.pens(cx).iter().map(|pen| pen.tag).collect();
         self.traces.retain(|tag, _| tags.contains(tag));
         self.moved();
-        self.hours.query.want();
+        self.values.answered.query.want();
         self.push_live(cx);
     }
 
@@ -105,7 +105,7 @@ impl Trends {
         if found.is_none() {
             self.opened = vec![tag];
         }
-        self.values = None;
+        self.listed = false;
         self.off.retain(|off| *off != tag);
         let (group, selected) = found.unwrap_or((groups.len(), 0));
         self.show_group(cx, group, selected);
@@ -113,9 +113,9 @@ impl Trends {
 
     /// Shows a value of the list: with the others that are marked, or as [`Trends::open_tag`] does.
     pub(super) fn open_value(&mut self, cx: &ViewContext, tag: TagId) {
-        match self.picked.iter().position(|picked| *picked == tag) {
+        match self.values.of.picked.iter().position(|picked| *picked == tag) {
             Some(place) => {
-                self.values = None;
+                self.listed = false;
                 self.opened.clear();
                 self.show_group(cx, cx.def().trends.len(), place);
             }
@@ -126,9 +126,9 @@ impl Trends {
     /// Marks the selected value of the list as a pen, or no longer.
     pub(super) fn pick(&mut self, cx: &ViewContext) {
         let Some(tag) = self.listed_value(cx) else { return };
-        match self.picked.iter().position(|picked| *picked == tag) {
-            Some(place) => drop(self.picked.remove(place)),
-            None if self.picked.len() < PENS_MAX => self.picked.push(tag),
+        match self.values.of.picked.iter().position(|picked| *picked == tag) {
+            Some(place) => drop(self.values.of.picked.remove(place)),
+            None if self.values.of.picked.len() < PENS_MAX => self.values.of.picked.push(tag),
             None => {}
         }
         self.opened.clear();

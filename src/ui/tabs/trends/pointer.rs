@@ -18,7 +18,7 @@ pub fn moment_at(trends: &Trends, cx: &ViewContext, at: Position) -> Option<Time
 
 /// The readout of the cursor, else the selected value as it is now.
 pub fn copied(trends: &Trends, cx: &ViewContext) -> Vec<String> {
-    if let (None, Some(at)) = (trends.values, trends.cursor(cx)) {
+    if let (false, Some(at)) = (trends.listed, trends.cursor(cx)) {
         let time = text::stamp(at, &cx.def().time_zone);
         let line = |(_, pen): (usize, Pen)| {
             let value = at_cursor(trends, cx, pen.tag, at).unwrap_or_else(|| "----".to_owned());

@@ -1,39 +1,104 @@
 //! The list of all values with their last hour.
 
-use super::{
-    view::{hour, resolution, trouble},
-    *,
-};
+use super::{view::resolution, *};
 use crate::{
-    plant::tag::TagDef,
+    plant::{exact::Exact, tag::TagDef},
     ui::widgets::{chart::mark, spark::spark},
 };
 
-impl Trends {
-    /// The stored tags that fit the filter, in the order of the plant.
-    pub(super) fn listed(&self, cx: &ViewContext) -> Vec<TagId> {
-        let fits = |tag: &TagDef| {
-            self.filter.is_empty()
-                || self.filter.fit(&format!(
-                    "{} {} {} {}",
-                    tag.name,
-                    tag.label,
-                    of_plant(&tag.label),
-                    cx.snapshot.unit(tag.id)
-                ))
+/// All stored tags, in the order of the plant.
+#[derive(Debug, Default)]
+pub struct StoredValues {
+    /// The tags that the operator has made pens.
+    pub picked: Vec<TagId>,
+}
+
+/// A tag with its place among the pens, and its last hour where it was asked for.
+#[derive(Debug, Clone)]
+pub struct StoredValue {
+    tag: TagId,
+    pen: Option<usize>,
+    hour: Option<Series>,
+}
+
+impl Listing for StoredValues {
+    type Answer = Vec<Series>;
+    type Row = StoredValue;
+    type Id = TagId;
+
+    const ACTS: bool = false;
+
+    fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a Vec<Series>>) -> Heading<'a> {
+        let count = cx.def().tags.iter().filter(|tag| tag.is_stored()).count();
+        Heading::new(t!("All values"), t!("no value of this plant is stored")).words(count.to_string(), cx.theme.dim())
+    }
+
+    fn rows<'a>(&'a self, cx: &ViewContext<'a>, hours: Option<&'a Vec<Series>>) -> Vec<Cow<'a, StoredValue>> {
+        let row = |tag: &TagDef| StoredValue {
+            tag: tag.id,
+            pen: self.picked.iter().position(|picked| *picked == tag.id),
+            hour: hours.into_iter().flatten().find(|series| series.tag == tag.id).cloned(),
         };
-        cx.def().tags.iter().filter(|tag| tag.is_stored() && fits(tag)).map(|tag| tag.id).collect()
+        cx.def().tags.iter().filter(|tag| tag.is_stored()).map(|tag| Cow::Owned(row(tag))).collect()
+    }
+
+    fn id(row: &StoredValue) -> TagId {
+        row.tag
+    }
+
+    /// What there is no room for gives way: the hour first, then its bounds. A number whose end is cut off would be another.
+    fn columns(&self, cx: &ViewContext, room: u16) -> Vec<Column<StoredValue>> {
+        let wide = room.saturating_sub(80);
+        let now = if cx.is_past() { t!("then") } else { t!("now") };
+        vec![
+            left(1, "", |cx, row: &StoredValue| row.pen.map_or(String::new(), |pen| mark(cx.theme, pen).to_string()))
+                .styled(|cx, row| row.pen.map_or(cx.theme.normal(), |pen| cx.theme.pen(pen))),
+            left(14 + wide / 5, t!("tag"), |cx, row| cx.def().tag(row.tag).name.clone()),
+            left(12 + wide / 4, t!("label"), |cx, row: &StoredValue| of_plant(&cx.def().tag(row.tag).label).to_owned())
+                .rank(1)
+                .dim()
+                .runs_on(),
+            right(13, now, |cx, row: &StoredValue| value::show(cx, row.tag).within(13))
+                .styled(|cx, row| value::show(cx, row.tag).style),
+            right(7, t!("1 h min"), |cx, row: &StoredValue| bound(cx, row, |(min, _, _)| min)).rank(2).dim(),
+            right(7, t!("1 h max"), |cx, row: &StoredValue| bound(cx, row, |(_, _, max)| max)).rank(2).dim(),
+            rest(8, t!("last hour"), last_hour).rank(3),
+        ]
+    }
+
+    fn searched(&self, cx: &ViewContext, row: &StoredValue) -> Option<String> {
+        let tag = cx.def().tag(row.tag);
+        Some(format!("{} {} {} {}", tag.name, tag.label, of_plant(&tag.label), cx.snapshot.unit(tag.id)))
+    }
+}
+
+/// A bound of the last hour, of a tag that is a number.
+fn bound(cx: &ViewContext, row: &StoredValue, of: fn((Exact, Exact, Exact)) -> Exact) -> String {
+    let is_number = cx.def().tag(row.tag).enum_labels.is_empty();
+    let summary = row.hour.as_ref().and_then(|hour| hour.summary).filter(|_| is_number);
+    summary.map_or(String::new(), |summary| cx.snapshot.format(row.tag, of(summary)))
+}
+
+fn last_hour(cx: &ViewContext, row: &StoredValue, room: u16) -> String {
+    let Some(series) = &row.hour else { return String::new() };
+    let cells = usize::from(room).min(series.buckets.len());
+    spark(series, cells, resolution(cx, row.tag), cx.theme.glyphs)
+}
+
+impl Trends {
+    /// The tags whose last hour is on the screen of the list.
+    pub(super) fn seen(&self, cx: &ViewContext) -> Vec<TagId> {
+        self.values.seen(cx).into_iter().map(|row| row.tag).collect()
     }
 
     /// The selected value, while they are listed.
     pub(super) fn listed_value(&self, cx: &ViewContext) -> Option<TagId> {
-        self.values.and_then(|(_, row)| self.listed(cx).get(row).copied())
+        self.values.selected(cx).filter(|_| self.listed).map(|row| row.tag)
     }
 
     /// Shows the list, and asks for the words of its filter.
     pub(super) fn find(&mut self, cx: &ViewContext) -> Vec<UiAction> {
-        self.values.get_or_insert((0, 0));
-        self.hours.query.want();
+        self.list_values(true);
         listing::ask_filter(self, cx)
     }
 
@@ -42,98 +107,5 @@ impl Trends {
         if let Some(tag) = self.listed_value(cx) {
             self.open_value(cx, tag);
         }
-    }
-}
-
-/// The list of values.
-impl ListPage for Trends {
-    fn step(&mut self, cx: &ViewContext, motion: Motion) {
-        let (first, row) = self.values.unwrap_or_default();
-        let rows = usize::from(cx.area.height.saturating_sub(2)).max(1);
-        let row = motion.to(row, self.listed(cx).len(), rows);
-        let first_now = first.clamp((row + 1).saturating_sub(rows), row);
-        if first_now != first {
-            self.hours.query.want();
-        }
-        self.values = Some((first_now, row));
-    }
-
-    fn back(&mut self, cx: &ViewContext) -> bool {
-        let filtered = !self.filter.is_empty();
-        if filtered {
-            self.set_filter(cx, "");
-        }
-        filtered
-    }
-
-    fn copied(&self, cx: &ViewContext) -> Vec<String> {
-        self.listed_value(cx).into_iter().map(|tag| value::line(cx, tag)).collect()
-    }
-
-    fn filter(&self) -> String {
-        self.filter.to_string()
-    }
-
-    fn filter_hint(&self) -> &'static str {
-        t!("words of name, label or unit; none lists all")
-    }
-
-    fn set_filter(&mut self, _cx: &ViewContext, text: &str) {
-        (self.filter, self.values) = (Words::parse(text), Some((0, 0)));
-        self.hours.query.want();
-    }
-}
-
-/// Every stored value with its last hour.
-pub(super) fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas, first: usize, selected: usize) {
-    let (theme, all) = (cx.theme, trends.listed(cx));
-    let rows = usize::from(canvas.height().saturating_sub(2)).max(1);
-    let last = (first + rows).min(all.len());
-    let x = canvas.text(1, 0, t!("All values"), theme.strong());
-    let range = t!("{min}–{last} of {count}", min = (first + 1).min(last), last, count = all.len());
-    let x = canvas.text(x + 3, 0, &range, theme.dim());
-    if !trends.filter.is_empty() {
-        canvas.text(x + 2, 0, &format!("/{}", trends.filter), theme.strong());
-    }
-    let wide = canvas.width().saturating_sub(80);
-    let name = 15 + wide / 5;
-    // The label gives way: a number whose end is cut off would be another number.
-    let label = (name + 18 + wide / 4).min(canvas.width().saturating_sub(32)).max(name + 2);
-    let (value, low, high) = (label + 15, label + 23, label + 31);
-    let has_room = high <= canvas.width();
-    canvas.text(2, 1, t!("tag"), theme.dim());
-    let now = if cx.is_past() { t!("then") } else { t!("now") };
-    canvas.text_right(value, 1, now, theme.dim());
-    for (end, text) in [(low, t!("1 h min")), (high, t!("1 h max"))].into_iter().filter(|_| has_room) {
-        canvas.text_right(end, 1, text, theme.dim());
-    }
-    canvas.text(high + 2, 1, t!("last hour"), theme.dim());
-    if let Some(trouble) = trouble(trends, cx) {
-        let room = canvas.width().saturating_sub(30);
-        canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&trouble, room), theme.trouble());
-    }
-    for (y, (n, tag)) in all.iter().enumerate().skip(first).take(rows).enumerate() {
-        let (y, def, shown) = (to_u16(y) + 2, cx.def().tag(*tag), value::show(cx, *tag));
-        let style = if n == selected { theme.strong() } else { theme.normal() };
-        if n == selected {
-            canvas.text(0, y, theme.pick("▸", ">"), theme.strong());
-        }
-        if let Some(pen) = trends.picked.iter().position(|picked| picked == tag) {
-            canvas.text(1, y, mark(theme, pen), theme.pen(pen));
-        }
-        canvas.text(2, y, &pad(&def.name, name.saturating_sub(1)), style);
-        let text = shown.within(value - label);
-        canvas.text_right(value, y, &text, shown.style);
-        // What the value leaves is the label's.
-        let room = value.saturating_sub(width(&text) + name + 4);
-        canvas.text(2 + name, y, &fit(of_plant(&def.label), room), theme.dim());
-        let Some(series) = hour(trends, *tag) else { continue };
-        if let Some((min, _, max)) = series.summary.filter(|_| has_room && def.enum_labels.is_empty()) {
-            for (end, value) in [(low, min), (high, max)] {
-                canvas.text_right(end, y, &fit(&cx.snapshot.format(*tag, value), 7), theme.dim());
-            }
-        }
-        let cells = usize::from(canvas.width().saturating_sub(high + 3)).min(series.buckets.len());
-        canvas.text(high + 2, y, &spark(series, cells, resolution(cx, *tag), theme.glyphs), style);
     }
 }

@@ -15,7 +15,6 @@ use super::{
     plots::{Plot, draw_histogram, draw_xy},
     response::draw_response,
     span::{RATES, WINDOWS, midnight, rate_text, window_text},
-    values::draw_values,
 };
 use crate::ui::tabs::prelude::*;
 use crate::{
@@ -41,9 +40,19 @@ pub fn draw(trends: &Trends, cx: &ViewContext, frame: &mut Frame, area: Rect) {
         return overlay.view(cx, frame, area);
     }
     let mut canvas = Canvas::new(frame.buffer_mut(), area);
-    match trends.values {
-        Some((first, row)) => draw_values(trends, cx, &mut canvas, first, row),
-        None => draw_curves(trends, cx, &mut canvas),
+    match trends.listed {
+        true => draw_values(trends, cx, &mut canvas),
+        false => draw_curves(trends, cx, &mut canvas),
+    }
+}
+
+/// All values; what is wrong with the history, also with the curves, stands beside their number.
+fn draw_values(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
+    trends.values.view(cx, canvas);
+    let trouble = trouble(trends, cx).filter(|_| trends.values.answered.trouble.is_none());
+    if let Some(trouble) = trouble {
+        let room = canvas.width().saturating_sub(30);
+        canvas.text_right(canvas.width().saturating_sub(1), 0, &fit(&trouble, room), cx.theme.trouble());
     }
 }
 
@@ -105,7 +114,7 @@ pub(super) fn placed_chart<'a>(trends: &'a Trends, cx: &ViewContext<'a>) -> Opti
     let legend = legend_rows(trends, cx, cx.area.height);
     let (chart, _, height) = time_chart(trends, cx, cx.area.height, legend);
     let area = Rect { y: cx.area.y + 1, height, ..cx.area };
-    let shown = trends.values.is_none() && trends.overlay.is_none() && trends.plot == Plot::Time;
+    let shown = !trends.listed && trends.overlay.is_none() && trends.plot == Plot::Time;
     shown.then_some((chart, area))
 }
 
@@ -204,9 +213,12 @@ fn draw_title(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
 pub(super) fn trouble(trends: &Trends, cx: &ViewContext) -> Option<String> {
     // Curves that are drawn are refreshed all the time: only a long wait is worth a word.
     let long = |query: &&PeriodicQuery| query.waiting(cx.monotonic_now()).is_some_and(|time| time >= real(cx, 2.0));
-    let mut waiting =
-        [&trends.curves, &trends.hours.query].into_iter().filter(long).filter_map(|query| query.shown_waiting(cx));
-    let failed = [&trends.trouble, &trends.hours.trouble].into_iter().chain(trends.events.troubles()).flatten().next();
+    let mut waiting = [&trends.curves, &trends.values.answered.query]
+        .into_iter()
+        .filter(long)
+        .filter_map(|query| query.shown_waiting(cx));
+    let failed =
+        [&trends.trouble, &trends.values.answered.trouble].into_iter().chain(trends.events.troubles()).flatten().next();
     failed.cloned().or_else(|| waiting.next())
 }
 
@@ -299,7 +311,7 @@ pub(super) fn at_cursor(trends: &Trends, cx: &ViewContext, tag: TagId, at: Times
 }
 
 pub(super) fn hour(trends: &Trends, tag: TagId) -> Option<&Series> {
-    trends.hours.value.iter().flatten().find(|series| series.tag == tag)
+    trends.values.answered.value.iter().flatten().find(|series| series.tag == tag)
 }
 
 /// What the axis of a tag is called: curves with one name share it.

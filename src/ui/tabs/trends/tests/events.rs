@@ -57,7 +57,7 @@ fn a_state_is_a_lane_under_the_chart() {
     stand.answer();
     let tags = stand.model.snapshot.def.tags.clone();
     let of = |state: bool| tags.iter().filter(move |tag| is_state(tag) == state);
-    stand.model.tabs.trends.picked = of(false).take(1).chain(of(true).take(2)).map(|tag| tag.id).collect();
+    stand.model.tabs.trends.values.of.picked = of(false).take(1).chain(of(true).take(2)).map(|tag| tag.id).collect();
     stand.press("gg");
     stand.answer();
     let lanes = stand.model.tabs.trends.lanes(&stand.model.cx());

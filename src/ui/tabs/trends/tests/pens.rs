@@ -9,14 +9,14 @@ fn marked_values_are_drawn_together() {
     stand.press("/");
     stand.press("p-1⏎");
     stand.answer();
-    let listed = |stand: &Stand| stand.model.tabs.trends.listed(&stand.model.cx()).len();
-    assert!(stand.screen().contains("/p-1"), "the filter is shown");
+    let listed = |stand: &Stand| stand.model.tabs.trends.values.rows(&stand.model.cx()).len();
+    assert!(stand.screen().contains("\"p-1\""), "the filter is shown");
     let found = listed(&stand);
     stand.press("/");
     stand.press("xyz⏎");
     assert_eq!(listed(&stand), 0);
     stand.press("⏎w ");
-    assert!(stand.model.tabs.trends.picked.is_empty(), "nothing to mark");
+    assert!(stand.model.tabs.trends.values.of.picked.is_empty(), "nothing to mark");
     stand.send(Msg::Key(KeyEvent::new(KeyCode::Esc, KeyModifiers::NONE)));
     assert!(listed(&stand) > found, "Esc takes the filter away");
     stand.press(" ↓↓↓ ⏎");
@@ -37,10 +37,11 @@ fn a_value_opened_alone_leaves_the_marked_ones() {
     let drawn = |tag: TagId| def.trends.iter().any(|group| group.pens.iter().any(|pen| pen.tag == tag));
     let free: Vec<TagId> = def.tags.iter().map(|tag| tag.id).filter(|tag| !drawn(*tag)).collect();
     let cx = stand.model.cx();
-    let mut trends = Trends { picked: free[..2].to_vec(), ..TabView::new(&stand.model.snapshot) };
+    let mut trends: Trends = TabView::new(&stand.model.snapshot);
+    trends.values.of.picked = free[..2].to_vec();
     trends.open_tag(&cx, free[2]);
     assert_eq!(trends.pens(&cx).iter().map(|pen| pen.tag).collect::<Vec<_>>(), free[2..3]);
-    assert_eq!(trends.picked, free[..2]);
+    assert_eq!(trends.values.of.picked, free[..2]);
     trends.open_value(&cx, free[1]);
     assert_eq!(trends.pens(&cx).len(), 2, "both marked ones");
 }
@@ -101,7 +102,7 @@ fn a_trend_that_is_opened_leaves_the_marked_pens() {
     let mut stand = Stand::new(Theme::FULL, 120, 40);
     stand.answer();
     stand.press("v ↓ ");
-    let marked = stand.model.tabs.trends.picked.clone();
+    let marked = stand.model.tabs.trends.values.of.picked.clone();
     let of_group = |tag: &TagId| {
         let groups = &stand.model.snapshot.def.trends;
         groups.iter().any(|group| group.pens.iter().any(|pen| pen.tag == *tag))
@@ -115,7 +116,7 @@ fn a_trend_that_is_opened_leaves_the_marked_pens() {
         let pens = stand.model.tabs.trends.pens(&stand.model.cx());
         pens.into_iter().map(|pen| pen.tag).collect::<Vec<_>>()
     };
-    assert_eq!((pens(&stand), &stand.model.tabs.trends.picked), (vec![other], &marked));
+    assert_eq!((pens(&stand), &stand.model.tabs.trends.values.of.picked), (vec![other], &marked));
     stand.press("ggg");
     assert_eq!(pens(&stand), marked, "the marked ones are a group again");
 }
@@ -140,11 +141,11 @@ fn no_number_of_the_list_of_values_is_cut_at_60_columns() {
     let mut stand = Stand::new(Theme::FULL, 60, 20);
     stand.press("v");
     stand.answer();
-    let values = &stand.model.tabs.trends.hours.value;
+    let values = &stand.model.tabs.trends.values.answered.value;
     let (_, _, max) = values.iter().flatten().find_map(|series| series.summary).expect("answered");
     let (screen, max) = (stand.screen(), stand.model.snapshot.format(TagId(0), max));
-    let row = screen.lines().find(|line| line.contains("▸ TIC-1.PV")).expect("the first value");
-    assert!(row.split_whitespace().filter(|word| *word == max).count() >= 1, "{max} in {row}");
+    let row = screen.lines().find(|line| line.contains("▸  TIC-1.PV")).expect("the first value");
+    assert!(row.split([' ', '"']).any(|word| word == max), "{max} in {row}");
     assert!(screen.contains("1 h max"), "{screen}");
 }
 
