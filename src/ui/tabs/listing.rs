@@ -240,10 +240,13 @@ impl<L: Listing> List<L> {
         }
         let columns = self.order.map(|_| self.columns(cx)).unwrap_or_default();
         if let Some(column) = self.order.and_then(|order| columns.get(order)) {
-            rows.sort_by(|a, b| column.compare(cx, a, b));
+            // What is not known comes last either way.
+            let (mut known, unknown): (Vec<_>, Vec<_>) = rows.into_iter().partition(|row| column.is_known(cx, row));
+            known.sort_by(|a, b| column.compare(cx, a, b));
             if self.reversed {
-                rows.reverse();
+                known.reverse();
             }
+            rows = known.into_iter().chain(unknown).collect();
         }
         rows
     }
@@ -382,7 +385,7 @@ impl<L: Listing> ListPage for List<L> {
     fn next_order(&mut self, cx: &ViewContext) {
         let next = self.order.map_or(0, |order| order + 1);
         let columns = self.columns(cx);
-        let named = columns.iter().enumerate().skip(next).find(|(_, column)| !column.head.is_empty());
+        let named = columns.iter().enumerate().skip(next).find(|(_, column)| column.sorts && !column.head.is_empty());
         (self.order, self.reversed) = (named.map(|(n, _)| n), false);
     }
 

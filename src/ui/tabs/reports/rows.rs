@@ -93,7 +93,6 @@ fn number(row: &Recorded, value: Option<Exact>) -> String {
     value.map_or("----".to_owned(), |value| digits(value, Some(row.1)))
 }
 
-/// What is not known comes last.
 fn compare(a: Option<Exact>, b: Option<Exact>) -> Ordering {
     let figure = |value: Option<Exact>| value.map_or(f64::INFINITY, |value| value.near());
     figure(a).total_cmp(&figure(b))

@@ -60,9 +60,9 @@ impl Listing for StoredValues {
                 .runs_on(),
             right(13, now, |cx, row: &StoredValue| value::show(cx, row.tag).within(13))
                 .styled(|cx, row| value::show(cx, row.tag).style),
-            right(7, t!("1 h min"), |cx, row: &StoredValue| bound(cx, row, |(min, _, _)| min)).rank(2).dim(),
-            right(7, t!("1 h max"), |cx, row: &StoredValue| bound(cx, row, |(_, _, max)| max)).rank(2).dim(),
-            rest(8, t!("last hour"), last_hour).rank(3),
+            right(7, t!("1 h min"), |cx, row: &StoredValue| bound(cx, row, |(min, _, _)| min)).rank(2).unsorted().dim(),
+            right(7, t!("1 h max"), |cx, row: &StoredValue| bound(cx, row, |(_, _, max)| max)).rank(2).unsorted().dim(),
+            rest(8, t!("last hour"), last_hour).rank(3).unsorted(),
         ]
     }
 

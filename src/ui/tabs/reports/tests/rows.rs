@@ -56,7 +56,16 @@ fn a_time_is_found_and_a_condition_filters() {
     let shown = stand.screen();
     let place = |words| shown.find(words).unwrap_or(usize::MAX);
     assert!(place("15:59:00") < place("15:56:00"), "the highest PV first: {shown}");
-    stand.press("⎋⎋/pv > 90⏎");
+    stand.press("⎋⎋ssss");
+    let last = |stand: &Stand| {
+        let cx = stand.model.cx();
+        let rows = stand.model.tabs.reports.report.rows(&cx);
+        rows.last().map(|row| cx.local(RecordRows::id(row), "%H:%M"))
+    };
+    assert_eq!(last(&stand).as_deref(), Some("14:03"), "what is not known comes last");
+    stand.press("S");
+    assert_eq!(last(&stand).as_deref(), Some("14:03"), "either way");
+    stand.press("⎋/pv > 90⏎");
     assert!(stand.screen().contains("No matching entries."), "{}", stand.screen());
     stand.press("⎋");
     assert!(stand.screen().contains("120 rows"), "{}", stand.screen());
