@@ -31,7 +31,7 @@ pub enum SessionEnd {
 
 fn too_many(count: usize, user: Option<&str>) -> String {
     match user {
-        Some(user) => t!("{count} terminals of {user} are attached, no more may be", count, user),
-        None => t!("{count} terminals are attached, no more may be", count),
+        Some(user) => t!("{user} has {count} terminals, no more can attach", count, user),
+        None => t!("{count} terminals are attached, no more can attach", count),
     }
 }

@@ -279,7 +279,7 @@ mod tests {
         let again = first().with(&UserChange::Add { user: "ANNA".into(), role: Role::Viewer, hash: "h".into() });
         assert_eq!(again.unwrap_err().to_string(), "user ANNA already exists");
         let mixed = check_name("ann\u{3b1}").unwrap_err().to_string();
-        assert_eq!(mixed, "a name is of one alphabet, found '\u{3b1}' of Greek beside Latin");
+        assert_eq!(mixed, "a name uses one alphabet, found '\u{3b1}' of Greek beside Latin");
     }
 
     #[test]

@@ -161,7 +161,7 @@ fn lines(snapshot: &Snapshot, device: &DeviceDef, span: &Span) -> Vec<String> {
 /// `TIC-1.SV = 5.0 °C, P-DP is 1`: the value, and what it hangs on.
 fn valued(snapshot: &Snapshot, tag: &TagDef, span: &Span) -> String {
     let name = &tag.name;
-    let Some(own) = span.words_of(tag.point) else { return t!("a part of {name}", name) };
+    let Some(own) = span.words_of(tag.point) else { return t!("part of {name}", name) };
     if let Some(text) = codec::decode_text(tag.point, own) {
         return format!("{name} = {text}");
     }

@@ -133,7 +133,7 @@ const IDENTIFICATION: &[Item] = &[
     MeiType,
     READ_CODE,
     Byte("conformity", |level| {
-        let one_by_one = if level & 0x80 == 0 { t!("as a list only") } else { t!("as a list and one by one") };
+        let one_by_one = if level & 0x80 == 0 { t!("stream access only") } else { t!("stream and individual access") };
         format!("{}, {one_by_one}", names::identification(level & 0x7F))
     }),
     Byte("more follows", |more| if more == 0 { t!("no") } else { t!("yes") }.into()),

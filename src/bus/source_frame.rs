@@ -83,7 +83,7 @@ pub fn advice(fault: Fault) -> &'static str {
             "the device cannot answer this request: check address and count of the block, lower read_registers_max or gap_registers_max"
         }
         Fault::NoHeader => {
-            "not what Modbus TCP has: check the mode of the line (tcp, or rtu-over-tcp for a serial gateway), the TCP port, then the gateway"
+            "check the mode of the line (tcp, or rtu-over-tcp for a serial gateway), the TCP port, then the gateway"
         }
         Fault::OutOfSync => {
             "check for a second master on the line, a duplicate address, or a repeater that repeats each response"
@@ -95,7 +95,7 @@ pub fn advice(fault: Fault) -> &'static str {
         Fault::NotConnected => "check that the port or host exists and that no other program uses it; settings: c",
         Fault::BackedOff => "it is retried at growing intervals; find out why it stopped responding",
         Fault::NotHeard => {
-            "check wires A and B, ground and place of the tap: the other master hears more than this port"
+            "check wires A and B, ground and position of the tap: the other master hears more than this port"
         }
         Fault::Unproven => "wait until the other master reads it again",
     }

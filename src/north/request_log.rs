@@ -106,7 +106,7 @@ impl Ended {
 
     /// It may have taken effect, and only the value tells.
     pub fn unknown(why: &str, at: Timestamp) -> Ended {
-        let reason = Some(format!("{why}: it may have taken effect, look at the value"));
+        let reason = Some(format!("{why}: it may have taken effect, check the value"));
         Ended { result: RequestResult::Unknown, reason, recorded: false, at }
     }
 }

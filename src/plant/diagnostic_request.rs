@@ -249,7 +249,7 @@ impl Scan {
             ));
         }
         match self.serials.iter().find(|serial| !serial.is_usual()) {
-            Some(serial) => Err(t!("{serial}: no port has such settings", serial)),
+            Some(serial) => Err(t!("{serial}: no port supports these settings", serial)),
             None => Ok(()),
         }
     }

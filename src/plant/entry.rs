@@ -149,7 +149,7 @@ pub fn warnings(snapshot: &Snapshot, tag: TagId, value: Exact) -> Vec<String> {
     });
     let def = snapshot.def.tag(tag);
     let raw = scale::to_raw(def, value, snapshot.scaling_decimals(tag)).filter(|raw| def.is_bad(*raw));
-    let bad = raw.map(|_| t!("! by this number the device says that it has no value").to_owned());
+    let bad = raw.map(|_| t!("! for the device this number means no value").to_owned());
     bad.into_iter().chain(large).chain(limits).collect()
 }
 

@@ -62,7 +62,7 @@ pub enum Fault {
         asked: u16,
     },
     /// Only answers with another transaction id came (Modbus TCP).
-    #[error("{}", t!("responses carry transaction {got}, the request was {asked}", got = .got, asked = .asked))]
+    #[error("{}", t!("response has transaction {got}, the request had {asked}", got = .got, asked = .asked))]
     WrongTransaction {
         /// Transaction of the last of them.
         got: u16,
@@ -95,10 +95,10 @@ pub enum Fault {
     BackedOff,
     /// On the line of another master: it has got its response, which was not heard, or what was heard may be that to
     /// another request.
-    #[error("{}", t!("no response was heard that is certainly its own"))]
+    #[error("{}", t!("no response heard that is certain to be its own"))]
     NotHeard,
     /// On the line of another master: a response to a request that was never heard before.
-    #[error("{}", t!("heard, but not certainly its own response"))]
+    #[error("{}", t!("heard, but not certain to be its own response"))]
     Unproven,
 }
 

@@ -47,7 +47,7 @@ pub fn check_settings(line: &LineDef) -> Vec<SettingError> {
     check(
         !known,
         "mode",
-        t!("{mode} is no mode of a line", mode = line.transport.mode()),
+        t!("{mode} is not a line mode", mode = line.transport.mode()),
         t!("expected RTU, ASCII or TCP"),
     );
     let short = t!("too short: no device responds within this time");
@@ -88,7 +88,7 @@ fn check_transport(transport: &Transport, check: &mut impl FnMut(bool, &'static 
             check(!BAUD_RANGE.contains(&baud), "baud", impossible, usual);
             check(!fits, "data_bits", t!("{who} data bits", who), expected);
             let wrong = !matches!(stop_bits, 1 | 2);
-            check(wrong, "stop_bits", t!("{stop_bits} stop bits do not exist", stop_bits), t!("expected 1 or 2"));
+            check(wrong, "stop_bits", t!("{stop_bits} stop bits are not possible", stop_bits), t!("expected 1 or 2"));
         }
         Transport::Network { protocol, host, port, framing: _ } => {
             let (key, word) = match protocol {
@@ -102,8 +102,8 @@ fn check_transport(transport: &Transport, check: &mut impl FnMut(bool, &'static 
             check(
                 with_port,
                 "host",
-                t!("`{host}` is no host", host),
-                t!("expected the host alone, the port is tcp_port or udp_port"),
+                t!("`{host}` is not a host", host),
+                t!("expected the host alone: its port goes into tcp_port or udp_port"),
             );
             check(*port == 0, key, t!("{word} port 0 does not exist", word), t!("expected 1 to 65535, usually 502"));
         }

@@ -96,7 +96,7 @@ impl fmt::Display for DeviceFinding {
             }
             DeviceFinding::ReadMost { table, most, .. } => {
                 t!(
-                    "gives {most} of table {table} at once: read_registers_max or read_bits_max = {most}",
+                    "returns {most} of table {table} at once: read_registers_max or read_bits_max = {most}",
                     most,
                     table = table.word()
                 )
@@ -112,7 +112,7 @@ impl fmt::Display for DeviceFinding {
                 t!("table {table}: no address {address}, {count} in all", table = table.word(), address, count)
             }
             DeviceFinding::RequestGap { gap } => {
-                t!("does not hear a request sooner after its response: request_gap_ms = {ms}", ms = gap.as_millis())
+                t!("misses a request sent sooner after its response: request_gap_ms = {ms}", ms = gap.as_millis())
             }
         })
     }

@@ -32,7 +32,7 @@ pub enum LineTrouble {
         holder: PortHolder,
     },
     /// The same for a line that is only listened to.
-    #[error("{}", t!("{path}: in use by {holder}: two programs at one port take each other's bytes; to listen needs a port of its own", path = .path, holder = .holder))]
+    #[error("{}", t!("{path}: in use by {holder}: two programs at one port take each other's bytes; listening needs a port of its own", path = .path, holder = .holder))]
     Shared {
         /// The port.
         path: String,
@@ -75,7 +75,7 @@ pub enum LineTrouble {
     #[error("{}", t!("{place}: no route to this address", place = .0))]
     NoRoute(String),
     /// A listening line over UDP.
-    #[error("{}", t!("datagrams of others do not come here: expected a serial port or a mirror over TCP"))]
+    #[error("{}", t!("datagrams between others are not heard here: expected a serial port or a mirror over TCP"))]
     DatagramsOfOthers,
     /// The driver does not go on.
     #[error("{}", t!("the port accepts no bytes"))]
@@ -102,7 +102,7 @@ pub enum LineTrouble {
     #[error("{}", t!("a response was incomplete, the stream is out of sync"))]
     ResponseIncomplete,
     /// Bytes that begin no frame.
-    #[error("{}", t!("bytes came that are no Modbus TCP frame: {bytes}", bytes = .0))]
+    #[error("{}", t!("received bytes that are not a Modbus TCP frame: {bytes}", bytes = .0))]
     NoFrame(String),
     /// A peer may have forgotten the connection.
     #[error("{}", t!("no answer to {count} requests over this connection", count = .0))]
@@ -171,7 +171,7 @@ pub enum PortHolder {
 fn known_words(ports: &[String]) -> String {
     match ports {
         [] => t!("this machine has no serial port").to_owned(),
-        ports => t!("there are: {ports}", ports = ports.join(", ")),
+        ports => t!("found: {ports}", ports = ports.join(", ")),
     }
 }
 
@@ -207,7 +207,7 @@ mod tests {
             known: known.iter().map(|port| (*port).to_owned()).collect(),
         };
         assert_eq!(missing(&[]).to_string(), "/dev/ttyUSB0: no such port (this machine has no serial port)");
-        assert_eq!(missing(&["a", "b"]).to_string(), "/dev/ttyUSB0: no such port (there are: a, b)");
+        assert_eq!(missing(&["a", "b"]).to_string(), "/dev/ttyUSB0: no such port (found: a, b)");
         assert!(!thai(&missing(&["a"])).contains("there are"), "{}", thai(&missing(&["a"])));
         let group = LineTrouble::NoPermission { path: path(), owner: PortOwner::Group("dialout".into()) };
         let english = "/dev/ttyUSB0: no permission: it belongs to the group dialout (usermod -aG dialout USER, then log in again)";

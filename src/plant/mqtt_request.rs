@@ -52,7 +52,7 @@ impl fmt::Display for MqttResult {
         match self {
             MqttResult::Refused(why) => write!(f, "{}", t!("refused: {why}", why)),
             MqttResult::Outcome(outcome) => write!(f, "{outcome}"),
-            MqttResult::Unknown => f.write_str(t!("unknown: it may have taken effect, look at the value")),
+            MqttResult::Unknown => f.write_str(t!("unknown: it may have taken effect, check the value")),
         }
     }
 }
@@ -61,7 +61,7 @@ impl fmt::Display for MqttResult {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error, Serialize, Deserialize)]
 pub enum MqttRefusal {
     /// The broker keeps it, and would deliver it again.
-    #[error("{}", t!("it is retained"))]
+    #[error("{}", t!("it is a retained message"))]
     Retained,
     /// More bytes than a request has.
     #[error("{}", t!("it is longer than {max} bytes", max = .0))]
@@ -85,7 +85,7 @@ pub enum MqttRefusal {
     #[error("{}", t!("it expires later than {max} s from now", max = .0))]
     ExpiresLate(u64),
     /// The plant has no such tag.
-    #[error("{}", t!("no tag is called {tag}", tag = .0))]
+    #[error("{}", t!("there is no tag {tag}", tag = .0))]
     UnknownTag(String),
     /// The tag is of another device than the topic.
     #[error("{}", t!("the tag is not of the device of this topic"))]
@@ -100,7 +100,7 @@ pub enum MqttRefusal {
     #[error("{}", t!("it could not be recorded: {why}", why = .0))]
     NotRecorded(String),
     /// The list of requests was damaged: what was done before is not known.
-    #[error("{}", t!("the list of earlier requests is damaged, none is taken before {until}", until = .0))]
+    #[error("{}", t!("the list of earlier requests is damaged, none is accepted before {until}", until = .0))]
     ListDamaged(Timestamp),
     /// It waited when the station was stopped.
     #[error("{}", t!("the station is stopping"))]

@@ -48,7 +48,7 @@ pub enum RequestRefusal {
     #[error("{}", t!("this terminal is locked"))]
     Locked,
     /// The role is not enough.
-    #[error("{}", t!("this is for a {needed}, you are {role}", needed = translate(.needed.word()), role = translate(.role.word())))]
+    #[error("{}", t!("this needs a {needed}, you are a {role}", needed = translate(.needed.word()), role = translate(.role.word())))]
     Role {
         /// The least that is enough.
         needed: Role,
@@ -85,7 +85,7 @@ pub enum RequestRefusal {
     #[error("{}", t!("a name has letters, digits, `.`, `_` and `-`, found {letter}", letter = format!("{:?}", .0)))]
     NameLetter(char),
     /// A name of letters that look alike.
-    #[error("{}", t!("a name is of one alphabet, found {letter} of {other} beside {first}", letter = format!("{:?}", .letter), other = .other.name(), first = .first.name()))]
+    #[error("{}", t!("a name uses one alphabet, found {letter} of {other} beside {first}", letter = format!("{:?}", .letter), other = .other.name(), first = .first.name()))]
     NameAlphabets {
         /// The first that is not of the first alphabet.
         letter: char,
@@ -95,7 +95,7 @@ pub enum RequestRefusal {
         first: Alphabet,
     },
     /// Most users are there.
-    #[error("{}", t!("there are {most} users, no more can be", most = .0))]
+    #[error("{}", t!("there are {most} users, no more can be added", most = .0))]
     UsersFull(usize),
     /// The plant file trusts this user of the operating system.
     #[error("{}", t!("{name} is a user of the operating system who needs no password here", name = .0))]
@@ -127,7 +127,7 @@ pub enum RequestRefusal {
         least: u16,
     },
     /// A long one.
-    #[error("{}", t!("the password has {chars} characters, at most {most} can be", chars = .chars, most = .most))]
+    #[error("{}", t!("the password has {chars} characters, at most {most} are allowed", chars = .chars, most = .most))]
     PasswordLong {
         /// What it has.
         chars: usize,
@@ -177,7 +177,7 @@ pub enum RequestRefusal {
     #[error("{}", t!("{name} must choose a new password first", name = .0))]
     ApproverMustChange(String),
     /// The role of the second user is not enough.
-    #[error("{}", t!("{name} cannot approve this: it is for a {needed}", name = .name, needed = translate(.needed.word())))]
+    #[error("{}", t!("{name} cannot approve this: it needs a {needed}", name = .name, needed = translate(.needed.word())))]
     ApproverRole {
         /// The second user.
         name: String,
@@ -203,7 +203,7 @@ pub enum RequestRefusal {
     #[error("{}", t!("station has ended"))]
     StationEnded,
     /// The connection to the station is lost.
-    #[error("{}", t!("station has gone"))]
+    #[error("{}", t!("station is gone"))]
     StationGone,
     /// The station was gone when the command was given.
     #[error("{}", t!("the station is disconnected"))]
@@ -263,8 +263,8 @@ fn wrong(wait: u64) -> String {
 
 fn not_checked(wait: u64) -> String {
     match wait {
-        0 => t!("password not checked after wrong ones").to_owned(),
-        seconds => t!("password not checked after wrong ones; wait {seconds} s", seconds),
+        0 => t!("too many wrong passwords: not checked").to_owned(),
+        seconds => t!("too many wrong passwords: not checked; wait {seconds} s", seconds),
     }
 }
 
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(wrong.to_string(), "wrong name or password; wait 8 s");
         assert_eq!(thai(&wrong), "ชื่อผู้ใช้\u{200b}หรือรหัสผ่าน\u{200b}ไม่ถูกต้อง; รอ 8 s");
         let role = RequestRefusal::Role { needed: Role::Supervisor, role: Role::Viewer };
-        assert_eq!(role.to_string(), "this is for a supervisor, you are viewer");
+        assert_eq!(role.to_string(), "this needs a supervisor, you are a viewer");
         assert!(!thai(&role).contains("this is"), "{}", thai(&role));
         assert_eq!(thai(&RequestRefusal::Failed("the disk is full".into())), "the disk is full");
     }
@@ -289,7 +289,7 @@ mod tests {
     fn a_wait_counts_down_to_nothing() {
         let refusal = RequestRefusal::NotChecked { wait: 16 };
         assert_eq!((refusal.wait(), refusal.with_wait(3).wait()), (16, 3));
-        assert_eq!(refusal.with_wait(0).to_string(), "password not checked after wrong ones");
+        assert_eq!(refusal.with_wait(0).to_string(), "too many wrong passwords: not checked");
         assert_eq!(RequestRefusal::Locked.wait(), 0);
         assert_eq!(RequestRefusal::Locked.with_wait(9), RequestRefusal::Locked);
     }

@@ -90,8 +90,8 @@ impl StationFault {
                 "read the details; free the disk or repair the command; what is missing is made automatically",
             ],
             StationFault::DataOut => [
-                "the broker or the network is down, it refuses the station, or the history does not record",
-                "the receivers of the values see old ones; nothing is lost, the history has all of them",
+                "the broker or the network is down, the broker refuses the station, or the history does not record",
+                "systems that receive the values see old ones; nothing is lost, the history has all of them",
                 "read the details; check network, broker, user and password; what is missing is sent automatically",
             ],
             StationFault::Procedure => [

@@ -251,8 +251,8 @@ impl Own {
             ],
             Own::OtherThanStated => [
                 "the device is set up differently, or `[device.stated]` of the plant file is wrong",
-                "values up to now were wrong by it; from now on what the device says counts",
-                "correct `[device.stated]` in the plant file, and tell who uses the values stored before",
+                "values so far were wrong; from now on the value of the device counts",
+                "correct `[device.stated]` in the plant file, and inform those who use the values stored before",
             ],
             Own::NoTraffic => [
                 "the other master has stopped or is off, or the wire to this port is broken",

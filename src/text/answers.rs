@@ -54,7 +54,7 @@ mod tests {
     #[test]
     fn a_refusal_on_record_is_read_in_the_language_of_the_terminal() {
         let thai = |outcome: &str| Language::THAI.locale().within(|| recorded(outcome));
-        for refusal in ["wrong name or password; wait 8 s", "this is for a supervisor, you are viewer", "log in first"]
+        for refusal in ["wrong name or password; wait 8 s", "this needs a supervisor, you are a viewer", "log in first"]
         {
             let shown = thai(&format!("refused: {refusal}"));
             assert!(!shown.contains(refusal.split(' ').next().unwrap_or_default()), "{shown}");

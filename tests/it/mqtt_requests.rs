@@ -146,7 +146,7 @@ fn what_is_no_valid_request_is_refused_and_writes_nothing() {
     check(&text("r-1", "TIC-1.SV", json!("hot")), &[], "invalid type: string");
     check(&text("r-2", "TIC-1.SV", json!(null)), &[], "invalid type: null");
     check(&vec![b' '; 5_000], &[], "longer than 4096 bytes");
-    check(&text("r-3", "TIC-7.SV", json!(50)), &[], "no tag is called TIC-7.SV");
+    check(&text("r-3", "TIC-7.SV", json!(50)), &[], "there is no tag TIC-7.SV");
     check(&text("r-4", "PLC-1.RUN", json!(1)), &[], "not of the device");
     check(
         &text("r-5", "TIC-1.SV", json!(50)),
@@ -161,7 +161,7 @@ fn what_is_no_valid_request_is_refused_and_writes_nothing() {
     check(&text("r-7", "TIC-1.SV", json!(50)), &["-r"], "retained");
     // What the plant refuses, as it would refuse it to a person: out of limits, and not for this role.
     check(&text("r-8", "TIC-1.SV", json!(100_000)), &[], "outside");
-    check(&text("r-9", "TIC-1.P", json!(7)), &[], "this is for a supervisor, you are technician");
+    check(&text("r-9", "TIC-1.P", json!(7)), &[], "this needs a supervisor, you are a technician");
 
     // Longer than a packet may be: the broker keeps it to itself, and the connection stays.
     client.publish(TOPIC, &vec![b' '; 100_000], &[]);
@@ -203,7 +203,7 @@ fn a_station_killed_before_the_outcome_answers_unknown() {
     let mut station = place.station();
     let answer = client.answer("k-1");
     assert_eq!(answer["result"], "unknown", "{answer}");
-    assert!(answer["reason"].as_str().is_some_and(|why| why.contains("look at the value")), "{answer}");
+    assert!(answer["reason"].as_str().is_some_and(|why| why.contains("check the value")), "{answer}");
     place.wait_until("it takes requests", is_ready);
     client.send(&killed, &[]);
     assert_eq!(client.answer("k-1")["result"], "unknown", "and it is not done again");
@@ -255,7 +255,7 @@ fn refusals_before_the_plant_are_on_record_in_bounds() {
     let entries: Vec<_> = log.lines().filter(|line| line.contains("request from outside")).collect();
     assert_eq!(entries.len(), 3, "{entries:?}");
     assert!(entries[2].contains("refused: 11 requests, the last: not a request"), "the rest, at the end: {entries:?}");
-    assert!(entries[0].contains("not a request") && entries[1].contains("no tag is called TIC-7.SV"), "{entries:?}");
+    assert!(entries[0].contains("not a request") && entries[1].contains("there is no tag TIC-7.SV"), "{entries:?}");
 }
 
 #[test]

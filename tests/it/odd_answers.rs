@@ -49,7 +49,7 @@ fn send_compares_every_field_of_an_answer() {
     }
     let next = peer(answers(|request| vec![0, request[1] + 1, 0, 0, 0, 5, 1, 3, 2, 0, 7]));
     let (code, said) = run(&["send", &next, "01 03 00 00 00 01", "--timeout", "200"]);
-    assert!(code == Some(1) && said.contains("responses carry transaction 2, the request was 1"), "{code:?} {said}");
+    assert!(code == Some(1) && said.contains("response has transaction 2, the request had 1"), "{code:?} {said}");
     // The answer behind that of another request.
     let both = peer(answers(|_| [[0, 9, 0, 0, 0, 5, 1, 3, 2, 0, 7], [0, 1, 0, 0, 0, 5, 1, 3, 2, 0, 8]].concat()));
     let (code, said) = run(&["send", &both, "01 03 00 00 00 01"]);

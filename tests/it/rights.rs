@@ -25,8 +25,8 @@ const USERS: [&str; 6] = ["nobody", "vera", "tom", "sue", "lena", "mia"];
 /// The refusal for each of them; `{}` is the role that is needed.
 const WHY: [&str; 6] = [
     "log in first",
-    "this is for a {}, you are viewer",
-    "this is for a {}, you are technician",
+    "this needs a {}, you are a viewer",
+    "this needs a {}, you are a technician",
     "",
     "this terminal is locked",
     "choose a new password first",
@@ -126,8 +126,8 @@ const DONE: &str = "";
 const LOG_IN: &str = "log in first";
 const LOCKED: &str = "this terminal is locked";
 const CHANGE: &str = "choose a new password first";
-const NOT_VIEWER: &str = "you are viewer";
-const NOT_TECHNICIAN: &str = "you are technician";
+const NOT_VIEWER: &str = "you are a viewer";
+const NOT_TECHNICIAN: &str = "you are a technician";
 const SUPERVISOR: Answers = [LOG_IN, NOT_VIEWER, NOT_TECHNICIAN, DONE, LOCKED, CHANGE];
 /// Whoever has started the station can end it anyway, logged in or not: these tests run as the same user.
 const HOST: Answers = [DONE, NOT_VIEWER, NOT_TECHNICIAN, DONE, LOCKED, CHANGE];

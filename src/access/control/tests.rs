@@ -248,7 +248,7 @@ fn the_audit_trail_is_for_supervisors_and_refusals_are_recorded() {
     bench.open(1, "here");
     bench.login(1, "tech", TECH).unwrap();
     let (why, effects) = bench.access.may_ask(1, &query, bench.now).unwrap_err();
-    assert_eq!(why, "this is for a supervisor, you are technician");
+    assert_eq!(why, "this needs a supervisor, you are a technician");
     assert!(matches!(&effects[..], [Effect::Record(entry)] if &*entry.by == "tech" && entry.outcome.ends_with(&why)));
     bench.login(1, "boss", BOSS).unwrap();
     assert_eq!(bench.access.may_ask(1, &query, bench.now), Ok(()));

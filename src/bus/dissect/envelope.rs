@@ -154,7 +154,7 @@ fn mbap(bytes: &[u8]) -> Envelope {
     };
     let (protocol, length, follow) = (word(2), usize::from(word(4)), bytes.len() - 6);
     let before = vec![
-        field(0, t!("transaction"), t!("{number}, the answer repeats it", number = word(0))),
+        field(0, t!("transaction"), t!("{number}, the response repeats it", number = word(0))),
         field(
             2,
             t!("protocol"),

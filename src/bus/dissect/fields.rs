@@ -137,7 +137,7 @@ impl<'r, 'a> Fields<'r, 'a> {
                 let more = self.values.numbers.last() != Some(&0);
                 self.reader.byte(t!("next object"), |id| match more {
                     false => t!("none").into(),
-                    true => t!("ask on from {id} {object}", id, object = names::object(id)),
+                    true => t!("continue from {id} {object}", id, object = names::object(id)),
                 })?;
             }
             Item::Objects => self.objects()?,

@@ -251,7 +251,7 @@ impl Readings {
                 (Some(Direction::Answer), answer, Some(also))
             }
             (None, true, true) => {
-                let also = t!("an answer: {summary}", summary = answer.summary);
+                let also = t!("a response: {summary}", summary = answer.summary);
                 (Some(Direction::Request), request, Some(also))
             }
             (None, true, false) => (Some(Direction::Request), request, None),

@@ -162,7 +162,7 @@ fn what_may_be_two_things_says_so() {
     );
     // Eight bytes that begin 01 01 03: a request from 00769, or 24 coils.
     let dissection = check("01 01 03 00 00 05", "", "unit 1 read coils 00769–00773 (0x0300, 5)");
-    assert_eq!(dissection.also.as_deref(), Some("an answer: 24 bits: 0000 0000 0000 0000 1010 0000"));
+    assert_eq!(dissection.also.as_deref(), Some("a response: 24 bits: 0000 0000 0000 0000 1010 0000"));
     // A request for 27397 coils would be refused: this is an answer.
     let dissection = check("01 01 03 CD 6B 05", "", "24 bits: 1011 0011 1101 0110 1010 0000");
     assert!(dissection.also.unwrap().starts_with("a request: unit 1 read coils"));

@@ -156,7 +156,7 @@ fn after_a_restart_nothing_is_done_again() {
     let mut after = requests(Ok(log));
     let left = after.after_restart(now(1));
     assert_eq!(results(&left), ["unknown"]);
-    assert!(answer(&left[0])["reason"].as_str().is_some_and(|why| why.contains("look at the value")));
+    assert!(answer(&left[0])["reason"].as_str().is_some_and(|why| why.contains("check the value")));
     assert!(decide(&mut after, &received, 2).starts_with("unknown: the station was restarted"));
     assert_eq!(decide(&mut after, &message(&json("b", "50")), 2), "command 1");
 }

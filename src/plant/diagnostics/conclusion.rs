@@ -75,10 +75,10 @@ pub enum SweepEnd {
         code: ExceptionCode,
     },
     /// This many blocks in a row were not answered, and none before.
-    #[error("{}", t!("no answer to {count} blocks: what this unit has is not known", count = .0))]
+    #[error("{}", t!("no response to {count} blocks: what this unit has is unknown", count = .0))]
     Silent(u32),
     /// The unit has fallen silent at this address.
-    #[error("{}", t!("no more answers, last asked at address {address}: the rest is not known", address = .0))]
+    #[error("{}", t!("no more responses, last request at address {address}: the rest is unknown", address = .0))]
     FellSilent(u16),
 }
 
@@ -98,17 +98,17 @@ impl fmt::Display for Conclusion {
             Conclusion::Units(count, _) => t!("{count} answers", count),
             Conclusion::Patterns(tally) => return tally.fmt(f),
             Conclusion::Plug(tally) => match (tally.received, tally.faults()) {
-                (0, _) => t!("nothing came back: no plug and no local echo, or transmitter or receiver does not work"),
+                (0, _) => t!("nothing came back: no plug and no local echo, or a faulty transmitter or receiver"),
                 (_, 0) => {
                     t!("every byte came back: plug and adapter work. Without a plug this is local echo: the adapter receives what it sends")
                 }
-                (_, _) => t!("bytes are lost or changed: contact, cable, baud rate too high, or a unit that sends too"),
+                (_, _) => t!("bytes are lost or changed: bad contact or cable, baud rate too high, or another unit sending"),
             }
             .to_owned(),
             Conclusion::Signals { test, held, after } => signals(*test, *held, *after),
             Conclusion::Deaf(span) => {
                 let seconds = format!("{:.1}", span.as_secs_f64());
-                t!("the device answered nothing for the first {seconds} s of the connection", seconds)
+                t!("the device did not respond for the first {seconds} s of the connection", seconds)
             }
             Conclusion::Sweep { ended: Some(ended), answers: 0, refused: 0, silent: 0, .. } => return ended.fmt(f),
             Conclusion::Sweep { ended: Some(ended), .. } => format!("{ended}; {}", self.swept()),
@@ -124,10 +124,10 @@ impl Conclusion {
             return String::new();
         };
         let mut words = match (answers, refused, silent) {
-            (0, 0, _) => t!("nothing answers, and nothing is refused: what this unit has is not known").to_owned(),
-            (0, _, 0) => t!("nothing but exceptions: no address that was asked can be read").to_owned(),
+            (0, 0, _) => t!("no response, not even a refusal: what this unit has is unknown").to_owned(),
+            (0, _, 0) => t!("only exceptions: none of the requested addresses can be read").to_owned(),
             (0, ..) => t!("nothing can be read; {refused} are refused, {silent} silent", refused, silent),
-            (_, 0, 0) => t!("all {answers} answer: this unit does not say what it does not have", answers),
+            (_, 0, 0) => t!("all {answers} answer: this unit does not refuse addresses that it lacks", answers),
             (_, _, 0) => t!("{answers} answer in {ranges} ranges, {refused} are refused", answers, ranges, refused),
             (..) => t!(
                 "{answers} answer in {ranges} ranges, {refused} are refused, {silent} silent",
@@ -138,7 +138,7 @@ impl Conclusion {
             ),
         };
         if 0 < refused && 1 < every {
-            words += &t!("; a refused block was asked at every {every}th address", every);
+            words += &t!("; a refused block was read at every {every}th address only", every);
         }
         if cut {
             words += &t!("; only the first {count} ranges are listed", count = FINDINGS_MAX - 1);

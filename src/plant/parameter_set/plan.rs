@@ -59,7 +59,7 @@ pub enum Problem {
     #[error("{}", t!("{tag}: interlock: {text}", tag = .tag, text = .text))]
     Interlock { tag: String, text: String },
     /// The limits forbid every sequence.
-    #[error("{}", t!("{what}: no sequence of writes keeps within the limits", what = .0))]
+    #[error("{}", t!("{what}: no sequence of writes stays within the limits", what = .0))]
     NoOrder(String),
 }
 

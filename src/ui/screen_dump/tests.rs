@@ -99,7 +99,7 @@ fn a_screen_that_is_not_recorded_is_not_saved() {
     let (id, _) = request(&type_keys(&mut model, "P")).expect("a request");
     let effects = update(&mut model, Msg::RequestDone(id, Err(RequestRefusal::StationGone)));
     assert_eq!((saved(&effects), request(&effects)), (None, None));
-    assert!(screen(&mut model, 80, 24).contains("The screen was not saved: station has gone"));
+    assert!(screen(&mut model, 80, 24).contains("The screen was not saved: station is gone"));
 }
 
 #[test]

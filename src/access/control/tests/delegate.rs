@@ -23,7 +23,7 @@ fn requests_have_the_rights_of_their_user() {
     assert_eq!(tech.last(), ("tech login", "tech", "done: named by the plant file"));
     assert_eq!(refused(&mut tech, RUN), None);
     let mut view = bench("view", AccessDef::default());
-    assert_eq!(refused(&mut view, RUN).as_deref(), Some("this is for a technician, you are viewer"));
+    assert_eq!(refused(&mut view, RUN).as_deref(), Some("this needs a technician, you are a viewer"));
     let trusted = AccessDef { trusted: vec![("mes".into(), Role::Technician)], ..AccessDef::default() };
     assert_eq!(refused(&mut bench("mes", trusted), RUN), None);
 }

@@ -38,7 +38,7 @@ fn wrong_passwords_of_one_system_user_lock_no_other_out() {
     }
     bench.login(2, "boss", BOSS).unwrap();
     let reply = bench.login(1, "boss", BOSS).unwrap_err();
-    assert!(reply.starts_with("password not checked after wrong ones; wait"), "{reply}");
+    assert!(reply.starts_with("too many wrong passwords: not checked; wait"), "{reply}");
     let rows = bench.access.session_status(2, bench.now).users;
     assert!(rows.iter().any(|row| &*row.user == "boss" && row.locked_until.is_some()), "a supervisor sees it");
     bench.request(2, SessionRequest::Disable { user: "boss".into(), disabled: false }).unwrap();

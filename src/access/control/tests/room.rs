@@ -55,8 +55,8 @@ fn the_stations_own_terminal_comes_and_goes_without_an_entry() {
 #[test]
 fn who_finds_no_seat_learns_whose_terminals_have_them() {
     for (user, words) in [
-        (Some("script"), "4 terminals of script are attached, no more may be"),
-        (None, "4 terminals are attached, no more may be"),
+        (Some("script"), "script has 4 terminals, no more can attach"),
+        (None, "4 terminals are attached, no more can attach"),
     ] {
         assert_eq!(SessionEnd::TooMany { count: 4, user: user.map(str::to_owned) }.to_string(), words);
     }

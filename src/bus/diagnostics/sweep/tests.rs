@@ -38,7 +38,7 @@ fn answering(job: &SweepJob) -> Vec<(u16, u16)> {
 fn a_unit_that_answers_everything_takes_one_request_a_block() {
     let (job, requests) = run(sweep(0, 65_535, 8), |_, _| Ok(()));
     assert_eq!((answering(&job), requests), (vec![(0, 65_535)], 547));
-    assert!(job.conclusion().to_string().contains("does not say what it does not have"), "{}", job.conclusion());
+    assert!(job.conclusion().to_string().contains("does not refuse addresses that it lacks"), "{}", job.conclusion());
 }
 
 #[test]
@@ -70,7 +70,7 @@ fn a_unit_that_gives_few_at_once_is_asked_for_fewer() {
 fn nothing_but_exceptions_is_said_as_such() {
     let (job, _) = run(sweep(0, 999, 8), |_, _| Err(Fault::Exception(ExceptionCode(4))));
     assert_eq!(answering(&job), []);
-    assert!(job.conclusion().to_string().starts_with("nothing but exceptions"), "{}", job.conclusion());
+    assert!(job.conclusion().to_string().starts_with("only exceptions"), "{}", job.conclusion());
     let (job, requests) = run(sweep(0, 999, 8), |_, _| Err(Fault::Exception(ExceptionCode::ILLEGAL_FUNCTION)));
     assert!(requests == 1 && job.conclusion().to_string().contains("no such table"), "{}", job.conclusion());
 }
@@ -80,7 +80,7 @@ fn a_silent_unit_is_given_up_and_nothing_is_claimed_of_it() {
     let (job, requests) = run(sweep(0, 65_535, 8), |_, _| Err(Fault::Timeout));
     assert_eq!(requests, 6, "three blocks, twice each");
     assert!(job.ranges().iter().all(|range| range.outcome == SweptOutcome::Silent(Fault::Timeout)));
-    assert!(job.conclusion().to_string().contains("not known"), "{}", job.conclusion());
+    assert!(job.conclusion().to_string().contains("is unknown"), "{}", job.conclusion());
 }
 
 #[test]
@@ -89,7 +89,7 @@ fn a_unit_that_falls_silent_ends_the_sweep_there() {
         run(sweep(0, 65_535, 8), |_, request| if request < 10 { Ok(()) } else { Err(Fault::Timeout) });
     assert_eq!((answering(&job), requests), (vec![(0, 1_199)], 13));
     assert!(
-        job.conclusion().to_string().starts_with("no more answers, last asked at address 1200"),
+        job.conclusion().to_string().starts_with("no more responses, last request at address 1200"),
         "{}",
         job.conclusion()
     );

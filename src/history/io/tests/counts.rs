@@ -249,7 +249,7 @@ fn a_correction_counts_in_the_period_in_which_it_is_entered() {
     let mut records = samples(|at| Some(plain(at)), 2 * DAY_S);
     records.push(correction(DAY_S + 100, "12.25 °C", "done"));
     records.push(correction(DAY_S + 200, "-2 °C", "verified"));
-    records.push(correction(DAY_S + 300, "99 °C", "refused: this is for a supervisor"));
+    records.push(correction(DAY_S + 300, "99 °C", "refused: this needs a supervisor"));
     store.append(&records).unwrap();
     let [before, with] = [report(&store, 3_600, DAY_S), report(&store, DAY_S, 2 * DAY_S - 300)];
     assert_eq!(counted(&before, PV), STEP * 276.0);

@@ -99,5 +99,5 @@ fn a_number_that_means_no_value_is_asked_again() {
         })
     };
     assert_eq!(asked(64.9), (false, Vec::new()));
-    assert_eq!(asked(65.0), (true, vec!["! by this number the device says that it has no value".to_owned()]));
+    assert_eq!(asked(65.0), (true, vec!["! for the device this number means no value".to_owned()]));
 }

@@ -330,7 +330,7 @@ fn the_csv_that_is_written_is_the_report_that_is_shown() {
     stand.reply = Err(RequestRefusal::Role { needed: Role::Technician, role: Role::Viewer });
     stand.press("e");
     assert!(stand.saved.is_empty(), "what the station does not have on record is not written");
-    assert!(stand.screen().contains("not written: this is for a technician"));
+    assert!(stand.screen().contains("not written: this needs a technician"));
 }
 
 #[test]

@@ -82,7 +82,7 @@ pub(super) fn of_device(
         Fault::WrongFunction { .. } | Fault::WrongLength { .. } | Fault::WrongEcho | Fault::OutOfSync => {
             t!("check for a second master or a duplicate unit address").to_owned()
         }
-        Fault::NotHeard => t!("check wires, ground and place of the tap").to_owned(),
+        Fault::NotHeard => t!("check wires, ground and position of the tap").to_owned(),
         Fault::NotANumber | Fault::NotConnected | Fault::BackedOff | Fault::Unproven => String::new(),
     };
     worries.push(t!("{fault} at {when}: {advice}", fault, when, advice).trim_end_matches(": ").to_owned());
