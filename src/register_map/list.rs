@@ -146,9 +146,13 @@ impl List {
                 return None;
             }
             Some(match taken.1 == unit {
-                true => t!("it is of another connection with unit {unit}", unit),
+                true => t!("it belongs to another connection with unit {unit}", unit),
                 false => {
-                    t!("it is of unit {other}, the registers of unit {unit} are taken", other = unit, unit = taken.1)
+                    t!(
+                        "it belongs to unit {other}, the registers of unit {unit} are taken",
+                        other = unit,
+                        unit = taken.1
+                    )
                 }
             })
         };
@@ -338,7 +342,7 @@ fn assumptions(taken: &Taken, context: &ListContext, is_sure: bool) -> Vec<Strin
         (*is_base_assumed && context.base.is_none(), t!("plain numbers are addresses as sent, from 0").to_owned()),
         (*is_order_assumed && context.order.is_none(), t!("byte order {order}", order = named.order.word())),
         (*is_type_assumed, t!("type uint16").to_owned()),
-        (*is_write_lost, t!("only read: where or how it is written is not sure").to_owned()),
+        (*is_write_lost, t!("read only: where or how it is written is uncertain").to_owned()),
         (*are_bounds_assumed && !is_sure, t!("bounds are values after the factor").to_owned()),
         (is_scaled_twice && !is_sure, t!("the offset is added after the factor").to_owned()),
     ];

@@ -78,7 +78,7 @@ pub fn read(bytes: &[u8], context: &ListContext) -> List {
 /// A file of a known form without a row is none.
 fn nothing(list: &List) -> Option<String> {
     let is_empty = list.named.is_empty() && list.calculated.is_empty() && list.problems.is_empty();
-    is_empty.then(|| t!("there is nothing in it").to_owned())
+    is_empty.then(|| t!("it is empty").to_owned())
 }
 
 fn of_text(text: &str, context: &ListContext) -> List {
@@ -100,7 +100,7 @@ fn of_text(text: &str, context: &ListContext) -> List {
     };
     let list = match format {
         Format::List => list::parse(text, context),
-        Format::Workbook => List::refused(t!("it is no Excel workbook (.xlsx): {error}", error = "PK")),
+        Format::Workbook => List::refused(t!("it is not an Excel workbook (.xlsx): {error}", error = "PK")),
         Format::Html => of_tables(html::tables(text), context),
         Format::HomeAssistant => tree(yaml::parse(text), format::home_assistant::read),
         Format::EspHome => tree(yaml::parse(text), format::esphome::read),

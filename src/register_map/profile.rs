@@ -81,7 +81,7 @@ pub fn written(list: &List, name: &str, source: &str) -> Result<Written, String>
             lessen(&mut rows, n, &why, &mut problems);
         }
     }
-    Err(problems.pop().unwrap_or_else(|| t!("there is nothing in it").to_owned()))
+    Err(problems.pop().unwrap_or_else(|| t!("it is empty").to_owned()))
 }
 
 /// Leaves out the rows whose power of ten is left out: without it they would be another value.
@@ -106,7 +106,7 @@ fn lessen(rows: &mut Vec<Row>, n: usize, why: &str, problems: &mut Vec<String>) 
     if has_more && !row.is_bare {
         let bare =
             Named { access: Access::Read, min: None, max: None, write_fc: None, write_at: None, ..row.named.clone() };
-        problems.push(format!("{place}: {}", t!("{name}: only to be read: {why}", name, why)));
+        problems.push(format!("{place}: {}", t!("{name}: read only: {why}", name, why)));
         row.tag = TagDef { label: row.tag.label.clone(), ..bare.tag(&row.tag.short) };
         row.is_bare = true;
     } else {

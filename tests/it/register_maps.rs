@@ -59,8 +59,8 @@ fn what_cannot_be_read_or_has_two_readings_writes_nothing() {
     let folder = folder();
     let twice = "address;name;type\n40080;W;int16\n40083;VA;int16\n";
     for (input, words) in [
-        (&b""[..], "there is nothing in it"),
-        (b"\x7FELF\x00\x00", "it is no text"),
+        (&b""[..], "it is empty"),
+        (b"\x7FELF\x00\x00", "it is not text"),
         (b"a: 1\nb: 2\nc:\n  - d: 3\n", "What can be read"),
         (twice.as_bytes(), "holding 79 (--base modicon) or holding 40080 (--base 0)"),
     ] {

@@ -33,7 +33,7 @@ pub fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, String> {
 }
 
 fn not_text() -> String {
-    t!("it is no text").to_owned()
+    t!("it is not text").to_owned()
 }
 
 /// The signs of Windows from 0x80 on, where Latin-1 has none; five of the bytes are not used.

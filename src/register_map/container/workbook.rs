@@ -24,7 +24,7 @@ pub type Sheets = (Vec<(String, Vec<Cells>)>, Vec<String>);
 /// Name and rows of each sheet that has any and is shown, and the names of those that are not.
 pub fn sheets(bytes: &[u8]) -> Result<Sheets, String> {
     check_size(bytes)?;
-    let no_book = |error: &dyn std::fmt::Display| t!("it is no Excel workbook (.xlsx): {error}", error);
+    let no_book = |error: &dyn std::fmt::Display| t!("it is not an Excel workbook (.xlsx): {error}", error);
     let mut book = Xlsx::new(Cursor::new(bytes)).map_err(|error| no_book(&error))?;
     let mut sheets = Vec::new();
     let of = |is_shown: bool| {
@@ -45,7 +45,7 @@ pub fn sheets(bytes: &[u8]) -> Result<Sheets, String> {
 
 /// A small file may be a large one in an archive.
 fn check_size(bytes: &[u8]) -> Result<(), String> {
-    let broken = |error: &dyn std::fmt::Display| t!("it is no Excel workbook (.xlsx): {error}", error);
+    let broken = |error: &dyn std::fmt::Display| t!("it is not an Excel workbook (.xlsx): {error}", error);
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|error| broken(&error))?;
     let (mut size, mut buffer) = (0, vec![0; 1 << 16]);
     for n in 0..archive.len() {

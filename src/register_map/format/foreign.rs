@@ -18,7 +18,7 @@ pub fn format_of(text: &str) -> Result<Format, &'static str> {
     } else if text.starts_with('{') && !is_toml {
         Format::Mtui
     } else if text.starts_with('[') && text.trim_end().ends_with(']') && !text.contains("[[") {
-        return Err(t!("JSON that is no list of registers"));
+        return Err(t!("JSON that is not a list of registers"));
     } else if is_toml {
         Format::Telegraf
     } else if has("[[tag]]") || has("[[device]]") {
@@ -42,7 +42,7 @@ pub fn format_of(text: &str) -> Result<Format, &'static str> {
     } else if has("modbus:") || has("input_type:") {
         Format::HomeAssistant
     } else if is_yaml(text) {
-        return Err(t!("YAML, which is no list of registers"));
+        return Err(t!("YAML that is not a list of registers"));
     } else if modmaster::is_one(text) {
         Format::ModMaster
     } else {

@@ -29,7 +29,7 @@ use crate::{
 
 /// Why a key makes a row none.
 pub fn unsaid(key: &str) -> String {
-    t!("`{key}` cannot be said in a profile", key)
+    t!("a profile cannot express `{key}`", key)
 }
 
 /// A key that is needed and is not there.
@@ -44,7 +44,7 @@ pub fn wrong(key: &str, node: &Node) -> String {
 
 /// The registers of a row do not stand beside each other.
 pub fn apart() -> String {
-    t!("its registers do not follow each other").to_owned()
+    t!("its registers are not consecutive").to_owned()
 }
 
 impl Node {
@@ -82,7 +82,7 @@ impl List {
     /// A list of a tree, with the keys in it that stand twice.
     pub fn of_tree(tree: &Tree) -> List {
         let twice = |(line, key): &(usize, String)| {
-            t!("line {line}: `{key}` stands twice: the last one counts", line = *line, key)
+            t!("line {line}: `{key}` is given twice: the last one counts", line = *line, key)
         };
         List { warnings: tree.twice.iter().map(twice).collect(), ..List::default() }
     }

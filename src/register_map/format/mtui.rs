@@ -138,17 +138,17 @@ impl Rule {
         let kind = words::kind_of(repr).ok_or_else(|| t!("`{repr}` is not a known type", repr))?;
         let kind = if table.is_bits() { DataType::Bool } else { kind };
         if !self.bits.is_empty() {
-            return Err(t!("names of bits cannot be taken").to_owned());
+            return Err(t!("names of bits cannot be imported").to_owned());
         }
         if self.next.iter().zip(1u16..).any(|(next, n)| address.checked_add(n) != Some(*next)) {
-            return Err(t!("its words do not stand beside each other").to_owned());
+            return Err(t!("its words are not adjacent").to_owned());
         }
         let order = self.word_order.as_deref().map_or(Some(usual), words::order_of);
         let order = order.ok_or_else(|| t!("unknown word order").to_owned())?;
         let order = if kind.is_half() { ByteOrder::Abcd } else { order };
         let (mut scale, mut offset) = (1.0, 0.0);
         for op in &self.ops {
-            let wrong = || t!("{op} is not a step that a scale and an offset can do", op);
+            let wrong = || t!("{op} cannot be expressed by a scale and an offset", op);
             let text = op.as_str().map(str::trim).ok_or_else(wrong)?;
             let by: f64 = text.get(1..).and_then(|number| number.trim().parse().ok()).ok_or_else(wrong)?;
             match text.chars().next() {

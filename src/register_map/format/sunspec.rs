@@ -108,7 +108,7 @@ impl Reader<'_> {
                 let most = counted_by
                     .map_or(1, |counted_by| self.repeat(first, begun, &format!("{prefix}{name}"), counted_by));
                 self.list.warnings.push(t!(
-                    "line {line}: how often `{name}` stands there ({count}) only the device knows: {most} at most are taken",
+                    "line {line}: only the device knows how many `{name}` it has ({count}): at most {most} are taken",
                     line = inner.line,
                     name,
                     count,
@@ -118,7 +118,7 @@ impl Reader<'_> {
             // Where the next group stands depends on how many these are.
             if times.is_none() && !is_last {
                 self.list.warnings.push(t!(
-                    "line {line}: what follows `{name}` has no fixed place",
+                    "line {line}: what follows `{name}` has no fixed address",
                     line = inner.line,
                     name
                 ));

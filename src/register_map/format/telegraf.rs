@@ -117,7 +117,7 @@ fn requested(request: &Node, field: &Node) -> Result<Option<Named>, String> {
         "discrete" => Table::Discrete,
         "input" => Table::Input,
         "holding" => Table::Holding,
-        word => return Err(t!("`{table}` is no table", table = word)),
+        word => return Err(t!("`{table}` is not a table", table = word)),
     };
     let address = field.wire_address("address")?;
     if table.is_bits() {

@@ -124,7 +124,7 @@ fn channel(row: &Node, name: &str, device: &Node, key: &str) -> Result<Named, St
         "input" => (Table::Input, None),
         "holding" | "holding_single" => (Table::Holding, None),
         "holding_multi" => (Table::Holding, Some(16)),
-        word => return Err(t!("`{table}` is no table", table = word)),
+        word => return Err(t!("`{table}` is not a table", table = word)),
     };
     let node = row.get("address").ok_or_else(|| missing("address"))?;
     let (address, field) = place(node)?;

@@ -63,7 +63,7 @@ impl Row {
     /// What plain numbers mean only a heading can say.
     fn refuse_numbers(&mut self, numbers: &[&str]) {
         if let Some(number) = numbers.first() {
-            self.wrong.get_or_insert(t!("what is `{number}`? A heading above the columns says it", number));
+            self.wrong.get_or_insert(t!("what is `{number}`? Add a heading above the columns", number));
         }
     }
 }

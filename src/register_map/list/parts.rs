@@ -117,7 +117,7 @@ fn of_form(cells: &Cells) -> Row {
 
 /// Rows without a heading; `Err` where they are no list.
 fn by_form(all: &[Cells], is_separated: bool, said: &Said) -> Result<Vec<Row>, String> {
-    let Some(first) = all.first() else { return Err(t!("there is nothing in it").to_owned()) };
+    let Some(first) = all.first() else { return Err(t!("it is empty").to_owned()) };
     if is_separated && !first.cells.iter().any(|cell| is_address(cell)) {
         // Prose above a table is no heading of it.
         let count = |row: &Cells| row.cells.iter().filter(|cell| !cell.is_empty()).count();

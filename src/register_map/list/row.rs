@@ -106,15 +106,15 @@ pub fn unfit(column: Column, cell: &str) -> String {
         return t!("`{wrong}` is not a scale", wrong = cell);
     }
     if matches!(column, Column::Table | Column::Area) {
-        return t!("`{table}` is no table", table = cell);
+        return t!("`{table}` is not a table", table = cell);
     }
     if column == Column::Offset {
         return t!("`{offset}` is not an offset", offset = cell);
     }
     if column == Column::Order {
-        return t!("`{order}` is no byte order", order = cell);
+        return t!("`{order}` is not a byte order", order = cell);
     }
-    t!("`{cell}` is not understood below {column}", cell, column = translate(column.word()))
+    t!("`{cell}` is not understood in the column {column}", cell, column = translate(column.word()))
 }
 
 /// Bounds beside a factor are values, unless no raw number would be one of them.
@@ -124,7 +124,9 @@ fn check_bounds(named: &Named) -> Result<(), String> {
     let (least, most) = (least as f64 - 1.0, most as f64 + 1.0);
     let is_beyond = |bound: &f64| !(least..=most).contains(&((bound - named.offset) / named.scale));
     match named.min.into_iter().chain(named.max).find(is_beyond) {
-        Some(bound) => Err(t!("`{bound}` is more than its registers hold after the factor: is it before it?", bound)),
+        Some(bound) => {
+            Err(t!("`{bound}` is more than its registers hold after the factor: is it a raw number?", bound))
+        }
         None => Ok(()),
     }
 }
@@ -188,7 +190,7 @@ impl Row {
         let is_signed = kind.encoding() == Encoding::Signed;
         let is_other = kind.is_binary() && self.signed.is_some_and(|signed| signed != is_signed);
         if is_other {
-            return Err(t!("`{word}` is not what its sign says", word));
+            return Err(t!("`{word}` contradicts its sign", word));
         }
         Ok((kind, order))
     }
@@ -297,7 +299,7 @@ impl Row {
         named.bad_if = more.bad.iter().filter_map(|bad| bad_span(*bad, named.point())).collect();
         let bits = more.bits.iter().map(|(bit, label)| Some((u8::try_from(*bit).ok()?, label.clone())));
         let bits: Option<_> = bits.collect();
-        named.bit_labels = bits.ok_or_else(|| t!("it has no such bit").to_owned())?;
+        named.bit_labels = bits.ok_or_else(|| t!("it does not have this bit").to_owned())?;
         Ok(if more.labels.is_empty() { named } else { named.labelled(more.labels.clone()) })
     }
 }

@@ -171,7 +171,7 @@ fn a_table_of_something_else_is_refused_as_a_whole() {
         ("Hex\tCode\tDescription\n0x01\t1\tno battery\n", "Hex, Code, Description"),
         ("Bit Number\tError message\n0\tGFCI\n1\tRelay\n", "no column of addresses"),
         ("parameters:\n  - name: PV\n    registers: [0x022D]\n    scale: 0.1\n", "only 0 of its 4 lines"),
-        ("", "nothing in it"),
+        ("", "it is empty"),
     ] {
         let list = parse(text, &context());
         assert!(

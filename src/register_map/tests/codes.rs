@@ -37,7 +37,7 @@ fn a_number_of_another_table_than_its_codes_is_left_out() {
     let rows = "X1;BIT;100001;FC=02;IN\nC1;BIT;16385;FC=01,05,15;PUMP\nSD1;INT;361441;FC=03,06,16;STATE\n";
     let taken = ["10001 IN bool ABCD x1", "016385 PUMP bool ABCD x1 rw"];
     check(&controller(rows), &taken, &["`361441` and `holding` differ"], &[]);
-    check(&controller("DS1;INT;5;FC=03,04;SP\n"), &[], &["`FC=03,04` is no table"], &[]);
+    check(&controller("DS1;INT;5;FC=03,04;SP\n"), &[], &["`FC=03,04` is not a table"], &[]);
 }
 
 #[test]

@@ -40,8 +40,8 @@ fn home_assistant_sensors_keep_type_order_scale_and_unit() {
     ];
     assert_eq!(named, expect);
     let expect = [
-        "line 16: Own: `structure` cannot be said in a profile",
-        "line 17: it is of unit 4, the registers of unit 3 are taken",
+        "line 16: Own: a profile cannot express `structure`",
+        "line 17: it belongs to unit 4, the registers of unit 3 are taken",
     ];
     assert_eq!(problems, expect);
     assert_eq!(list_of(text).notes.get("max_value"), Some(&(1, 13)));
@@ -78,7 +78,7 @@ fn home_assistant_entities_are_written_and_verified_elsewhere() {
         "40033 Room mode uint16 ABCD x1 0=off 1=heat 2=heat rw",
     ];
     assert_eq!(named, expect);
-    assert_eq!(problems, ["line 6: Odd: `verify` cannot be said in a profile"]);
+    assert_eq!(problems, ["line 6: Odd: a profile cannot express `verify`"]);
 }
 
 #[test]
@@ -125,9 +125,9 @@ fn telegraf_is_read_in_all_its_styles() {
     ];
     assert_eq!(named, expect);
     let expect = [
-        "line 9: apart: its registers do not follow each other",
+        "line 9: apart: its registers are not consecutive",
         "line 10: odd: `DECIMAL` is not a known type",
-        "line 28: it is of unit 2, the registers of unit 1 are taken",
+        "line 28: it belongs to unit 2, the registers of unit 1 are taken",
     ];
     assert_eq!(problems, expect);
 }
@@ -159,7 +159,7 @@ read_only_boolean:
         "10004 door bool ABCD x1",
     ];
     assert_eq!(named, expect);
-    let why = |key| format!("`{key}` cannot be said in a profile");
+    let why = |key| format!("a profile cannot express `{key}`");
     assert_eq!(problems, [format!("line 8: sum: {}", why("sum_scale")), format!("line 11: named: {}", why("map"))]);
     assert_eq!(list_of(text).about, ["Rekall", "Hub 310"]);
 }
@@ -253,7 +253,7 @@ fn solarman_numbers_outside_their_range_are_no_value() {
         "40020 Open uint16 ABCD x1 !0",
     ];
     assert_eq!(named, expect);
-    assert_eq!(problems, ["line 9: Part: `range` cannot be said in a profile"]);
+    assert_eq!(problems, ["line 9: Part: a profile cannot express `range`"]);
     let list = list_of(text);
     let written = crate::register_map::profile::written(&list, "inverter", "a file").expect("it is a profile");
     let charge = &written.checked.plant.tags[0];
@@ -286,7 +286,7 @@ fn a_template_of_wiren_board_is_read_without_its_setup() {
     assert_eq!(named, expect);
     assert_eq!(
         problems,
-        ["line 9: Press: `press_counter` is no table", "line 11: `setup` cannot be said in a profile"]
+        ["line 9: Press: `press_counter` is not a table", "line 11: a profile cannot express `setup`"]
     );
 }
 
@@ -342,6 +342,6 @@ fn a_model_of_sunspec_follows_its_sizes_and_factors() {
 #[test]
 fn what_stands_in_another_place_of_a_configuration_is_said() {
     let text = "read_only_word:\n  a: { address: 1 }\ncomposite:\n  clock: { type: datetime, fields: { year: { address: 10 } } }\n";
-    assert_eq!(read(text).1, ["line 4: clock: `composite` cannot be said in a profile"]);
+    assert_eq!(read(text).1, ["line 4: clock: a profile cannot express `composite`"]);
     assert_eq!(list_of("modbus: !include modbus.yaml\n").problems, ["line 1: `modbus` is in another file"]);
 }

@@ -96,7 +96,7 @@ fn a_sign_and_a_width_make_a_type() {
     check(
         "address;name;type;signed\n5;a;uint16;yes\n6;b;int;no\n",
         &["40007 b uint16 ABCD x1"],
-        &["not what its sign says"],
+        &["contradicts its sign"],
         &[],
     );
 }
@@ -138,7 +138,7 @@ fn plain_numbers_without_a_heading_are_no_factors() {
 fn a_cell_that_does_not_fit_leaves_out_its_row_alone() {
     let rows = "0x5;a;int16;0.1;0;10;1;rw\n6;b;int16;;0;ten;1;rw\n7;c;int16;;0;30;1;?\n8;d;int16;;1;30;one;r\n";
     let text = format!("address;name;type;scale;min;max;decimals;access\n{rows}");
-    let left_out = ["6: `ten` is not understood below greatest", "7: `?`", "8: `one`"];
+    let left_out = ["6: `ten` is not understood in the column greatest", "7: `?`", "8: `one`"];
     check(&text, &["40006 a int16 ABCD x0.1 rw min0 max10"], &left_out, &[]);
     let bad = "address;name;type;bad if\n5;a;float32;-9999.5 0x7F7FFFFF\n7;b;uint16;65535\n8;c;uint16;n/a\n";
     check(
@@ -257,7 +257,7 @@ fn what_may_be_written_is_taken_where_that_is_sure() {
         };
         assert_eq!(access(&rows("0x1")), expect, "{heading}");
         assert_eq!(access(&rows("1")), ["r", "r", "r"], "the base is assumed: {heading}");
-        assert!(list(&rows("1")).said_of_rows().any(|said| said.contains("only read")), "{heading}");
+        assert!(list(&rows("1")).said_of_rows().any(|said| said.contains("read only")), "{heading}");
         assert_eq!(access(&rows("input:")), ["r", "r", "r"], "{heading}");
     }
     assert_eq!(access("address;name;type;access\n0x1;a;int32;RW"), ["r"], "the order is assumed");
@@ -283,7 +283,7 @@ fn what_is_assumed_is_said() {
 fn orders_in_words_are_known_where_they_can_mean_one_thing() {
     let text = "address;name;type;word order\n0;a;int32;Low word first\n2;b;int32;big-endian\n4;c;int32;little endian\n6;d;int32;CDAB\n8;e;int32;word swapped\n10;f;int16;little endian\n";
     let taken = ["40001 a int32 CDAB x1", "40003 b int32 ABCD x1", "40007 d int32 CDAB x1", "40009 e int32 CDAB x1"];
-    check(text, &taken, &["4: `little endian` is no byte order", "10: `little endian`"], &[]);
+    check(text, &taken, &["4: `little endian` is not a byte order", "10: `little endian`"], &[]);
     let typed = "address;name;type\n0;a;FLOAT (CDAB)\n2;b;FLOAT32-ABCD\n4;c;float inverse\n";
     check(
         typed,

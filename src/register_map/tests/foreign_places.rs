@@ -34,11 +34,11 @@ fn words_for_tables_make_their_column_that_of_tables() {
 fn a_column_of_tables_is_never_ignored() {
     for heading in ["Table", "Space", "Area", "RegType"] {
         let text = format!("{heading};Address;Name;Type\nMain;0;a;int16\nHR;1;b;int16\n");
-        check(&text, &["40002 b int16 ABCD x1"], &["`Main` is no table"], &[]);
+        check(&text, &["40002 b int16 ABCD x1"], &["`Main` is not a table"], &[]);
         let access = format!("{heading};Address;Name;Type\nRO;0x10;a;int16\nRW;0x11;b;int16\n");
         let (taken, why) = match heading {
             "RegType" | "Area" => (&["40017 a int16 ABCD x1", "40018 b int16 ABCD x1 rw"][..], &[][..]),
-            _ => (&[][..], &["`RO` is no table", "`RW` is no table"][..]),
+            _ => (&[][..], &["`RO` is not a table", "`RW` is not a table"][..]),
         };
         check(&access, taken, why, &[]);
         let digits = format!("{heading};Address;Name;Type\n3;0;a;int16\n4;1;b;int16\n");
@@ -59,7 +59,7 @@ fn a_second_column_of_types_that_is_not_used_is_said() {
     check(text, &["40017 a uint16 ABCD x1"], &[], &[]);
     assert!(list_of(text).notes.contains_key("Type"), "{:?}", list_of(text).notes);
     let partly = "Address;Name;Data Type;Type\n0x10;a;UINT16;Holding\n0x11;b;UINT16;Holding\n0x12;c;UINT16;quux\n";
-    check(partly, &["40017 a uint16 ABCD x1", "40018 b uint16 ABCD x1"], &["`quux` is no table"], &[]);
+    check(partly, &["40017 a uint16 ABCD x1", "40018 b uint16 ABCD x1"], &["`quux` is not a table"], &[]);
 }
 
 #[test]

@@ -9,16 +9,16 @@ fn what_is_no_register_map_is_refused_with_a_reason() {
     let json = format!("{{ \"channels\": {}", "[".repeat(5_000));
     let xml = format!("<modbusscope>{}", "<a>".repeat(5_000));
     let cases: Vec<(&[u8], &str)> = vec![
-        (b"", "nothing in it"),
-        (b"\xEF\xBB\xBF", "nothing in it"),
-        (b"\r\n\r\n", "nothing in it"),
-        (b"\x89PNG\r\n\x1a\n\x00\x00\x00", "it is no text"),
-        (b"PK\x03\x04 and nothing behind", "no Excel workbook"),
-        (b"modbus:\n  - sensors: []\n", "nothing in it"),
+        (b"", "it is empty"),
+        (b"\xEF\xBB\xBF", "it is empty"),
+        (b"\r\n\r\n", "it is empty"),
+        (b"\x89PNG\r\n\x1a\n\x00\x00\x00", "it is not text"),
+        (b"PK\x03\x04 and nothing behind", "not an Excel workbook"),
+        (b"modbus:\n  - sensors: []\n", "it is empty"),
         (b"modbus:\n  - sensors:\n   - a: [1\n", "line "),
         (b"[[inputs.modbus]]\nname = \n", "line 2"),
         (b"{ \"group\": { \"points\": [ }", "line 1"),
-        (b"<html><p>no table</p></html>", "nothing in it"),
+        (b"<html><p>no table</p></html>", "it is empty"),
         (deep.as_bytes(), "line 1"),
         (json.as_bytes(), "line 1"),
         (xml.as_bytes(), "line 1"),
@@ -90,7 +90,7 @@ fn tags_anchors_and_doubled_keys_of_yaml_are_read() {
     let named: Vec<(&str, u16, f64)> =
         list.named.iter().map(|named| (named.name.as_str(), named.address, named.scale)).collect();
     assert_eq!(named, [("One", 5, 0.1), ("Two", 7, 0.1)]);
-    assert_eq!(list.warnings, ["line 4: `address` stands twice: the last one counts"]);
+    assert_eq!(list.warnings, ["line 4: `address` is given twice: the last one counts"]);
     assert_eq!(list.problems.len(), 2, "{:?}", list.problems);
     assert!(list.problems[0].contains("`nine` is not understood"), "{:?}", list.problems);
 }

@@ -47,7 +47,7 @@ fn what_the_check_refuses_is_left_out_and_said() {
     let written = profile(text);
     assert_eq!(tags(&written).len(), 2);
     assert_eq!(tags(&written)[0].access, Access::Read, "{}", written.text);
-    assert!(written.problems[0].starts_with("line 2: a: only to be read: min -5 is outside"), "{:?}", written.problems);
+    assert!(written.problems[0].starts_with("line 2: a: read only: min -5 is outside"), "{:?}", written.problems);
 }
 
 #[test]
@@ -82,7 +82,7 @@ fn a_calculated_row_is_an_expression_over_its_registers() {
       - { name: Chosen, rule: 1, sensors: [{ registers: [10], enabled_lookup: { a: [b] } }] }
 ";
     let list = super::list_of(text);
-    let why = |key: &str| format!("`{key}` cannot be said in a profile");
+    let why = |key: &str| format!("a profile cannot express `{key}`");
     let expect =
         [format!("line 10: Checked: {}", why("validation")), format!("line 11: Chosen: {}", why("enabled_lookup"))];
     assert_eq!(list.problems, expect);

@@ -154,7 +154,7 @@ fn a_gap_in_the_column_of_tables_is_no_holding_register() {
     let text = "FC;Address;Name;Type\n4;0;A;int16\n;1;B;int16\n3;10;C;int16\n";
     let (named, problems) = read(text);
     assert_eq!(named, ["30001 A int16 ABCD x1", "40011 C int16 ABCD x1"]);
-    assert_eq!(problems, ["line 3: 1: `` is no table"]);
+    assert_eq!(problems, ["line 3: 1: `` is not a table"]);
     let mut book = Workbook::new();
     let sheet = book.add_worksheet();
     let format = rust_xlsxwriter::Format::new();

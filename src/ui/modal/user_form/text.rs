@@ -52,7 +52,7 @@ impl UserForm {
 
     pub(super) fn words(&self, cx: &ViewContext) -> Vec<String> {
         let least = cx.session.password_chars_min;
-        let rule = t!("At least {least} characters. Best a phrase, in any language, also Thai.", least);
+        let rule = t!("At least {least} characters. Best a phrase, in any language, Thai too.", least);
         let first = t!("It must be changed at the first login.").to_owned();
         let own = |user: &Arc<str>| cx.session.who.as_ref().is_some_and(|who| who.user == *user);
         let you = |user: &Arc<str>| {
@@ -68,7 +68,7 @@ impl UserForm {
             ],
             Purpose::Login => Vec::new(),
             Purpose::Change(Some(_)) => {
-                vec![t!("Another user set your current password: choose one that only you know.").to_owned(), rule]
+                vec![t!("Another user set your password: choose one that only you know.").to_owned(), rule]
             }
             Purpose::Change(None) => vec![rule],
             Purpose::Unlock(_) => vec![t!("Process and alarms stay visible. Your open window is kept.").to_owned()],

@@ -142,8 +142,7 @@ impl Registers {
         if stem.is_empty() || text.is_empty() {
             return Err(t!("expected the name of a file such as bench.toml").to_owned());
         }
-        let list =
-            self.preview.as_ref().map(preview::Preview::list).ok_or_else(|| t!("there is nothing in it").to_owned())?;
+        let list = self.preview.as_ref().map(preview::Preview::list).ok_or_else(|| t!("it is empty").to_owned())?;
         let written = register_map::profile::written(list, &plain_name(&stem), t!("a list"))?;
         let mut actions = vec![save_new(vec![(path, written.text.into_bytes())])];
         if !written.problems.is_empty() {

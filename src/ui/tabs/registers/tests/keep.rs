@@ -242,7 +242,7 @@ fn a_configuration_of_another_program_is_saved_as_a_profile() {
 fn a_file_that_is_no_list_is_refused_with_what_can_be_read() {
     let mut bench = Bench::at_unit(|_, _| None);
     for (text, name) in [
-        ("{ \"group\": { \"points\": [] } }", "there is nothing in it"),
+        ("{ \"group\": { \"points\": [] } }", "it is empty"),
         ("a: 1\nb: 2\nc:\n  - d: 3\n", "it is YAML"),
         ("Mode\tCode\nWait\t0\nOn\t1\n", "no column of addresses"),
     ] {

@@ -30,7 +30,7 @@ pub(super) fn named(text: &str, plain: Named) -> Result<Named, String> {
                 (named.scale, named.decimals) = (scale, decimals);
             }
             (.., Ok(_)) => return Err(t!("found `{word}`, expected a scale other than 0", word)),
-            (None, None, Err(_)) if is_like_type(word) => return Err(t!("`{word}` is no type", word)),
+            (None, None, Err(_)) if is_like_type(word) => return Err(t!("`{word}` is not a type", word)),
             (None, None, Err(_)) if named.unit.is_empty() => named.unit = unit_of(word),
             (None, None, Err(_)) => return Err(t!("found `{word}`, expected one unit at the end", word)),
         }
@@ -76,7 +76,7 @@ mod tests {
             );
         }
         for word in ["int99", "uint17", "float31", "string(900)", "chars()", "bcd8", "ipv5", "epoch64"] {
-            assert_eq!(parse(&format!("N {word}")), Err(format!("`{word}` is no type")));
+            assert_eq!(parse(&format!("N {word}")), Err(format!("`{word}` is not a type")));
         }
         assert_eq!(parse("A m3").map(|named| named.unit), Ok("m³".to_owned()));
         let bit = Named { table: Table::Coil, kind: DataType::Bool, ..plain.clone() };
