@@ -217,7 +217,7 @@ async fn find_serial(line: LineDef, serial: Serial, args: &Args) -> Result<(Line
     }
     Err(CliError::Failed(format!(
         "{}: {} at none of the usual settings{came}. In the order of likelihood:\n\
-         A and B exchanged, the device without power or not set to Modbus RTU,\n\
+         A and B swapped, the device without power or not set to Modbus RTU,\n\
          no common ground or termination, other settings (`sightglass scan {0} --bauds all --parities all`), another \
          master on the line, answers that take longer (`--timeout 2000`).\n\
          `--baud`, `--parity` and `--unit` together open the line without trying",

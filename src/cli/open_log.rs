@@ -36,7 +36,7 @@ impl WatchArgs {
     pub fn start(&self) -> Result<Start, CliError> {
         let watch = parse_watched(&self.watch).map_err(|why| CliError::Usage(format!("--watch: {why}")))?;
         if let Some(log) = self.log.as_ref().filter(|log| log.exists()) {
-            let why = "a file of this name is there already, and stays as it is";
+            let why = "a file of this name already exists and is not changed";
             return Err(CliError::Usage(format!("--log: {}: {why}", log.display())));
         }
         Ok(Start { watch, log: self.log.clone(), every: self.every, shown: None })

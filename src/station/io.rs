@@ -275,7 +275,7 @@ impl Station {
             let _ = snapshots.wait_for(|snapshot| snapshot.procedure_at_work().is_none()).await;
         };
         if tokio::time::timeout(SAFE_STATE_MAX, aborted).await.is_err() {
-            tracing::warn!("the safe state of the procedure at work was not written in time");
+            tracing::warn!("the safe state of the running procedure was not written in time");
         }
     }
 

@@ -144,7 +144,7 @@ const KEYS: &[GlobalKey] = &[
     GlobalKey::new(char('['), "", "back to the tab before", |model| revisit(model, false)),
     GlobalKey::new(char(']'), "", "forward again", |model| revisit(model, true)),
     GlobalKey::new(char('@'), "", "replay: the plant as it was at a past time", show_past).unlocked(),
-    GlobalKey::new(char('!'), "", "event page: mimic, curves, journal, frames, people at one past time", |model| {
+    GlobalKey::new(char('!'), "", "event page: mimic, curves, journal, frames, users at one past time", |model| {
         on_past(model, true)
     })
     .unlocked(),

@@ -82,12 +82,12 @@ impl NoPicture {
     pub fn words(self) -> &'static str {
         match self {
             NoPicture::Off => t!("Pictures are off in the settings (F2)"),
-            NoPicture::NotAsked => t!("Pictures were off when this terminal began: begin again to have it asked"),
-            NoPicture::Relayed => t!("tmux and screen pass no pictures on; the settings (F2) can insist"),
+            NoPicture::NotAsked => t!("Pictures were off when this terminal started: restart it to detect them"),
+            NoPicture::Relayed => t!("tmux and screen pass no pictures on; the settings (F2) can force them"),
             NoPicture::NotAnnounced => {
                 t!("This terminal shows no pictures: neither Kitty graphics nor Sixel announced")
             }
-            NoPicture::NoCellSize => t!("This terminal shows no pictures: it does not say how large its cells are"),
+            NoPicture::NoCellSize => t!("This terminal shows no pictures: it does not report its cell size"),
         }
     }
 }

@@ -216,7 +216,7 @@ impl Model {
     /// Shows all texts in this language, if the terminal has its letters.
     pub fn set_locale(&mut self, locale: Locale) {
         if !self.can_show(locale) {
-            self.note = Some(t!("This terminal does not have the letters of that language").into());
+            self.note = Some(t!("This terminal cannot show the letters of that language").into());
         } else if let Some(Modal::TerminalSettings(window)) = &mut self.modal {
             window.chosen.language = Some(locale.language);
         } else {

@@ -46,7 +46,7 @@ impl Task {
             Task::Set => "Set its temperature: Esc, s, type 60, ⏎ and ⏎ again",
             Task::Follow => "Follow it: 2 shows its curves, c a cursor that ← → move",
             Task::Acknowledge => "A device stops responding. Acknowledge its alarm: a",
-            Task::Guidance => "What should be done about it? 3 lists alarms, ⏎ says it",
+            Task::Guidance => "What should be done about it? 3 lists alarms, ⏎ shows it",
             Task::Why => "Why is a value bad? Esc, 1, select one with arrow keys, w",
             Task::Past => "It responds again. Show the past: Esc, @, -20s, ⏎",
             Task::Report => "Export the report: Esc (the present), 5, e",

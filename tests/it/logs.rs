@@ -55,7 +55,7 @@ fn rows_of_a_log_outlive_a_killed_program() {
     // It is not written over, and not mixed with another one.
     let output = sightglass().args(args).output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(!output.status.success() && said.contains("there already"), "{said}");
+    assert!(!output.status.success() && said.contains("already exists"), "{said}");
     assert_eq!(std::fs::read_to_string(&log).unwrap(), text);
 }
 

@@ -65,7 +65,7 @@ fn lines(finding: &Finding, verbose: bool) -> Vec<String> {
 fn plug(args: &Args) -> Result<(), CliError> {
     let line = args.of.port.line()?;
     if line.transport.framing() == Framing::Mbap {
-        return Err(CliError::Usage("--plug: Modbus TCP has no plug: this needs a serial line".into()));
+        return Err(CliError::Usage("--plug: Modbus TCP has no loopback plug: this needs a serial line".into()));
     }
     let bits = line.transport.serial().map_or(8, |serial| serial.data_bits);
     let diagnostic = Diagnostic::Pattern { bits, count: args.count };

@@ -51,7 +51,7 @@ impl Loop {
         write: impl FnOnce() -> Result<PathBuf, Failed> + Send + 'static,
     ) {
         let (outbox, plants) = (self.outbox.clone(), self.model.plants);
-        let exists = self.model.locale().within(|| t!("a file of this name is there already"));
+        let exists = self.model.locale().within(|| t!("a file of this name already exists"));
         tokio::task::spawn_blocking(move || {
             let why = |error: io::Error| match error.kind() {
                 io::ErrorKind::AlreadyExists => exists.to_owned(),

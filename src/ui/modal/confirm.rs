@@ -63,7 +63,7 @@ impl Confirm {
         let ends = match leaving {
             Leaving::Station => t!("Polling and alarms stop too: the station runs in this terminal."),
             Leaving::Demo => t!("The demonstration ends: its simulated plant, polling and alarms stop."),
-            Leaving::Bench => t!("The device stays as it is. Reading ends, and a log of it."),
+            Leaving::Bench => t!("The device stays as it is. Reading ends, and so does a log."),
             Leaving::Log => t!("The log stays as it is."),
             Leaving::Terminal => t!("Only this terminal closes. Polling and alarms continue."),
         };

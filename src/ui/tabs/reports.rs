@@ -58,7 +58,7 @@ const KEYS: &[Key] = &[
     Key::change(char(';'), "", "CSV with , and . or with ; and ,", |reports, cx| {
         (reports.dialect, reports.export) = (reports.dialect.toggled(cx.def().report.csv), Export::Not);
     }),
-    Key::change(char('r'), "automatic", "the reports that the station makes by itself", |reports, _| {
+    Key::change(char('r'), "automatic", "the automatic reports of the station", |reports, _| {
         (reports.page, reports.export) = (Page::Made, Export::Not);
         reports.made.list.answered.query.want();
     }),

@@ -167,7 +167,7 @@ impl RequestForm {
                 (Diagnostic::Loopback { unit, data: 0xA537, count }, vec![words])
             }
             TestKind::Plug if framing == Framing::Mbap => {
-                return Err(t!("Modbus TCP has no plug: this needs a serial line").to_owned());
+                return Err(t!("Modbus TCP has no loopback plug: this needs a serial line").to_owned());
             }
             TestKind::Plug => {
                 let count = to_u16(number(&self.form.text(0), t!("patterns"), 1..=i64::from(PATTERNS_MAX))?);

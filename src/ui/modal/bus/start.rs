@@ -110,7 +110,7 @@ fn danger(cx: &ViewContext, at: &LineView, diagnostic: &Diagnostic) -> Option<St
         | Diagnostic::Identify { .. }
         | Diagnostic::Read { .. } => None,
         Diagnostic::Pattern { .. } => Some(
-            t!("Sends bytes that are no Modbus, between the polls: units on the line may count errors. Start it?")
+            t!("Sends bytes that are not Modbus, between polls: units on the line may count errors. Start it?")
                 .to_owned(),
         ),
         Diagnostic::Signal(test) => Some(t!(

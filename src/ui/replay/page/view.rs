@@ -192,7 +192,7 @@ impl EventPage {
         };
         let mut y = 0;
         if canvas.height() > 2 {
-            heading(cx, canvas, t!("people"));
+            heading(cx, canvas, t!("users"));
             y = 1;
         }
         let room = canvas.width().saturating_sub(2);
@@ -228,7 +228,7 @@ fn frames(cx: &ViewContext, present: &ViewContext, canvas: &mut Canvas) {
         let oldest = oldest.map(|frame| frame.at).min();
         let text = match oldest {
             Some(oldest) if cx.now < oldest => {
-                t!("frames no longer kept: the oldest is of {at}", at = super::super::stamp(cx, oldest))
+                t!("frames no longer kept: the oldest is from {at}", at = super::super::stamp(cx, oldest))
             }
             Some(_) | None => t!("no frames of that time").to_owned(),
         };

@@ -108,7 +108,7 @@ fn before(tab: &Alarms, cx: &ViewContext, alarm: &ActiveAlarm) -> Vec<LabelledRo
         (Some(time), times) => t!("{times} times since {time}", times, time),
     };
     let mut rows = vec![(t!("before"), head, normal)];
-    let words = actions.map(|at| t!("actions are known since {time}", time = since(at)));
+    let words = actions.map(|at| t!("actions are recorded since {time}", time = since(at)));
     rows.extend(words.map(|words| ("", words, cx.theme.strong())));
     for occurrence in all.iter().take(TIMES_MAX) {
         let at = since(occurrence.raised_at);

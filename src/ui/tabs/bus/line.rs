@@ -185,7 +185,7 @@ fn counters(cx: &ViewContext, at: &LineView, report: &LineReport, width: u16) ->
         rows.extend(flow(t!("signals"), dim, width, signals.all().map(|(name, on)| value(cx, name, state(on)))));
     }
     if counters.echoes {
-        let words = t!("local echo: the adapter gives back what it sends (removed from answers)");
+        let words = t!("local echo: the adapter gives back what it sends (removed from responses)");
         rows.extend(flow(t!("port"), dim, width, [plain(words, cx.theme.normal())]));
     }
     rows

@@ -213,7 +213,7 @@ impl Controllers {
     pub(super) fn swap_direction(&mut self, cx: &ViewContext) -> Vec<UiAction> {
         self.on_device(cx, |tab, device| {
             let Some(Compare { source: Source::Device(other), .. }) = tab.compared() else {
-                return notice(device, t!("only a copy between two controllers can be turned around"));
+                return notice(device, t!("only a copy between two controllers can be reversed"));
             };
             tab.show(*other);
             tab.pages.extend([Page::Sets, Page::Compare(Compare::new(Source::Device(device.id)))]);

@@ -87,14 +87,14 @@ const DEVICE: &[Key] = &[
     Key::new(char('r'), "runs", "control runs: what each change of SV led to, compared", Controllers::show_runs)
         .when(|tab, cx| tab.offer(cx, |device| cx.snapshot.has_runs(device.id))),
     GUIDE,
-    Key::new(char('T'), "tune", "auto-tuning on, or off while it is on", Controllers::tune)
+    Key::new(char('T'), "tune", "start auto-tuning, or stop it", Controllers::tune)
         .when(|tab, cx| tab.offer(cx, |device| tune(device).is_some()))
         .needs(Role::Technician)
         .writes(|tab, cx| tab.role_for(cx, tune)),
     ACTIONS,
     WHY,
     REFRESH,
-    Key::new(char('/'), "find", "show only parameters with some words in name or meaning", listing::ask_filter),
+    Key::new(char('/'), "find", "filter the parameters by words of name or meaning", listing::ask_filter),
     Key::change(char('d'), "defaults", "mark differences from the factory default", |tab, _| {
         tab.table.defaults = !tab.table.defaults;
     })
@@ -185,7 +185,7 @@ const COMPARE: &[Key] = &[
     GUIDE,
 ];
 const RUNS: &[Key] = &[
-    Key::change(char('o'), "overlay", "the curves of the marked runs over each other", Controllers::swap_overlay),
+    Key::change(char('o'), "overlay", "overlay the curves of the marked runs", Controllers::swap_overlay),
     GUIDE,
     BACK,
 ];
@@ -194,7 +194,7 @@ const PROCEDURES: &[Key] = &[
         .needs(Role::Technician)
         .writes(Controllers::role_to_start),
     BACK,
-    Key::new(char('x'), "abort", "abort the procedure at work: the safe state is written at once", |tab, cx| {
+    Key::new(char('x'), "abort", "abort the running procedure: the safe state is written at once", |tab, cx| {
         tab.procedures.abort(cx)
     })
     .when(|tab, cx| Offer::footer_if(tab.procedures.to_abort(cx).is_some()))
@@ -202,7 +202,7 @@ const PROCEDURES: &[Key] = &[
     Key::change(
         char('o'),
         "overlay",
-        "the curves of what the procedures measured last over each other",
+        "overlay the curves that the procedures measured last",
         Controllers::swap_overlay,
     ),
     GUIDE,

@@ -141,7 +141,7 @@ pub fn view(cx: &ViewContext, canvas: &mut Canvas, device: &DeviceDef, live: &Li
         }
         let x = canvas.text(1, y, of_plant(group), theme.dim());
         if lamps.iter().all(Lamp::is_taken_back) {
-            let words = t!("driven by the device: it takes back what is written to them");
+            let words = t!("driven by the device: it overwrites what is written to them");
             canvas.text(x + 2, y, &fit_words(words, wide.saturating_sub(x + 3)), theme.normal());
         }
         y += 1;

@@ -18,13 +18,13 @@ trait Tables: Sized + 'static {
 impl<P: KeyTable> Tables for P {
     const MOVING: &'static [Key<P>] = &motions!("select", step);
     const ACTING: &'static [Key<P>] = &[
-        Key::change(char(' '), "mark", "mark several rows, for what is done with all of them; Esc: no marks", mark)
+        Key::change(char(' '), "mark", "mark several rows, to act on all of them; Esc: no marks", mark)
             .when(|page, cx| offer(page, cx, char(' '), Some(Can::Mark))),
-        Key::new(char('t'), "trend", "the curves of its time", trend)
+        Key::new(char('t'), "trend", "the curves at its time", trend)
             .when(|page, cx| offer(page, cx, char('t'), Some(Can::Trend))),
-        Key::new(char('/'), "filter", "show only rows with some words, while they are typed; Esc: all rows", filter)
+        Key::new(char('/'), "filter", "filter the rows while typing; Esc: all rows", filter)
             .when(|page, cx| offer(page, cx, char('/'), None)),
-        Key::change(char('s'), "sort", "sort: by the next column, after the last as at first", sort)
+        Key::change(char('s'), "sort", "sort by the next column; after the last: original order", sort)
             .when(|page, cx| offer(page, cx, char('s'), Some(Can::Sort))),
         Key::change(char('S'), "", "sort the other way round", reverse)
             .when(|page, cx| offer(page, cx, char('S'), Some(Can::Sort))),

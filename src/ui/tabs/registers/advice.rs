@@ -21,7 +21,7 @@ pub fn advice(tab: &Registers, cx: &ViewContext) -> Vec<String> {
         lines.insert(0, t!("the device has unit address {got}: U, then {got}", got));
     }
     if cx.snapshot.lines[tab.line.index()].counters.echoes && !lines.is_empty() {
-        lines.insert(0, t!("local echo: the adapter gives back what it sends (removed from answers)").to_owned());
+        lines.insert(0, t!("local echo: the adapter gives back what it sends (removed from responses)").to_owned());
     }
     lines
 }
@@ -39,7 +39,7 @@ fn of_connection(cx: &ViewContext, line: LineId) -> Vec<String> {
     let lines = [
         t!("no Modbus server there, or another protocol on this TCP port; 502 is usual"),
         other,
-        t!("the device takes one connection, and another program has it"),
+        t!("the device accepts one connection, and another program holds it"),
         t!("a firewall, or a device that answers certain hosts only"),
     ];
     lines.map(str::to_owned).to_vec()
@@ -48,22 +48,22 @@ fn of_connection(cx: &ViewContext, line: LineId) -> Vec<String> {
 fn of_fault(fault: Fault, serial: bool) -> Vec<&'static str> {
     if let Fault::WrongUnit { .. } = fault {
         return vec![
-            t!("a gateway that gives every answer an address of its own"),
-            t!("another master on the line, whose answers come in between"),
+            t!("a gateway that puts its own address into every response"),
+            t!("another master on the line, whose traffic interferes"),
         ];
     }
     match fault.kind() {
         FaultKind::Timeout if serial => vec![
             t!("another unit address: U; or a scan of all: tab Bus"),
             t!("another baud rate or parity: quit, and open without --baud and --parity"),
-            t!("A and B exchanged, or the device without power"),
+            t!("A and B swapped, or the device without power"),
             t!("no termination or common ground, another master on the line"),
         ],
         FaultKind::Timeout => vec![
             t!("another unit address: U; 255 and 0 are usual of devices, 1 behind a gateway"),
             t!("no device behind the gateway, or the device without power"),
             t!("other serial settings in the gateway than in the device"),
-            t!("the device takes one connection, and another program has it"),
+            t!("the device accepts one connection, and another program holds it"),
             t!("another protocol on this TCP port"),
         ],
         FaultKind::Exception(code) if code.is_of_gateway() => vec![
@@ -78,7 +78,7 @@ fn of_fault(fault: Fault, serial: bool) -> Vec<&'static str> {
                 t!("other serial settings in the gateway than in the device")
             },
             t!("two devices with the same unit address, or another master on the line"),
-            t!("noise: screen, termination, common ground; every byte stands on tab Bus"),
+            t!("noise: shield, termination, common ground; tab Bus shows every byte"),
         ],
         FaultKind::Exception(_)
         | FaultKind::OutOfSync

@@ -58,14 +58,14 @@ const LOOK: &[Key] = &[
 const LOG: &[Key] = &[Key::new(
     char('R'),
     "log",
-    "begin or end a log of what is watched, as CSV: a row for every read",
+    "start or stop a CSV log of the watch list: a row for every read",
     Registers::toggle_log,
 )];
 const WRITE: &[Key] = &[
     Key::new(
         char('w'),
         "write",
-        "write the selected register; asks first, and once whether writing is wanted at all",
+        "write the selected register (asks first, and once to enable writing)",
         |registers, _| registers.ask_write(),
     )
     .needs(Role::Supervisor),
@@ -101,7 +101,7 @@ const UNIT: &[Key] = &[
         modal::bus::ask_sweep(cx, registers.line, registers.unit, registers.table)
     })
     .needs(Role::Technician),
-    Key::change(char('r'), "", "ask again for what the unit has refused", |registers, _| registers.relearn = true),
+    Key::change(char('r'), "", "retry what the unit has refused", |registers, _| registers.relearn = true),
 ];
 
 const BENCH: &[&[Key]] = &[&MOVE, TABLES_KEYS, NAMES, LOOK, LOG, WRITE, UNIT];

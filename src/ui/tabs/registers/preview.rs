@@ -166,10 +166,10 @@ impl Registers {
         let is_first = |named: &Named| places.insert((named.table, named.address));
         let (named, others) = list.named.into_iter().partition(is_first);
         list.named = named;
-        let only = |named: Named| t!("{name}: only a profile has several at one address", name = named.name);
+        let only = |named: Named| t!("{name}: several values at one address need a profile", name = named.name);
         list.problems.extend(Vec::into_iter(others).map(only));
         let sums =
-            list.calculated.iter().map(|sum| t!("{name}: only a profile has calculated values", name = sum.named.name));
+            list.calculated.iter().map(|sum| t!("{name}: calculated values need a profile", name = sum.named.name));
         list.problems.extend(sums);
         let taken = t!("names taken: {count}", count = list.named.len());
         if let Some(first) = list.named.first() {
@@ -189,7 +189,7 @@ fn said(list: &List) -> Vec<String> {
 }
 
 fn unclear() -> UiAction {
-    let words = t!("Its addresses can be read in two ways: say first which with b.").to_owned();
+    let words = t!("Its addresses can be read in two ways: choose one with b first.").to_owned();
     UiAction::Open(Modal::Notice(Notice::new(t!("load a register list"), vec![words])))
 }
 
@@ -222,15 +222,15 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
                 AddressBase::Zero => t!("{place} (as sent)", place = place(at)),
                 AddressBase::One => t!("{place} (from 1)", place = place(at)),
             });
-            (t!("{written}: {first} or {second}? b says which", written, first, second), theme.trouble())
+            (t!("{written}: {first} or {second}? b chooses", written, first, second), theme.trouble())
         }
         (None, Some(question)) => {
-            (t!("{question} m says what the column means", question = question.words()), theme.trouble())
+            (t!("{question} m chooses what the column means", question = question.words()), theme.trouble())
         }
         (None, None) => {
             let (base, table) = (base_words(context, list), translate(context.table.word()));
             let order = context.order.or(list.order).unwrap_or_default().word();
-            (t!("plain numbers: {base}; where nothing is said: {table}, {order}", base, table, order), theme.normal())
+            (t!("plain numbers: {base}; by default: {table}, {order}", base, table, order), theme.normal())
         }
     };
     canvas.text(1, 1, &fit_words(&words, room), style);
@@ -267,7 +267,7 @@ pub fn view(tab: &Registers, cx: &ViewContext, canvas: &mut Canvas) {
 /// Each column with what it means, the selected one in sight.
 fn columns(canvas: &mut Canvas, cx: &ViewContext, columns: &[(String, Option<Column>)], selected: usize) {
     if columns.is_empty() {
-        canvas.text(1, 2, t!("no heading: what a cell is shows in its form"), cx.theme.dim());
+        canvas.text(1, 2, t!("no heading: a cell is known by its form"), cx.theme.dim());
         return;
     }
     let mut x = 1;

@@ -303,11 +303,11 @@ fn what_is_not_known_is_not_written_over() {
     let mut bench = Bench::new();
     bench.keys("wyes⏎");
     bench.keys("w");
-    assert!(bench.screen(80, 24).contains("It is not known what this address holds"));
+    assert!(bench.screen(80, 24).contains("The current value of this address is unknown"));
     bench.keys("⎋j1002⏎");
     bench.answer(0, |address| Some(address).filter(|address| *address == 1002));
     bench.keys("w1 2⏎");
-    assert!(bench.screen(80, 24).contains("what all of them hold"), "{}", bench.screen(80, 24));
+    assert!(bench.screen(80, 24).contains("not all of their current values"), "{}", bench.screen(80, 24));
 }
 
 #[test]
@@ -345,7 +345,7 @@ fn where_nothing_answers_the_tab_says_what_to_check() {
     };
     bench.snapshot(0, LineState::Waiting { why: "closed by the other side".into(), retry_at: now() });
     let shown = bench.screen(80, 24);
-    assert!(shown.contains("--mode rtu-over-tcp") && shown.contains("another program has it"), "{shown}");
+    assert!(shown.contains("--mode rtu-over-tcp") && shown.contains("another program holds it"), "{shown}");
     bench.snapshot(0, LineState::Connected);
     let shown = silent(&mut bench, Fault::Timeout);
     assert!(shown.contains("another unit address") && shown.contains("response timeout"), "{shown}");

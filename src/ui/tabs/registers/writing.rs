@@ -158,7 +158,7 @@ impl Registers {
     /// Asks whether to write what was typed.
     pub(super) fn write_typed(&self, cx: &ViewContext, text: &str) -> Result<Vec<UiAction>, String> {
         let held = self.cells.words(self.table, self.selected, 1);
-        let first = held.first().copied().ok_or_else(|| t!("it is not known what it holds now").to_owned())?;
+        let first = held.first().copied().ok_or_else(|| t!("its current value is unknown").to_owned())?;
         let words = match self.named_and_held() {
             Some((named, held)) if !text.starts_with("0x") && !text.starts_with("0X") => {
                 typed_as(text, &named, &held, &cx.now.to_zoned(cx.def().time_zone.clone()))?
@@ -204,7 +204,7 @@ impl Registers {
     fn confirm(&self, words: Vec<u16>) -> Result<Vec<UiAction>, String> {
         let expected = self.cells.words(self.table, self.selected, to_u16(words.len()));
         if expected.len() != words.len() {
-            return Err(t!("it is not known what all of them hold now").to_owned());
+            return Err(t!("not all of their current values are known").to_owned());
         }
         let (unit, table, address) = (self.unit, self.table, self.selected);
         let multiple = words.len() == 1 && self.writing.multiple(unit, table);
@@ -273,7 +273,7 @@ fn list(words: &[u16]) -> String {
 }
 
 fn unknown() -> UiAction {
-    let why = t!("It is not known what this address holds now, so nothing is written over it.").to_owned();
+    let why = t!("The current value of this address is unknown, so it is not overwritten.").to_owned();
     UiAction::Open(Modal::Notice(Notice::new(t!("write"), vec![why])))
 }
 

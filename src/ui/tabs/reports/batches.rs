@@ -18,7 +18,7 @@ pub const LIST: &[&[Key]] = &[&[
             reports.show(Some(period));
         }
     }),
-    Key::change(char('o'), "overlay", "the curves of the marked batches over each other", |reports, cx| {
+    Key::change(char('o'), "overlay", "overlay the curves of the marked batches", |reports, cx| {
         reports.batches.lay_over(cx);
     }),
     Key::new(char('e'), "export", "write the list as CSV", Reports::export_batches).needs(Role::Technician),

@@ -111,7 +111,7 @@ impl Listing for AutomaticReports {
 
     fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a MadeReports>) -> Heading<'a> {
         let empty = match cx.def().report.automatic.is_empty() {
-            true => t!("The plant file asks for none: see `sightglass help reports`."),
+            true => t!("The plant file configures none: see `sightglass help reports`."),
             false => t!("No report was made yet."),
         };
         Heading::new(t!("Automatic reports"), empty)

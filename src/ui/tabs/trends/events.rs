@@ -123,7 +123,7 @@ impl Trends {
         let too_long = !cx.def().batches.is_empty() && view.width() > BATCHES_SPAN;
         let too_long =
             too_long.then(|| missing(view.from, t!("no batches in windows over 31 days: choose a shorter one")));
-        let older = t!("older events are too many to show: choose a shorter window");
+        let older = t!("too many events, older ones are not shown: choose a shorter window");
         let more = more.into_iter().flatten().map(|at| missing(at, older)).chain(too_long);
         let raised = alarms.iter().filter(|record| record.event == AlarmEvent::Raised).map(|record| Mark {
             at: record.at,

@@ -6,7 +6,7 @@ use crate::ui::tabs::prelude::*;
 pub(super) type Key = crate::ui::key_table::Key<Trends>;
 
 pub(super) const CURVES: &[Key] = &[
-    Key::elsewhere(code(KeyCode::Esc), "close", "close the picture, as every key does")
+    Key::elsewhere(code(KeyCode::Esc), "close", "close the picture (any key)")
         .when(|trends, _| Offer::only_if(trends.pictured)),
     Key::new(code(KeyCode::Left), "", "earlier (with the cursor on: cursor to the left)", |trends, cx| {
         trends.side(cx, -1)
@@ -58,15 +58,14 @@ pub(super) const CURVES: &[Key] = &[
     Key::change(char(' '), "pen", "switch the selected pen on or off", Trends::toggle),
     Key::new(char('s'), "scale", "scale of the selected pen: 0 100, auto, own, own 0 100, plant", Trends::ask_scale)
         .when(of_plant),
-    Key::new(char('o'), "overlay", "lay periods over each other, as today over yesterday", Trends::ask_overlay)
-        .when(of_plant),
+    Key::new(char('o'), "overlay", "overlay periods, such as today over yesterday", Trends::ask_overlay).when(of_plant),
     Key::change(char('x'), "plot", "curves, x-y plot, histogram, step response, or large numbers", |trends, _| {
         trends.plot = trends.plot.next();
     }),
     Key::change(char('B'), "", "the pens as large numbers for the wall, or the curves", |trends, _| {
         trends.plot = if trends.plot == Plot::Numbers { Plot::Time } else { Plot::Numbers };
     }),
-    Key::change(char('k'), "", "look of the selected pen: steps, lines, dots, bars", Trends::next_stroke),
+    Key::change(char('k'), "", "style of the selected pen: steps, lines, dots, bars", Trends::next_stroke),
     Key::change(char('e'), "export", "write the values of the view as CSV", Trends::export_csv)
         .needs(Role::Technician)
         .when(of_plant),

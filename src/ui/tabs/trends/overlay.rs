@@ -24,7 +24,7 @@ impl Trends {
     pub(super) fn ask_overlay(&mut self, _cx: &ViewContext) -> Vec<UiAction> {
         self.asking = Asking::Overlay;
         let typed = self.typed_overlay.as_deref().unwrap_or(OFFERED);
-        open(Modal::Prompt(Prompt::new(t!("Lay periods over each other"), FORMS, typed)))
+        open(Modal::Prompt(Prompt::new(t!("Overlay periods"), FORMS, typed)))
     }
 
     fn next_overlaid(&mut self, by: isize) {

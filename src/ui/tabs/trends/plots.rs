@@ -93,7 +93,7 @@ pub(super) fn draw_xy(trends: &Trends, cx: &ViewContext, canvas: &mut Canvas) {
         Some((x, y)) => {
             canvas.text(left + to_u16(x / cell_x), top + to_u16(y / cell_y), mark(theme, *n), theme.strong());
         }
-        None => canvas.text_centred(height / 2, t!("no instant at which both are known"), theme.dim()),
+        None => canvas.text_centred(height / 2, t!("no time at which both are known"), theme.dim()),
     }
 }
 

@@ -21,7 +21,7 @@ pub enum SearchField {
 pub const KEYS: &[Key] = &[
     Key::new(code(KeyCode::Enter), "open", "entry details", |users, cx| users.in_audit(|audit| audit.open(cx))),
     Key::new(char('/'), "search", "only rows with some words", |users, _| ask(users, SearchField::Words)),
-    Key::new(char('b'), "by", "only actions of a user", |users, _| ask(users, SearchField::Who)),
+    Key::new(char('b'), "by", "only the actions of a user", |users, _| ask(users, SearchField::Who)),
     Key::new(char('w'), "what", "only an action: write, login …", |users, _| ask(users, SearchField::Action)),
     Key::new(char('t'), "time", "another day or period", |users, _| ask(users, SearchField::Time)),
     Key::change(char('d'), "terminals", "show or fold attach and detach", |users, _| {

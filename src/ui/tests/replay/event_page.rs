@@ -81,15 +81,15 @@ fn an_alarm_opens_the_event_page_with_one_key() {
     for keys in ["3!", "3@⏎"] {
         let mut model = paged(&Fixture::alarm(), keys, raised_at);
         let shown = screen(&mut model, 120, 40);
-        assert!(shown.contains("here") && shown.contains("people"), "{keys}: {shown}");
+        assert!(shown.contains("here") && shown.contains("users"), "{keys}: {shown}");
         // The tabs are one key away, and the present is.
         type_keys(&mut model, "!");
-        assert!(!screen(&mut model, 120, 40).contains("people"));
+        assert!(!screen(&mut model, 120, 40).contains("users"));
         let effects = type_keys(&mut model, "!");
         answer_page(&mut model, &effects, raised_at);
-        assert!(screen(&mut model, 120, 40).contains("people"));
+        assert!(screen(&mut model, 120, 40).contains("users"));
         type_keys(&mut model, "2");
-        assert!(!screen(&mut model, 120, 40).contains("people") && shown_at(&model).is_some());
+        assert!(!screen(&mut model, 120, 40).contains("users") && shown_at(&model).is_some());
         type_keys(&mut model, "!⎋");
         assert_eq!((shown_at(&model), model.replay.page().is_none()), (None, true));
     }

@@ -194,7 +194,7 @@ fn the_only_field_of_a_test_is_typed() {
 fn a_plug_is_tested_after_a_question_and_its_faults_are_listed() {
     let clear = "\u{8}".repeat(3);
     let mut model = bus(&Fixture::traffic(), Theme::FULL, &format!("Tp{clear}6⏎"));
-    assert!(screen(&mut model, 80, 24).contains("Sends bytes that are no Modbus"));
+    assert!(screen(&mut model, 80, 24).contains("Sends bytes that are not Modbus"));
     let effects = type_keys(&mut model, "y");
     let diagnostic = Diagnostic::Pattern { bits: 8, count: 6 };
     assert_eq!(sent_kind(&effects), Some(&CommandKind::Test(L1, diagnostic.clone())));

@@ -108,7 +108,7 @@ fn outputs_that_only_the_ladder_drives_are_named() {
         type_keys(&mut model, "4↓⏎i");
         screen(&mut model, 80, 24)
     };
-    const WORDS: &str = "Outputs  driven by the device: it takes back what is written to them";
+    const WORDS: &str = "Outputs  driven by the device: it overwrites what is written to them";
     assert!(!shown(&fixture).contains(WORDS), "RUN is a command");
     for tag in fixture.def.tags.iter_mut().filter(|tag| tag.group == "Outputs") {
         tag.access = crate::plant::tag::Access::Read;

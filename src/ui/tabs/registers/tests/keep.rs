@@ -147,7 +147,7 @@ fn a_list_from_a_manual_gives_names() {
         shown.contains("Registers that can be taken: 1, lines that cannot: 1") && shown.contains("70.0 °C"),
         "{shown}"
     );
-    assert!(shown.contains("41003: holding 1002 (Modicon) or holding 41003 (as sent)? b says which"), "{shown}");
+    assert!(shown.contains("41003: holding 1002 (Modicon) or holding 41003 (as sent)? b chooses"), "{shown}");
     assert!(shown.contains("line 3: ") && bench.model.tabs.registers.names.is_empty(), "nothing is taken yet: {shown}");
     bench.keys("b⏎");
     assert!(bench.screen(80, 24).contains("names taken: 1"), "{}", bench.screen(80, 24));
@@ -169,10 +169,10 @@ fn a_list_that_can_be_read_in_two_ways_asks_before_it_is_taken() {
     let list = "address;name;type\n40080;W;int16\n40083;VA;int16\n".to_owned();
     bench.send(Msg::Loaded(Tab::Registers, Ok(list.into_bytes())));
     let shown = bench.screen(120, 24);
-    let both = "40080: holding 79 (Modicon) or holding 40080 (as sent)? b says which";
+    let both = "40080: holding 79 (Modicon) or holding 40080 (as sent)? b chooses";
     assert!(shown.contains(both), "{shown}");
     bench.keys("⏎");
-    assert!(bench.screen(80, 24).contains("say first which with b"), "{}", bench.screen(80, 24));
+    assert!(bench.screen(80, 24).contains("choose one with b first"), "{}", bench.screen(80, 24));
     bench.keys("⎋bb⏎");
     assert!(bench.model.tabs.registers.names.get(Table::Holding, 40_080).is_some());
     assert!(bench.model.tabs.registers.names.get(Table::Holding, 79).is_none());
@@ -209,7 +209,7 @@ fn the_meaning_of_a_column_is_changed_by_a_key() {
     let mut bench = Bench::at_unit(|_, _| None);
     bench.send(Msg::Loaded(Tab::Registers, Ok("address;name;factor\n5;W;10\n6;VA;100\n".into())));
     bench.answer(1, |address| Some(address * 10));
-    let asked = "factor (10): factor / divisor? m says what the column means";
+    let asked = "factor (10): factor / divisor? m chooses what the column means";
     assert!(bench.screen(120, 24).contains(asked), "{}", bench.screen(120, 24));
     bench.keys("→→m");
     assert!(bench.screen(120, 24).contains("×10 "), "{}", bench.screen(120, 24));

@@ -173,7 +173,7 @@ impl Registers {
         if more != 0 {
             words.push(t!("and {more} more", more));
         }
-        self.said = Some(UiAction::Open(Modal::Notice(Notice::new(t!("damaged: all the rest is shown"), words))));
+        self.said = Some(UiAction::Open(Modal::Notice(Notice::new(t!("damaged: the rest is shown"), words))));
     }
 
     /// Shows what is watched; where nothing is, the selected register.
