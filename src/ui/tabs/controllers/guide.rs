@@ -1,4 +1,4 @@
-//! What the words of a controller mean, and what to change when it does not do what it should: pages to read.
+//! What the words of a controller mean, and what to change when it misbehaves: pages to read.
 
 use crate::text::translation;
 use crate::ui::tabs::prelude::*;
