@@ -56,19 +56,18 @@ pub(super) const ROWS: [Row; 22] = [
         InjectedFault::Noise(10),
         "noise",
         TargetKind::Line,
-        "Interference, a missing termination or a bad screen: bits change on the way, in requests and in responses.",
+        "Interference, a missing termination or a bad shield: bits change on the way, in requests and in responses.",
         "The check of a frame finds every single wrong bit: no value is wrong, some are missing. Corrupt responses and \
          timeouts of all units on the line are counted on Bus; values grow old only when it is bad.",
-        "Compare the units on Bus: all of them suffering points to the cable, one to that unit.",
+        "Compare the units on Bus: errors of all units point to the cable, errors of one to that unit.",
     )
     .with_number("%", 1.0, 100.0, &[1.0, 5.0, 10.0, 20.0, 50.0]),
     row(
         InjectedFault::Silent,
         "silent",
         TargetKind::Unit,
-        "The unit has no power, the wrong address or baud rate, or its wire is off.",
-        "Its values are uncertain at once and bad after three failed requests, when its alarm \"not responding\" comes; \
-         other units go on. Whether the unit still works its process cannot be known from here.",
+        "The unit has no power, the wrong address or baud rate, or a loose wire.",
+        "Its values are uncertain at once and bad after three failed requests, when its alarm \"not responding\" comes; other units go on. Whether the unit still controls its process cannot be known from here.",
         "Inspect the unit; treat all it controls as unknown.",
     ),
     row(
@@ -76,8 +75,7 @@ pub(super) const ROWS: [Row; 22] = [
         "late",
         TargetKind::Unit,
         "The unit is overloaded or sits behind a slow radio or converter.",
-        "A response within the timeout is only slower. A later one is a timeout; when it then arrives it is thrown away \
-         as stale and never taken for the response to the next request.",
+        "A response within the timeout is only slower. A later one is a timeout; when it then arrives it is discarded as stale and never taken for the response to the next request.",
         "See the response times on Bus; raise timeout_ms of the line if the unit is meant to be slow.",
     )
     .with_number("s", 0.05, 60.0, &[0.2, 0.5, 1.0, 2.0, 5.0]),
@@ -112,7 +110,7 @@ pub(super) const ROWS: [Row; 22] = [
         InjectedFault::Stuck,
         "stuck value",
         TargetKind::Value,
-        "The measuring part of the unit hangs while its communication goes on: every response is good and old.",
+        "The measuring part of the unit hangs while its communication goes on: every response is valid but old.",
         "The line shows nothing. A master sees it only by a value that should move and does not: by another \
          measurement, by its effect, or by an alarm on no change, where there is one.",
         "Compare with what the process must do: heating without a change of temperature is not possible.",
@@ -122,8 +120,7 @@ pub(super) const ROWS: [Row; 22] = [
         "torn value",
         TargetKind::Value,
         "The unit updates a 32-bit value between its two words: one word is new, one is of the reading before.",
-        "Inside one good response no master can see it. It shows as a jump that the next reading takes back; only a value \
-         outside of the range of the tag is refused.",
+        "Inside one good response no master can see it. It shows as a jump that the next reading reverses; only a value outside the range of the tag is refused.",
         "Distrust single spikes; ask the maker for a register that latches.",
     ),
     row(
@@ -131,8 +128,7 @@ pub(super) const ROWS: [Row; 22] = [
         "word order",
         TargetKind::Value,
         "The unit was replaced or set to another word order.",
-        "The bits are good and mean another number. It is refused only where it is not a number or outside of the range \
-         of the tag; what happens to be inside is shown as good.",
+        "The bits are good but mean another number. It is refused only where it is not a number or outside the range of the tag; what happens to be inside is shown as good.",
         "After a replacement compare one value with the front panel of the unit; set `order` in the profile.",
     ),
     row(
