@@ -35,7 +35,7 @@ pub struct AckArgs {
     /// Tags or devices whose alarms are acknowledged: TIC-1.PV
     #[arg(required_unless_present = "all")]
     subjects: Vec<String>,
-    /// Every alarm that waits for it now
+    /// Every alarm that is not acknowledged now
     #[arg(long, conflicts_with = "subjects")]
     all: bool,
     #[command(flatten)]
@@ -47,7 +47,7 @@ pub struct AckArgs {
 pub struct CorrectArgs {
     /// The counter: PM-1.E
     tag: String,
-    /// What is added to what it counted, in its unit; below 0 it is taken away
+    /// Amount to add to what it has counted, in its unit; below 0: to subtract
     #[arg(allow_negative_numbers = true)]
     amount: Exact,
     #[command(flatten)]

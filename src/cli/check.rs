@@ -31,11 +31,11 @@ use super::{CliError, client, in_runtime, paths, say, say_problems};
 pub struct Args {
     /// A plant file or device profile, or the name of a shipped one
     file: PathBuf,
-    /// Refuse a plant with warnings: every alarm must be complete and of use
+    /// Refuse a plant with warnings: every alarm must be complete and useful
     #[arg(long)]
     strict: bool,
-    /// Name the alarms, shelvings and alarms out of service of a plant that this file would end, and what else is at work:
-    /// those of its running station, else those that it left behind [default: the plant of this file]
+    /// List what loading this file would end in a plant: alarms, shelvings, alarms out of service, procedures, runs and
+    /// restores; of its running station, else as it left them [default: the plant of this file]
     #[arg(long, value_name = "PLANT", num_args = 0..=1, default_missing_value = "")]
     against: Option<String>,
 }
@@ -61,7 +61,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     let losses = in_runtime(losses(def, &name))?;
     say("");
     match losses.as_slice() {
-        [] => say(&format!("nothing that stands in {name} would be lost or renamed")),
+        [] => say(&format!("nothing in {name} would be lost or renamed")),
         [..] => losses.iter().for_each(|loss| say(&format!("against {name}: {loss}"))),
     }
     Ok(())

@@ -55,12 +55,12 @@ pub async fn find_station(plant: Option<&str>) -> Result<find::FoundStation, Cli
     }
     match (running.len(), plant) {
         (1, _) => Ok(running.remove(0)),
-        (0, Some(plant)) => Err(CliError::NotRunning(format!("no station of {plant} runs here"))),
+        (0, Some(plant)) => Err(CliError::NotRunning(format!("no station of {plant} is running here"))),
         (0, None) => Err(CliError::NotRunning(match find::SocketFolders::here().closed() {
             Some(folder) => {
-                format!("no station runs here that this user may reach; {} is not accessible", folder.display())
+                format!("no station is running here that this user may reach; {} is not accessible", folder.display())
             }
-            None => "no station runs here".to_owned(),
+            None => "no station is running here".to_owned(),
         })),
         (_, _) => {
             let names: Vec<String> = running.into_iter().map(|found| found.name).collect();

@@ -237,8 +237,8 @@ fn instead(paste: &Paste) -> Vec<String> {
     let Some(other) = &paste.instead else { return Vec::new() };
     let reason = match paste.framing {
         Some(Framing::Rtu) => "a CRC fits by chance once in 65,536 times",
-        Some(Framing::Ascii) => "digits between `:` and CR LF are no chance",
-        Some(Framing::Mbap) | None => "a header that fits is less of a chance",
+        Some(Framing::Ascii) => "hex digits between `:` and CR LF are no coincidence",
+        Some(Framing::Mbap) | None => "a header that fits is less likely by chance",
     };
     let kind = other.framing.map_or("a message alone", name_of);
     wrap(&format!("may also be {kind}: {}; {reason}", other.summary), WIDTH, 2)

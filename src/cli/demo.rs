@@ -42,13 +42,13 @@ pub struct Args {
     /// Begin with a tour: eight small tasks
     #[arg(long, conflicts_with_all = ["headless", "scenario", "plant"])]
     tour: bool,
-    /// Without a terminal: do the whole job and print what was done
+    /// Run without a terminal and print what was done
     #[arg(long)]
     headless: bool,
     /// A drill: a scenario file, or the name of a shipped scenario; its plant is simulated
     #[arg(long, value_name = "FILE", conflicts_with = "plant")]
     scenario: Option<PathBuf>,
-    /// Show nothing of the faults before the drill is over
+    /// Do not show the faults before the drill is over
     #[arg(long, requires = "scenario", conflicts_with = "headless")]
     exam: bool,
     /// End after this plant time

@@ -67,8 +67,8 @@ pub fn without_station() -> Result<Option<Vec<String>>, CliError> {
     choices.extend(devices());
     choices.extend(networks());
     choices.push(Choice::new("a new plant file, from your answers and the devices found", &["new"]));
-    say("no station runs here");
-    ask("what shall be shown? a number, HOST[:TCPPORT] or /dev/…", &choices).map(Some)
+    say("no station is running here");
+    ask("what to show? a number, HOST[:TCPPORT] or /dev/…", &choices).map(Some)
 }
 
 /// Remembers a device that has answered, the latest first.

@@ -76,7 +76,7 @@ Exit codes:
   1  failed while running, or what was checked is wrong (the message says why)
   2  wrong arguments, errors in a profile, or bytes that cannot be read
   3  the history is in use by another process, or a station of this plant runs already
-  4  no station runs here
+  4  no station is running here
   5  the audit log is sound, but could not be compared with the history or with its sealing key;
      or a report agrees with all that is there, but its checksum or the audit log could not be read";
 
@@ -196,7 +196,7 @@ enum CliError {
     Usage(String),
     #[error(transparent)]
     History(#[from] HistoryError),
-    #[error("{0}\nit is not a station of this user that can be queried; stop it first")]
+    #[error("{0}\nit is not a station of yours that can be queried; stop it first")]
     InUse(HistoryError),
     #[error(transparent)]
     Users(UsersError),

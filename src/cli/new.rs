@@ -69,7 +69,7 @@ fn free(text: &str) -> Result<PathBuf, String> {
 }
 
 async fn wizard(path: PathBuf) -> Result<(), CliError> {
-    say("Enter takes what stands in [ ]. Nothing is written before the last question; Ctrl-C leaves.");
+    say("Enter accepts what is in [ ]. Nothing is written before the last question; Ctrl-C quits.");
     let mut profiles = open::own_profiles(path.parent().unwrap_or(Path::new("")));
     let known = profiles.recognisable();
     let title = ask("title", "Plant").await?;

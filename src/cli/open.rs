@@ -107,7 +107,7 @@ fn show_log(start: Start, terminal: &TerminalArgs) -> Result<(), CliError> {
 pub fn own_profiles(folder: &Path) -> OwnProfiles {
     let profiles = profile::own_profiles(&Search::usual(), &folder.join("plant.toml"));
     for file in profiles.broken() {
-        say(&format!("{file} has errors and takes no part: `sightglass check {file}` says which"));
+        say(&format!("{file} has errors and is ignored: `sightglass check {file}` lists them"));
     }
     profiles
 }

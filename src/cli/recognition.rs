@@ -80,7 +80,7 @@ pub async fn recognise_all(
             None => asked.rank(known).await?,
         };
         if let Some(fault) = asked.lost() {
-            say(&format!("unit {unit}: not all that tells what it is could be read: {fault}"));
+            say(&format!("unit {unit}: not all of its identification could be read: {fault}"));
         }
         found.push(FoundUnit { unit, has_register, kind });
     }

@@ -19,7 +19,7 @@ enum Command {
     /// Write a device profile from a register map: CSV, Excel, Markdown, HTML, Home Assistant, ESPHome, Telegraf, ioBroker, NIBE,
     /// modbus_local_gateway, solarman, wb-mqtt-serial, SunSpec, ModbusScope, MTUI
     Import(import::Args),
-    /// Write a device profile as the configuration of another program; what that cannot say is listed
+    /// Write a device profile as the configuration of another program; what that cannot express is listed
     Export(export::Args),
 }
 

@@ -25,7 +25,7 @@ pub struct Args {
     /// The plant to simulate; every line is served, and the options below are for its first one
     #[arg(default_value = "tank")]
     plant: String,
-    /// How to serve it; as the plant says if this is not given, Modbus TCP if only an address is
+    /// How to serve it [default: as the plant file says; Modbus TCP if only an address is given]
     #[arg(long, value_enum)]
     mode: Option<ModeArg>,
     /// Data bits of the serial line instead of those in the plant file: 7 for ASCII as the standard has it, or 8

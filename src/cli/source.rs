@@ -97,7 +97,7 @@ impl CsvArgs {
     pub fn refuse_unless(&self, is_csv: bool) -> Result<(), CliError> {
         match is_csv || !(self.bom || self.separator.is_some()) {
             true => Ok(()),
-            false => Err(CliError::Usage("--bom and --separator are of CSV: found another format".to_owned())),
+            false => Err(CliError::Usage("--bom and --separator are for CSV: found another format".to_owned())),
         }
     }
 

@@ -304,7 +304,7 @@ pub enum HistoryError {
     #[error("history: {}", words::plain(.0))]
     Engine(String),
     /// The file is something else: it is left alone.
-    #[error("{path} is not a history and is not changed: use another name, best one that ends in .duckdb")]
+    #[error("{path} is not a history and is not changed: use another name, preferably one that ends in .duckdb")]
     Foreign {
         /// The file.
         path: String,

@@ -212,7 +212,7 @@ mod tests {
         let group = LineTrouble::NoPermission { path: path(), owner: PortOwner::Group("dialout".into()) };
         let english = "/dev/ttyUSB0: no permission: it belongs to the group dialout (usermod -aG dialout USER, then log in again)";
         assert_eq!(group.to_string(), english);
-        assert!(!thai(&LineTrouble::NoFrame("55 01".into())).contains("bytes came"), "with what came behind it");
+        assert!(!thai(&LineTrouble::NoFrame("55 01".into())).contains("received bytes"), "with what came behind it");
         assert_eq!(thai(&LineTrouble::System("No such device".into())), "No such device");
     }
 }

@@ -240,7 +240,7 @@ pub(super) fn link(defined: Vec<Defined>, names: &Names, problems: &mut Problems
             let known = target.enum_labels.iter().find(|(_, unit)| units::is_known(unit));
             if *what == "unit_from" && known.is_none() {
                 let first = target.enum_labels.first();
-                let found = first.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is no unit"));
+                let found = first.map_or("it has no `enum`".to_owned(), |(_, unit)| format!("`{unit}` is not a unit"));
                 problems.add(need.at, format!("{} gives no unit: {found}", target.name)).label("unit_from");
             }
             if *what == "decimals_from" && may_be_exponent(target) {
@@ -350,7 +350,7 @@ pub(super) fn stated(stated: &Stated, scope: &Scope, listens: bool, problems: &m
             if let Some(decimals) = unusable.next() {
                 let is_power = decimals.power_source().is_some();
                 let what = if is_power { "power of ten" } else { "number of decimals" };
-                let problem = problems.add(choice.at, format!("{value} is no {what}"));
+                let problem = problems.add(choice.at, format!("{value} is not a {what}"));
                 let (least, most) = decimals.possible();
                 problem.label(format!("expected {least} to {most}"));
             }

@@ -18,7 +18,7 @@ pub(super) fn with_line(text: &str, settings: &LineDef) -> Result<String, String
     if let Some(error) = check_settings(settings).into_iter().next() {
         return Err(format!("{}, {}", error.what, error.expected));
     }
-    let mut document: DocumentMut = text.parse().map_err(|error| format!("the file is no TOML: {error}"))?;
+    let mut document: DocumentMut = text.parse().map_err(|error| format!("the file is not valid TOML: {error}"))?;
     let table = table_of(&mut document, &settings.name)?;
     set(table, settings)?;
     let edited = document.to_string();
@@ -277,7 +277,7 @@ unit = 1
             assert!(refused.as_ref().is_err_and(|why| why.contains(expect)), "{refused:?}");
         };
         check(FILE, &LineDef { name: "L9".into(), ..l1() }, "no line `L9`");
-        check("title = ", &l1(), "no TOML");
+        check("title = ", &l1(), "not valid TOML");
         check(FILE, &serial(|serial| serial.baud = 49), "49 baud is out of range");
         check(FILE, &serial(|serial| serial.data_bits = 7), "Modbus RTU sends 8 data bits");
     }

@@ -65,7 +65,8 @@ fn delay(table: &AlarmTable, problems: &mut Problems) {
             );
         }
         (_, Some(delay), Some(time)) if time.value < delay.value => {
-            let problem = problems.warn(delay.at, format!("{} comes later than it must be answered", name(table)));
+            let problem =
+                problems.warn(delay.at, format!("{} is raised later than the operator must respond", name(table)));
             problem.label("longer than `response_time`").also(time.at, "the response time");
         }
         (Some(_) | None, _, _) => {}
@@ -212,7 +213,7 @@ mod tests {
         check(&alarm(&HOT.replace("5s", "10min")), &[]);
         check(
             &alarm(&HOT.replace("5s", "11min")),
-            &["comes later than it must be answered (longer than `response_time`)"],
+            &["is raised later than the operator must respond (longer than `response_time`)"],
         );
     }
 

@@ -79,12 +79,10 @@ fn commands_as(user: &At<String>, is_private: bool, defs: &Defs, problems: &mut 
         problem.label("other masters poll them: nothing can be written");
     }
     if user.value.trim().is_empty() {
-        problems
-            .add(user.at, "requests need a user as whom they act")
-            .label("expected the name of a user of the station");
+        problems.add(user.at, "requests need a user to act as").label("expected the name of a user of the station");
     } else if !is_private {
         let problem = problems.warn(user.at, "requests are taken over a connection without TLS");
-        problem.label("anybody on the network may read and forge them").help("set `tls = true`");
+        problem.label("anyone on the network can read and forge them").help("set `tls = true`");
     }
     user.value.clone()
 }

@@ -169,11 +169,11 @@ impl StepReader<'_, '_> {
             // A key of the wrong type is reported already.
             [] if !table.valid => return Vec::new(),
             [] => {
-                self.problems.add(table.at, "a step does something").label(KINDS);
+                self.problems.add(table.at, "a step needs an action").label(KINDS);
                 return Vec::new();
             }
             [_, second, ..] => {
-                self.problems.add(*second, "a step does one thing").label("expected a step of its own");
+                self.problems.add(*second, "a step has one action").label("expected a step of its own");
                 return Vec::new();
             }
         }

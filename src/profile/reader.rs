@@ -123,7 +123,8 @@ fn check_text(text: &str, at: Span, problems: &mut Problems) {
 }
 
 fn report_hidden(letter: char, at: Span, problems: &mut Problems) {
-    let message = format!("the character U+{:04X} is not shown, or turns the direction of writing", u32::from(letter));
+    let message =
+        format!("the character U+{:04X} is invisible, or changes the direction of writing", u32::from(letter));
     problems.add(at, message).label("expected only visible characters");
 }
 

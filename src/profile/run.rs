@@ -67,7 +67,7 @@ pub(super) fn runs(tables: &[At<RunTable>], batches: &[BatchDef], defs: &Defs, p
 /// The names of a list that is written to have some, each once.
 fn each<'a>(list: &'a At<Texts>, what: &str, problems: &mut Problems) -> Vec<&'a At<String>> {
     if list.value.0.is_empty() {
-        problems.add(list.at, format!("a run without a {what}")).label("expected at least one, or no such key");
+        problems.add(list.at, format!("a run without a {what}")).label("expected at least one: else leave the key out");
     }
     let mut seen = Unique::default();
     let mut is_new = |name: &At<String>, problems: &mut Problems| {

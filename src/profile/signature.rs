@@ -70,7 +70,7 @@ fn check_signature(table: &SignatureTable, probes: &[Probe], problems: &mut Prob
     let count = probes.len();
     if count < PROBES_MIN {
         let problem = problems.add(table.at, format!("a signature of {count} probes can never fit"));
-        problem.label(format!("expected at least {PROBES_MIN}: so many must fit"));
+        problem.label(format!("expected at least {PROBES_MIN}: this many must fit"));
         return;
     }
     let is_one = |probe: &Probe| probe.bits.is_none() && probe.ranges.iter().all(|(low, high)| low == high);

@@ -343,7 +343,7 @@ fn a_plant_file_may_change_a_tag_but_not_contradict_itself() {
     assert_eq!(tag.unit, "°C", "what the plant file does not say stays as the profile has it");
     let both = "fast = \"1s\"\n[[device.tag]]\nname = \"T\"\nmax = 90\nmax_from = \"DP\"";
     check("fast = \"1s\"", both, &["`max` and `max_from` exclude each other"]);
-    check("unit = \"°C\"", "unit_from = \"MODE\"", &["D1.MODE gives no unit: `off` is no unit"]);
+    check("unit = \"°C\"", "unit_from = \"MODE\"", &["D1.MODE gives no unit: `off` is not a unit"]);
 }
 
 #[test]

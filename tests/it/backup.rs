@@ -45,7 +45,7 @@ fn a_file_is_imported_while_the_station_records() {
     // The user of the station may do so without a login, and look only with one.
     for _ in 0..2 {
         let (code, said) = home.history("import", &file);
-        assert!(code == Some(0) && said.contains("imported of 45000 rows"), "{said}");
+        assert!(code == Some(0) && said.contains("imported those of 45000 rows"), "{said}");
     }
     let (code, said) = home.said(home.command().args(["stop", "tank"]));
     assert_eq!((code, station.end()), (Some(0), Some(0)), "{said}");

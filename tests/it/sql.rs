@@ -83,7 +83,7 @@ fn raw_samples_are_exported_whole() {
     let args = ["export", "--raw", "--bom", "--from", "2026-03-03T11:59:58", "--to", "2026-03-03T14:00:02"];
     assert_eq!(run(&history, &[&args[..], &["--tags", "TIC-1.PV"]].concat()), (Some(0), format!("\u{feff}{text}")));
     let (code, said) = run(&history, &[&args[..], &["--format", "parquet"]].concat());
-    assert!(code == Some(2) && said.contains("--bom and --separator are of CSV"), "{said}");
+    assert!(code == Some(2) && said.contains("--bom and --separator are for CSV"), "{said}");
     // A history that lacks them takes them back.
     let other = folder.path().join("other.duckdb");
     let def = sightglass::api::profile::load(Path::new("tank"), &sightglass::api::profile::Search::shipped()).unwrap();

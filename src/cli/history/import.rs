@@ -81,7 +81,7 @@ async fn through_station(args: &Args, def: &Arc<PlantDef>, file: &Path) -> Resul
             Some(import) => say(&format!("imported {}", import.summary(rows, &def.time_zone))),
             None => nothing(rows),
         },
-        None => say(&format!("imported of {rows} rows those without a stored value: the audit log has the figures")),
+        None => say(&format!("imported those of {rows} rows that had no stored value: the audit log has the counts")),
     }
     Ok(())
 }

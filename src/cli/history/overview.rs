@@ -94,7 +94,7 @@ fn of_room(overview: &Overview, time: &impl Fn(Timestamp) -> String) -> Vec<Stri
     lines.push(match next_deletion {
         None => "next      nothing is deleted as things stand".to_owned(),
         Some(Deletion { file, why, at }) => {
-            let at = Timestamp::from_microsecond(*at).map_or_else(|_| "in a far future".to_owned(), time);
+            let at = Timestamp::from_microsecond(*at).map_or_else(|_| "in the far future".to_owned(), time);
             let why = match why {
                 Why::Age(days) => format!("kept for {days} days"),
                 Why::Share => format!("the history would have more than {} % of the disk", rule.disk_share_percent_max),

@@ -35,7 +35,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     }
     say_error(&format!("{} of {all} tags as {}", exported.count, args.format.word()));
     if exported.count == 0 {
-        return Err(CliError::Failed("nothing of it can be said there".to_owned()));
+        return Err(CliError::Failed("this format cannot express any of it".to_owned()));
     }
     match &args.out {
         Some(path) => {

@@ -33,7 +33,7 @@ const SAID_MAX: usize = 400;
 pub struct Args {
     /// The register map; `-` reads standard input
     file: PathBuf,
-    /// What the file is, where that is not seen: list, xlsx, html, homeassistant, esphome, telegraf, modbus_local_gateway, solarman,
+    /// Format of the file, where it is not recognised: list, xlsx, html, homeassistant, esphome, telegraf, modbus_local_gateway, solarman,
     /// wb-mqtt-serial, sunspec, modbusscope, mtui, modmaster
     #[arg(long, value_parser = super::words::<Format>)]
     format: Option<Format>,
@@ -53,7 +53,7 @@ pub struct Args {
     /// [default: ABCD; of a list of NIBE CDAB]
     #[arg(long, value_parser = super::words::<ByteOrder>)]
     order: Option<ByteOrder>,
-    /// What a column of a list means, such as `Ratio=divisor`; `none`: it is not used. May be given several times
+    /// What a column of a list means, such as `Ratio=divisor`; `none`: ignore it. May be given several times
     #[arg(long, value_name = "HEADING=MEANING", value_parser = meaning_of)]
     column: Vec<(String, Option<Column>)>,
     /// The unit whose rows are taken, in a file of several [default: the first]
@@ -133,7 +133,7 @@ pub fn main(args: &Args) -> Result<(), CliError> {
     }
     let written = profile::written(&list, &name, &title);
     say_rows(&title, &list, written.as_ref().ok());
-    let written = written.map_err(|why| CliError::Usage(format!("{title}: nothing of it can be taken: {why}")))?;
+    let written = written.map_err(|why| CliError::Usage(format!("{title}: nothing of it can be imported: {why}")))?;
     let text = with_plant(args, &list, &name, &written)?;
     let was_there = path.exists();
     write(&path, written.text.as_bytes(), args.force)?;

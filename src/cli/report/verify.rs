@@ -83,11 +83,11 @@ pub fn main(args: Args) -> Result<(), CliError> {
             Err(CliError::NotVerified(format!("{file} is what was written, but its checksum is missing")))
         }
         (false, Compared::Unrecorded(_), true) => Err(CliError::NotVerified(format!(
-            "{file} is as its checksum has it, but no station has recorded it: nothing else says that it was not changed"
+            "{file} agrees with its checksum, but no station has recorded it: nothing else shows that it was not changed"
         ))),
-        (false, Compared::Unrecorded(_), false) => Err(CliError::Failed(format!(
-            "{file} is nothing that a station of this plant has recorded, and has no checksum"
-        ))),
+        (false, Compared::Unrecorded(_), false) => {
+            Err(CliError::Failed(format!("{file} was not recorded by a station of this plant, and has no checksum")))
+        }
         (false, _, _) => Err(CliError::NotVerified(format!("{file} could not be compared with the audit log"))),
     }
 }

@@ -34,7 +34,7 @@ pub struct Args {
     /// Save every frame for Wireshark, in a new file
     #[arg(long, value_name = "FILE")]
     pcap: Option<PathBuf>,
-    /// End by itself after this time: 10s, 5m [default: Ctrl-C ends]
+    /// Stop after this time: 10s, 5m [default: Ctrl-C ends]
     #[arg(long = "for", value_name = "TIME", value_parser = span)]
     time: Option<Duration>,
     /// Show no frames: only the summary, and with --profile what has changed
@@ -43,7 +43,7 @@ pub struct Args {
     /// Show every byte
     #[arg(long, short)]
     verbose: bool,
-    /// Leave RTS on, for an adapter that takes its power from it; others may hold the line with it
+    /// Leave RTS on, for an adapter that is powered by it; others may hold the line with it
     #[arg(long)]
     rts: bool,
 }

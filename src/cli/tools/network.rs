@@ -52,7 +52,7 @@ async fn permitted(network: Network, line: &LineDef) -> Result<bool, CliError> {
     let (Some(first), Some(last)) = (hosts.first(), hosts.last()) else { return Ok(false) };
     say(&format!(
         "This connects to {} hosts, {first} to {last},\non TCP port {}, {AT_ONCE} at once, and reads one register of each \
-         that accepts.\nIt takes {} s at worst. In a network of others ask its owner first.",
+         that accepts.\nIt takes {} s at worst. On a network of others, ask its owner first.",
         hosts.len(),
         port_of(line),
         worst.as_secs()

@@ -31,7 +31,7 @@ pub struct Args {
     /// Add nothing: send exactly these bytes
     #[arg(long)]
     as_is: bool,
-    /// Send it although something is wrong with it, or every unit would obey it
+    /// Send it even if it is invalid, or a broadcast that every unit executes
     #[arg(long)]
     force: bool,
     /// Send without asking, even if it may change something
@@ -83,7 +83,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
     });
     let broadcast = asked.message.first().is_some_and(|unit| framing.is_broadcast(*unit));
     match (answer, broadcast) {
-        (None, false) => Err(CliError::Failed(format!("no answer within {} ms", line.timeout.as_millis()))),
+        (None, false) => Err(CliError::Failed(format!("no response within {} ms", line.timeout.as_millis()))),
         (None, true) => {
             say("   sent to all units; a broadcast has no response");
             Ok(())
@@ -93,7 +93,7 @@ pub fn main(args: Args) -> Result<(), CliError> {
         (Some(bytes), _) => asked
             .reply(bytes)
             .map(drop)
-            .map_err(|why| CliError::Failed(format!("what came back is no answer to this: {why}"))),
+            .map_err(|why| CliError::Failed(format!("what came back is not the response to this: {why}"))),
     }
 }
 

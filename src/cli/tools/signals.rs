@@ -31,7 +31,7 @@ pub struct Args {
     /// Send a break
     #[arg(long = "break")]
     send_break: bool,
-    /// End by itself after this time: 0s shows them once [default: Ctrl-C ends]
+    /// Stop after this time: 0s shows them once [default: Ctrl-C ends]
     #[arg(long = "for", value_name = "TIME", value_parser = span)]
     time: Option<Duration>,
 }

@@ -70,7 +70,7 @@ impl<'a> Reader<'a, '_> {
     fn fits(&mut self, test: &IdentityTest, with: Option<At<&'a str>>) -> bool {
         let at = with.map_or(self.end, |with| with.at);
         if test.is_of_versions() && !is_version(&test.with) {
-            let problem = self.problems.add(at, format!("`{}` is no version", test.with));
+            let problem = self.problems.add(at, format!("`{}` is not a version", test.with));
             problem.label("expected numbers with dots between them, as \"2.10\"");
             return false;
         }

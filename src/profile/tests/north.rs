@@ -16,7 +16,7 @@ fn a_broker_gets_no_text_or_number_that_it_cannot_take() {
         ("\"c\"", &format!("{long:?}"), "this is too long for a broker"),
         ("mes", &long, "this is too long for a broker"),
         ("localhost", &long, "this is too long for a broker"),
-        ("mes", " ", "requests need a user as whom they act"),
+        ("mes", " ", "requests need a user to act as"),
         ("a/b", "a/+", "`a/+` is not a topic to send to"),
         ("localhost", "a b", "`a b` is not a host"),
         ("20s", "14s", "this is too short"),

@@ -122,7 +122,7 @@ impl Correction {
         let theme = cx.theme;
         let room = body.width.saturating_sub(8).min(72);
         let words =
-            t!("Added to what it has counted, in its unit; negative ones are subtracted. It counts from now on.");
+            t!("Amount to add to what it has counted, in its unit; below 0: to subtract. It counts from now on.");
         let notes: Vec<_> = wrap(words, room).into_iter().map(|note| (note, theme.normal())).collect();
         let (above, rows) = (to_u16(notes.len()), self.form.rows());
         let mut canvas = window(cx, frame, body, t!("correct a counter"), (room, above + rows + 5));

@@ -86,7 +86,7 @@ impl Words {
             known.map(|tag| (value(snapshot, tag.id), snapshot.sample(tag.id).at)).collect();
         let width = rows.iter().map(|(text, _)| text.chars().count()).max().unwrap_or_default();
         let time = |at: &Timestamp| at.to_zoned(self.time_zone.clone()).strftime("%H:%M:%S").to_string();
-        let title = if rows.is_empty() { "values: none was heard" } else { "values, and when each was heard:" };
+        let title = if rows.is_empty() { "values: none heard" } else { "values, and when each was heard:" };
         let row = |(text, at): &(String, Timestamp)| format!("  {text:width$}  {}", time(at));
         std::iter::once(title.to_owned()).chain(rows.iter().map(row)).collect()
     }
@@ -136,7 +136,7 @@ pub(super) fn summary(listener: &Listener, line: &LineDef, time: Duration) -> Ve
         totals.noise_bytes,
     )];
     match (totals.requests + totals.unmatched, totals.noise_bytes, line.transport.serial()) {
-        (0, 0, _) => lines.push("nothing was heard: no master asks, or this is not its line".to_owned()),
+        (0, 0, _) => lines.push("nothing was heard: no master polls, or this is not its line".to_owned()),
         (0, _, Some(serial)) => {
             lines.push(format!(
                 "no frame at {serial}: other serial settings (--baud, --parity), A and B swapped, or --mode"
@@ -155,7 +155,7 @@ pub(super) fn summary(listener: &Listener, line: &LineDef, time: Duration) -> Ve
         false => row(*unit, stats),
     }));
     if 0 < listener.waiting() {
-        lines.push(format!("{} at the end without response yet, not counted above", listener.waiting()));
+        lines.push(format!("{} without a response at the end, not counted above", listener.waiting()));
     }
     lines
 }
