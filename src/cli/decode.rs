@@ -227,7 +227,7 @@ fn why(paste: &Paste) -> String {
         (Why::BadCheck, _) => format!("read as RTU: the CRC is wrong, but {place}"),
         (Why::BadHeader, _) => format!("read as TCP: the header is wrong, but {place}"),
         (Why::Nothing, _) => {
-            "no CRC or LRC fits, there is no header, and no message of the standard is like this".to_owned()
+            "no CRC or LRC fits, there is no header, and no message of the standard looks like this".to_owned()
         }
     }
 }

@@ -51,7 +51,7 @@ pub(super) fn report(
         let id = defs.device(device, problems);
         if id.is_some_and(|id| defs.devices[id.index()].faceplate.is_none()) {
             problems
-                .add(device.at, format!("{} is no controller", device.value))
+                .add(device.at, format!("{} is not a controller", device.value))
                 .label("it has no faceplate with PV and SV");
         }
         report.record = id.map(|id| (id, every.value));

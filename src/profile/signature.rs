@@ -20,12 +20,12 @@ pub(super) fn probes(table: &SignatureTable, scope: &Scope, problems: &mut Probl
         let Some(tag) = probe.tag.as_ref().and_then(|name| scope.tag(name, problems)) else { continue };
         check_number(*at, tag, problems);
         if tag.point.kind.address_words() != 1 {
-            let problem = problems.add(*at, format!("{} is no register of 16 bits", tag.name));
+            let problem = problems.add(*at, format!("{} is not a 16-bit register", tag.name));
             problem.label("a device is recognised before it is known how it counts");
         }
         let bits = probe.bits.as_ref().and_then(|name| scope.tag(name, problems));
         if let Some(bit) = bits.filter(|bit| !bit.point.table.is_bits() || tag.point.len() != 1) {
-            problems.add(*at, format!("{} and {} are no word and bit", tag.name, bit.name)).label("bits");
+            problems.add(*at, format!("{} and {} are not a word and a bit", tag.name, bit.name)).label("bits");
         }
         let is: Vec<f64> = probe.is.iter().filter_map(|number| probed(*number, tag, problems)).collect();
         let ranges = match (probe.range, &probe.bits, probe.is.is_empty()) {

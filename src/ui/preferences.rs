@@ -252,7 +252,7 @@ fn of_bookmarks(value: &Node, at: Span, problems: &mut Problems) -> Option<Vec<B
             Some(bookmark) => texts.push(bookmark),
             None => {
                 problems
-                    .add(text.at, format!("`{}` is no bookmark", text.value))
+                    .add(text.at, format!("`{}` is not a bookmark", text.value))
                     .label("expected an instant and a name: `2026-11-21T13:52:31Z pump tripped`");
             }
         }

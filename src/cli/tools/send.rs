@@ -148,7 +148,7 @@ impl Asked {
     fn oddities(&self, reply: &Reply, came: &[u8]) -> Vec<String> {
         let (before, behind) = (reply.range.start, came.len() - reply.range.end);
         let around = |count: usize, place: &str| {
-            (0 < count).then(|| format!("   {} {place} it are no part of it", counted(count, Counted::Bytes)))
+            (0 < count).then(|| format!("   {} {place} it, not part of it", counted(count, Counted::Bytes)))
         };
         let header = match frame::mbap(&came[reply.range.clone()]) {
             _ if self.framing != Framing::Mbap => None,

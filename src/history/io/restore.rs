@@ -60,7 +60,7 @@ struct Plan {
 pub fn verify(from: &Path) -> Result<Sound, HistoryError> {
     let refuse = |why: String| Err(HistoryError::Refused(format!("{}: {why}", from.display())));
     let Some(backup) = read_manifest(from)? else {
-        return refuse("it is no backup, or one that was never completed: it has no backup.json".into());
+        return refuse("it is not a backup, or one that was never completed: it has no backup.json".into());
     };
     let wrong: Vec<&str> =
         backup.files.iter().filter(|file| !is_sound(from, file)).map(|file| file.path.as_str()).collect();

@@ -274,7 +274,7 @@ fn symbol(
         SymbolKind::Controller => {
             let device = defs.device(name, problems)?;
             if defs.devices[device.index()].faceplate.is_none() {
-                let problem = problems.add(name.at, format!("{} is no controller", name.value));
+                let problem = problems.add(name.at, format!("{} is not a controller", name.value));
                 problem.label("its profile has no [faceplate]");
             }
             Symbol::Controller(device)

@@ -311,7 +311,7 @@ fn a_value_of_32_bits_may_have_one_address() {
         ("table = \"coil\"", "a coil is one bit"),
         ("table = \"holding\"\naccess = \"rw\"\nwrite_fc = 6", "function 6 cannot write this tag"),
         ("table = \"holding\"\naccess = \"rw\"\nwrite_fc = 23", "expected [16]"),
-        ("table = \"holding\"\n[[signature.probe]]\ntag = \"X\"\nis = [1]", "X is no register of 16 bits"),
+        ("table = \"holding\"\n[[signature.probe]]\ntag = \"X\"\nis = [1]", "X is not a 16-bit register"),
     ] {
         let map = meter(&row(keys));
         assert!(errors(&map).contains(why), "{keys}: {}", errors(&map));

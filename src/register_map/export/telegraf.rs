@@ -96,7 +96,7 @@ fn lose(tag: &TagDef, exported: &mut Exported) {
             (tag.writable(), "writing it"),
             (!tag.enum_labels.is_empty(), "names of its numbers"),
             (!tag.bit_labels.is_empty(), "names of its bits"),
-            (!tag.bad_if.is_empty(), "numbers that are no value"),
+            (!tag.bad_if.is_empty(), "numbers that mean \"no value\""),
             (tag.quality_from.is_some(), "its quality from another tag"),
             (tag.when.is_some(), "when the device has it"),
         ],

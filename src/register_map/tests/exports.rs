@@ -239,7 +239,7 @@ fn home_assistant_takes_whole_numbers_for_no_value() {
     };
     assert_eq!(of("-9999"), (Some("-9999".to_owned()), Vec::new()));
     assert_eq!(of("0x7FC00000, 7"), (Some("7".to_owned()), Vec::new()));
-    assert_eq!(of("0x3FC00000"), (None, vec!["F: a number that is no value and not whole".to_owned()]));
+    assert_eq!(of("0x3FC00000"), (None, vec!["F: a number that means \"no value\" and is not whole".to_owned()]));
 }
 
 #[test]

@@ -76,5 +76,5 @@ fn bookmarks_are_kept_beside_the_choices() {
     assert_eq!(read, file, "{}", file.text());
     assert_eq!((read.bookmarks(Some("som chai")).len(), read.bookmarks(None).len()), (1, 2));
     let file = PreferencesFile::read("p.toml", b"[bookmarks]\nanna = [\"yesterday\"]\n");
-    assert!(file.problem.is_some_and(|line| line.contains("p.toml:2:9: `yesterday` is no bookmark")));
+    assert!(file.problem.is_some_and(|line| line.contains("p.toml:2:9: `yesterday` is not a bookmark")));
 }

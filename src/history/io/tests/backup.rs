@@ -142,7 +142,7 @@ fn a_killed_backup_is_never_taken_for_a_whole_one() {
             kill += 1;
             let done = store.write_killed(&to, sec(round), &mut killed_at(kill));
             match (&whole, restore::verify(&to)) {
-                (None, Err(why)) if done.is_err() => assert!(why.to_string().contains("it is no backup"), "{why}"),
+                (None, Err(why)) if done.is_err() => assert!(why.to_string().contains("it is not a backup"), "{why}"),
                 (_, Ok(sound)) => {
                     let expect = done.as_ref().ok().or(whole.as_ref());
                     assert_eq!(Some(&sound.backup), expect, "killed at step {kill}");
