@@ -20,7 +20,7 @@ pub struct MqttDef {
     pub host: String,
     /// TCP port.
     pub port: u16,
-    /// As the broker knows this station; two clients of one name throw each other out.
+    /// As the broker knows this station; two clients of one name disconnect each other.
     pub client_id: String,
     /// User name at the broker.
     pub user: Option<String>,

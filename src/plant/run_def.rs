@@ -20,7 +20,7 @@ pub struct RunDef {
     pub sv_used: Option<TagId>,
     /// Process value.
     pub pv: TagId,
-    /// PV so near to SV is at SV, in its unit; `None` for 2 % of the way, 0.5 % of the range at least.
+    /// PV this near to SV is at SV, in its unit; `None` for 2 % of the way, 0.5 % of the range at least.
     pub band: Option<f64>,
     /// PV that stays at SV for so long is steady.
     pub steady_for: Duration,
