@@ -10,7 +10,7 @@ const TOPICS: [(&str, &str, &str); 10] = [
     ("commands", "what each command does", include_str!("help/commands.md")),
     ("screen", "tabs, keys, and what the signs mean", include_str!("help/screen.md")),
     ("station", "a station on a panel PC: installation, users, rights", include_str!("help/station.md")),
-    ("reports", "reports by hand and by themselves, and how to trust them", include_str!("help/reports.md")),
+    ("reports", "reports by hand, automatic reports, and how to verify them", include_str!("help/reports.md")),
     ("mqtt", "values for other systems: topics, what arrives, what an outage does", include_str!("help/mqtt.md")),
     ("audit-log", "the audit log: what it holds and what it promises", include_str!("help/audit.md")),
     ("reliability", "what you can rely on, and what happens when something fails", include_str!("help/reliability.md")),
