@@ -134,7 +134,7 @@ fn what_is_never_heard_is_stated_for_a_listening_line_only() {
     for (stated, mode, expect) in [
         ("DP = 2", "mode = \"rtu\"", ["small.toml:16:12", "M1.DP is read from the device"]),
         ("DP = 9", "mode = \"listen\"", ["small.toml:16:17", "9 is not a number of decimals"]),
-        ("DP = 0.5", "mode = \"listen\"", ["small.toml:16:17", "no number of decimals"]),
+        ("DP = 0.5", "mode = \"listen\"", ["small.toml:16:17", "is not a number of decimals"]),
         ("MODE = 1", "mode = \"listen\"", ["small.toml:16:12", "no value is scaled by M1.MODE"]),
         ("X = 1", "mode = \"listen\"", ["small.toml:16:12", "unknown tag `X`"]),
     ] {

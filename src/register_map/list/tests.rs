@@ -140,7 +140,7 @@ fn a_list_of_iobroker_is_read_with_types_orders_and_units() {
         "40116 Wide int16 ABCD 1 0 W",
     ];
     assert_eq!(named, expect);
-    let expect = ["of unit 2"];
+    let expect = ["to unit 2"];
     assert_eq!(problems.len(), expect.len(), "{problems:?}");
     for (problem, expect) in problems.iter().zip(expect) {
         assert!(problem.contains(expect), "{problem}: {expect}");

@@ -215,7 +215,7 @@ parameters:
     ];
     assert_eq!(named, expect);
     assert_eq!(problems.len(), 3, "{problems:?}");
-    assert!(problems[0].contains("`rule: 9` cannot be said"), "{problems:?}");
+    assert!(problems[0].contains("cannot express `rule: 9`"), "{problems:?}");
     assert!(problems[2].contains("differs between 2 models"), "{problems:?}");
     let second = super::ListContext { variant: Some(1), ..Default::default() };
     let list = crate::register_map::read(text.as_bytes(), &second);
@@ -336,7 +336,7 @@ fn a_model_of_sunspec_follows_its_sizes_and_factors() {
     ];
     assert_eq!((named, problems), (expect.map(str::to_owned).to_vec(), Vec::new()));
     let warnings = list_of(text).warnings;
-    assert!(warnings[0].contains("40070") && warnings[1].contains("16 at most are taken"), "{warnings:?}");
+    assert!(warnings[0].contains("40070") && warnings[1].contains("at most 16 are taken"), "{warnings:?}");
 }
 
 #[test]

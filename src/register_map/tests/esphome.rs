@@ -58,7 +58,7 @@ sensor:
         "40051 Serial cstring(8) ABCD x1",
     ];
     assert_eq!(named, expect, "{problems:?}");
-    let expect = ["Turned: `lambda`", "Curve: `calibrate_linear`", "of unit 6"];
+    let expect = ["Turned: a profile cannot express `lambda`", "cannot express `calibrate_linear`", "to unit 6"];
     let matches = problems.len() == expect.len() && problems.iter().zip(expect).all(|(why, of)| why.contains(of));
     assert!(matches, "{problems:?}");
 }

@@ -124,7 +124,7 @@ fn addresses_are_understood_as_manuals_write_them() {
     let hex = "Address;Name\nFF00H;a\n1008 h;b\n&H1001;c\n16#1003;d\nH1004;e\n";
     let places: Vec<u16> = list_of(hex).named.iter().map(|named| named.address).collect();
     assert_eq!(places, [0xFF00, 0x1008, 0x1001, 0x1003, 0x1004]);
-    check("Address;Name\n1!400001;a\n2!400002;b\n", &["40001 a uint16 ABCD x1"], &["of unit 2"], &[]);
+    check("Address;Name\n1!400001;a\n2!400002;b\n", &["40001 a uint16 ABCD x1"], &["to unit 2"], &[]);
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn home_assistant_hubs_and_units_are_not_mixed() {
     let units = "modbus:
   - { name: a, sensors: [{ name: One, address: 1, slave: 7 }, { name: Two, address: 2 }, { name: Odd, address: 3, slave: x }] }
 ";
-    check(units, &["40002 One int16 ABCD x1"], &["of unit 1", "Odd: `slave`"]);
+    check(units, &["40002 One int16 ABCD x1"], &["to unit 1", "Odd: `slave`"]);
 }
 
 #[test]
@@ -38,7 +38,11 @@ fn home_assistant_temperatures_have_scales_of_their_own() {
         "40031 Room int16 ABCD x0.5 -10 °C",
         "40032 Room target int16 ABCD x0.01 °C rw",
     ];
-    check(text, &expect, &["Turned: `reverse_order`", "Same: `target_temp_scale`"]);
+    check(
+        text,
+        &expect,
+        &["Turned: a profile cannot express `reverse_order`", "Same: a profile cannot express `target_temp_scale`"],
+    );
 }
 
 #[test]
@@ -50,11 +54,15 @@ fn a_bit_that_means_the_contrary_is_left_out() {
     covers:
       - { name: Gate, address: 7, input_type: coil, state_open: 0, state_closed: 1 }
 ";
-    check(ha, &["00007 Even bool ABCD x1 rw"], &["Odd: `command_on`", "Gate: `state_open`"]);
+    check(
+        ha,
+        &["00007 Even bool ABCD x1 rw"],
+        &["Odd: a profile cannot express `command_on`", "Gate: a profile cannot express `state_open`"],
+    );
     let wb = r#"{ "device": { "channels": [
         { "name": "Odd", "reg_type": "coil", "address": 0, "type": "switch", "on_value": 0, "off_value": 1 },
         { "name": "Even", "reg_type": "coil", "address": 1, "type": "switch" } ] } }"#;
-    check(wb, &["00002 Even bool ABCD x1 rw"], &["Odd: `on_value`"]);
+    check(wb, &["00002 Even bool ABCD x1 rw"], &["Odd: a profile cannot express `on_value`"]);
 }
 
 #[test]
@@ -80,7 +88,7 @@ fn telegraf_inputs_bits_and_texts_mean_what_it_makes_of_them() {
     string_register_location = "upper"
 "#;
     let expect = ["40002 plain uint16[3+1] ABCD x1", "40003 swapped uint16[3+1] BADC x1"];
-    check(bits, &expect, &["text: `string_register_location`"]);
+    check(bits, &expect, &["text: a profile cannot express `string_register_location`"]);
 }
 
 #[test]
@@ -106,7 +114,11 @@ fn wiren_board_texts_and_conditions_are_as_it_means_them() {
         { "name": "Old", "reg_type": "input", "address": 20, "scale": 0.1, "condition": "fw==1" },
         { "name": "New", "reg_type": "input", "address": 20, "condition": "fw==2" },
         { "name": "Half", "reg_type": "input", "address": "11:4" } ] } }"#;
-    check(text, &["30002 Serial chars(6) ABCD x1"], &["Old: `condition`", "New: `condition`", "Half: `address`"]);
+    check(
+        text,
+        &["30002 Serial chars(6) ABCD x1"],
+        &["Old: a profile cannot express `condition`", "New: a profile cannot express `condition`", "Half: `address`"],
+    );
 }
 
 #[test]
@@ -122,5 +134,5 @@ fn solarman_groups_give_their_keys_and_parts_are_not_guessed() {
       - { name: Signed, rule: 2, registers: [5], inverted: true }
 ";
     let expect = ["40002 Inherits uint16 ABCD x0.1", "40003 Own uint16 ABCD x10", "40006 Signed int16 ABCD x-0.1"];
-    check(text, &expect, &["Both: `bit`", "Turned: `inverted`"]);
+    check(text, &expect, &["Both: a profile cannot express `bit`", "Turned: a profile cannot express `inverted`"]);
 }

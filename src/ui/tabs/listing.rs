@@ -240,13 +240,7 @@ impl<L: Listing> List<L> {
         }
         let columns = self.order.map(|_| self.columns(cx)).unwrap_or_default();
         if let Some(column) = self.order.and_then(|order| columns.get(order)) {
-            // What is not known comes last either way.
-            let (mut known, unknown): (Vec<_>, Vec<_>) = rows.into_iter().partition(|row| column.is_known(cx, row));
-            known.sort_by(|a, b| column.compare(cx, a, b));
-            if self.reversed {
-                known.reverse();
-            }
-            rows = known.into_iter().chain(unknown).collect();
+            rows = column.sorted(cx, rows, self.reversed);
         }
         rows
     }

@@ -53,7 +53,7 @@ fn disabling_the_user_ends_its_requests_at_once() {
     bench.later(1);
     assert_eq!(bench.who(MES).as_deref(), Some("tech"));
     bench.request(1, SessionRequest::SetRole { user: "tech".into(), role: Role::Viewer }).unwrap();
-    assert!(refused(&mut bench, RUN).is_some_and(|why| why.contains("for a technician")));
+    assert!(refused(&mut bench, RUN).is_some_and(|why| why.contains("needs a technician")));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A column of a list: its heading, how wide it is, its text in each row, and the order that it gives.
 
-use std::cmp::Ordering;
+use std::{cmp::Ordering, ops::Deref};
 
 use crate::ui::tabs::prelude::*;
 
@@ -106,13 +106,18 @@ impl<R: ?Sized> Column<R> {
         }
     }
 
-    /// Has it a word or figure of a row?
-    pub fn is_known(&self, cx: &ViewContext, row: &R) -> bool {
-        self.text(cx, row, u16::MAX).contains(char::is_alphanumeric)
+    /// The rows in the order of this column; what it does not know comes last either way.
+    pub fn sorted<T: Deref<Target = R>>(&self, cx: &ViewContext, rows: Vec<T>, reversed: bool) -> Vec<T> {
+        let is_known = |row: &T| self.text(cx, row, u16::MAX).contains(char::is_alphanumeric);
+        let (mut known, unknown): (Vec<T>, Vec<T>) = rows.into_iter().partition(is_known);
+        known.sort_by(|a, b| self.compare(cx, a, b));
+        if reversed {
+            known.reverse();
+        }
+        known.into_iter().chain(unknown).collect()
     }
 
-    /// The order of two rows by this column.
-    pub fn compare(&self, cx: &ViewContext, a: &R, b: &R) -> Ordering {
+    fn compare(&self, cx: &ViewContext, a: &R, b: &R) -> Ordering {
         match self.order {
             Some(order) => order(a, b),
             None => natural(&self.text(cx, a, u16::MAX), &self.text(cx, b, u16::MAX)),

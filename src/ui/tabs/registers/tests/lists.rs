@@ -202,7 +202,7 @@ fn a_preview_says_how_plain_numbers_were_read() {
     let sent = first(&mut bench, "address;name;type\n5;a;int16\n");
     assert!(sent.contains("as sent, from 0; by default: holding, ABCD"), "{sent}");
     let modicon = first(&mut bench, "address;name;type\n400005;a;int16\n");
-    assert!(modicon.contains("Modicon numbers; where"), "{modicon}");
+    assert!(modicon.contains("Modicon numbers; by default"), "{modicon}");
     let heat_pump = "Title;Register type;Register;Division factor;Size of variable\na;MODBUS_INPUT_REGISTER;5;1;6\n";
     let swapped = first(&mut bench, heat_pump);
     assert!(swapped.contains("as sent, from 0; by default: holding, CDAB"), "{swapped}");
