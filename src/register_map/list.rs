@@ -11,6 +11,7 @@ mod factors;
 mod form;
 mod formula;
 mod headed;
+mod halves;
 pub mod headings;
 mod heat_pump;
 mod meanings;
@@ -320,6 +321,7 @@ pub fn of_cells(all: &[Cells], is_separated: bool, context: &ListContext) -> Lis
             row.unused.into_iter().for_each(|heading| list.note(heading, row.line));
         }
     }
+    list.warnings.extend(halves::warnings(&list.named));
     list
 }
 

@@ -84,6 +84,8 @@ fn cell(tag: &TagDef, column: Column) -> String {
         Column::Offset => number(0.0, tag.offset),
         Column::Decimals if tag.is_text() => String::new(),
         Column::Decimals => decimals(tag).to_string(),
+        // One that the device chooses is none of the file.
+        Column::Unit if tag.unit_from.is_some() => String::new(),
         Column::Unit => tag.unit.clone(),
         Column::Access => if is_written { tag.access } else { Access::Read }.word().to_owned(),
         Column::Min => bound(tag.min),

@@ -114,7 +114,9 @@ fn register(tag: &TagDef, keys: &mut Vec<String>) -> Result<(), &'static str> {
     keys.extend((tag.scale != 1.0).then(|| format!("scale: {}", tag.scale)));
     keys.extend((tag.offset != 0.0).then(|| format!("offset: {}", tag.offset)));
     keys.push(format!("precision: {}", decimals(tag)));
-    keys.extend((!tag.unit.is_empty()).then(|| format!("unit_of_measurement: {}", quoted(&tag.unit))));
+    // One that the device chooses is none of the file.
+    let has_unit = !tag.unit.is_empty() && tag.unit_from.is_none();
+    keys.extend(has_unit.then(|| format!("unit_of_measurement: {}", quoted(&tag.unit))));
     keys.extend(whole_bad(tag).next().map(|bad| format!("nan_value: {bad}")));
     Ok(())
 }

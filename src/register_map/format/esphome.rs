@@ -29,7 +29,10 @@ const KEPT: &[&str] = &[
 /// Keys that make another value, in a way that no profile says.
 const TURNING: [&str; 5] = ["lambda", "offset", "custom_command", "raw_encode", "inverted"];
 /// Filters after which a value is the same.
-const HARMLESS: [&str; 6] = ["throttle", "delta", "debounce", "heartbeat", "skip_initial", "round"];
+#[rustfmt::skip]
+const HARMLESS: [&str; 11] = [
+    "throttle", "delta", "debounce", "heartbeat", "skip_initial", "round", "delayed_on", "delayed_off", "delayed_on_off", "settle", "autorepeat",
+];
 
 /// Reads the items of all sections; those of the first unit are taken.
 pub fn read(tree: &Tree, context: &ListContext) -> List {
@@ -46,6 +49,10 @@ pub fn read(tree: &Tree, context: &ListContext) -> List {
                 list.note_keys(item, &[PLAIN, KEPT]);
             }
         }
+    }
+    for item in tree.root.all("output").iter().filter(|item| item.word("platform") == Some(PLATFORM)) {
+        let name = item.word("id").unwrap_or("output");
+        list.push_of(context, None, item.line, Err(format!("{name}: {}", unsaid("output"))));
     }
     list
 }
@@ -77,6 +84,7 @@ fn row(section: &str, item: &Node, name: &str) -> Result<Named, String> {
     let (kind, order) = kind(section, item, table)?;
     let mut named = Named::new(table, address, kind, ByteOrder::Abcd, name).ordered(order);
     if kind.is_text() || table.is_bits() {
+        unfiltered(item)?;
         named.access = if section == "switch" && table == Table::Coil { Access::ReadWrite } else { Access::Read };
         return Ok(named);
     }
@@ -84,6 +92,13 @@ fn row(section: &str, item: &Node, name: &str) -> Result<Named, String> {
     let is_bit = matches!(section, "binary_sensor" | "switch");
     let mask = item.opt_whole("bitmask")?.or(is_bit.then_some(1));
     if let Some(mask) = mask {
+        // What a mask leaves of a number has no sign.
+        named.kind = match kind {
+            DataType::I16 => DataType::U16,
+            DataType::I32 => DataType::U32,
+            DataType::I64 => DataType::U64,
+            kind => kind,
+        };
         let field = u64::try_from(mask).ok().and_then(field_of).filter(|(_, width)| !is_bit || *width == 1);
         let (low, width) = field.ok_or_else(|| unsaid("bitmask"))?;
         named.field = (u16::from(width) < u16::from(kind.bits())).then_some((low, width));
@@ -110,6 +125,18 @@ fn row(section: &str, item: &Node, name: &str) -> Result<Named, String> {
         named.access = Access::Read;
     }
     filtered(named, item)
+}
+
+/// A bit or text, of which filters would make another.
+fn unfiltered(item: &Node) -> Result<(), String> {
+    let filters = item.all("filters");
+    let turning = filters.iter().flat_map(Node::entries).find(|(key, _)| !HARMLESS.contains(&key.as_str()));
+    let is_odd = filters.iter().any(|filter| matches!(filter.value, Value::Scalar(_)));
+    match turning {
+        Some((key, _)) => Err(unsaid(key)),
+        None if is_odd => Err(unsaid("filters")),
+        None => Ok(()),
+    }
 }
 
 /// The type, and the order of its registers: `_R` has the low one first.

@@ -36,7 +36,7 @@ pub fn format_of(text: &str) -> Result<Format, &'static str> {
         .any(|key| has(key))
     {
         Format::LocalGateway
-    } else if has("- platform: modbus_controller") || has("platform: modbus_controller") {
+    } else if ["", "- ", "- {", "- { "].into_iter().any(|dash| has(&format!("{dash}platform: modbus_controller"))) {
         // It has a section `modbus:` as well.
         Format::EspHome
     } else if has("modbus:") || has("input_type:") {
@@ -78,6 +78,7 @@ mod tests {
             ("device:\n  model: A\nread_only_word:\n  power:\n    address: 84\n", Format::LocalGateway),
             ("modbus:\n  - name: hub\n    type: tcp\n", Format::HomeAssistant),
             ("modbus:\n  id: bus\nsensor:\n  - platform: modbus_controller\n    address: 5\n", Format::EspHome),
+            ("sensor:\n  - { platform: modbus_controller, address: 5 }\n", Format::EspHome),
             ("{ \"registers\": { \"holdings\": [] } }", Format::Mtui),
             ("\"Address\",\"Name\",\"Type\",\"Value\",\"Unit\",\"Radix\",\"Offset\",\"Scale\"\n", Format::ModMaster),
             ("40001  Voltage L1  float  V\n", Format::List),

@@ -54,29 +54,47 @@ const SECTIONS: [&str; 7] = ["sensors", "binary_sensors", "switches", "lights", 
 /// Most registers of an array.
 const ARRAY_MAX: i64 = 1_000;
 
+/// What holds the hubs: the file, or packages in it.
+fn holders(root: &Node) -> Vec<&Node> {
+    if let Some(hubs) = root.get("modbus") {
+        return vec![hubs];
+    }
+    let packages = root.get("homeassistant").and_then(|home| home.get("packages"));
+    let hubs = packages.map_or(&[][..], Node::entries).iter().filter_map(|(_, package)| package.get("modbus"));
+    let hubs: Vec<&Node> = hubs.collect();
+    if hubs.is_empty() { vec![root] } else { hubs }
+}
+
 /// Reads all hubs; the rows of the first unit are taken.
 pub fn read(tree: &Tree, context: &ListContext) -> List {
     let mut list = List::of_tree(tree);
-    let hubs = tree.root.get("modbus").unwrap_or(&tree.root);
-    if let Value::Scalar(_) = hubs.value {
-        list.problems.push(t!("line {line}: `{section}` is in another file", line = hubs.line, section = "modbus"));
-    }
-    // A file that is included has the sensors of one hub, without their key.
-    let is_sensors = hubs.items().iter().all(|item| item.get("address").is_some());
-    if is_sensors {
-        hubs.items().iter().for_each(|item| row(&mut list, context, 0, SECTIONS[0], item));
-    }
-    for (n, hub) in hubs.items().iter().enumerate().filter(|_| !is_sensors) {
-        for section in SECTIONS {
-            let items = hub.all(section);
-            if let [Node { line, value: Value::Scalar(_) }] = items {
-                list.problems.push(t!("line {line}: `{section}` is in another file", line = *line, section));
-                continue;
-            }
-            items.iter().for_each(|item| row(&mut list, context, n, section, item));
+    let mut hub_count = 0;
+    for hubs in holders(&tree.root) {
+        if let Value::Scalar(_) = hubs.value {
+            list.problems.push(t!("line {line}: `{section}` is in another file", line = hubs.line, section = "modbus"));
+        }
+        // A file that is included has the sensors of one hub, without their key.
+        if hubs.items().iter().all(|item| item.get("address").is_some()) {
+            hubs.items().iter().for_each(|item| row(&mut list, context, hub_count, SECTIONS[0], item));
+            continue;
+        }
+        for of_hub in hubs.items() {
+            hub(&mut list, context, hub_count, of_hub);
+            hub_count += 1;
         }
     }
     list
+}
+
+fn hub(list: &mut List, context: &ListContext, n: usize, hub: &Node) {
+    for section in SECTIONS {
+        let items = hub.all(section);
+        if let [Node { line, value: Value::Scalar(_) }] = items {
+            list.problems.push(t!("line {line}: `{section}` is in another file", line = *line, section));
+            continue;
+        }
+        items.iter().for_each(|item| row(list, context, n, section, item));
+    }
 }
 
 fn row(list: &mut List, context: &ListContext, hub: usize, section: &str, item: &Node) {

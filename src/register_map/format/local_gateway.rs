@@ -89,7 +89,7 @@ fn entity(table: Table, key: &str, item: &Node) -> Result<Named, String> {
     let poll = poll.filter(|seconds| (1..=86_400).contains(seconds)).map(Duration::from_secs).map(Poll::Every);
     let named = Named { access, poll, ..Named::new(table, address, DataType::Bool, ByteOrder::Abcd, name) };
     if table.is_bits() {
-        return Ok(named);
+        return bit(item, named);
     }
     let kind = kind_of(item)?;
     let order = swapped(item.word("swap").unwrap_or("none")).ok_or_else(|| unsaid("swap"))?;
@@ -100,13 +100,29 @@ fn entity(table: Table, key: &str, item: &Node) -> Result<Named, String> {
     numbers(item, named)
 }
 
+/// A bit that is on while it is 0 would be shown the other way round, and names of its states would be lost.
+fn bit(item: &Node, named: Named) -> Result<Named, String> {
+    let states = item.get("switch").filter(|_| item.word("control") == Some("switch")).unwrap_or(item);
+    for (key, usual) in [("on", true), ("off", false)] {
+        if states.get(key).is_some_and(|node| node.is_true() != usual) {
+            return Err(unsaid(key));
+        }
+    }
+    match ["map", "options", "flags", "multiplier", "offset"].into_iter().find(|key| item.get(key).is_some()) {
+        Some(key) => Err(unsaid(key)),
+        None => Ok(named),
+    }
+}
+
 fn kind_of(item: &Node) -> Result<DataType, String> {
     let size = item.opt_whole("size")?.unwrap_or(1);
     let flag = |key: &str| item.get(key).is_some_and(Node::is_true);
     if flag("string") {
         return text_of(size).ok_or_else(|| unsaid("size"));
     }
-    let known = match (size, flag("float"), flag("signed")) {
+    // Bits are masked out of a number with a sign, and have none.
+    let is_signed = flag("signed") && item.get("bits").is_none();
+    let known = match (size, flag("float"), is_signed) {
         _ if item.get("sum_scale").is_some() => return sum(item),
         (2, true, _) => DataType::F32,
         (4, true, _) => DataType::F64,
@@ -169,6 +185,9 @@ fn numbers(item: &Node, named: Named) -> Result<Named, String> {
         named = named.labelled(labels.labels()?);
     }
     if item.word("control") == Some("switch") {
+        if scale != 1.0 || offset != 0.0 {
+            return Err(unsaid("switch"));
+        }
         let state = |key: &str, usual| {
             item.get("switch").map_or(Ok(None), |node| node.opt_whole(key)).map(|found| found.unwrap_or(usual))
         };

@@ -109,7 +109,11 @@ fn of_expression(node: &Node, found: &Expression, is_little: bool) -> Result<Nam
         word => return Err(t!("`{word}` is not a known type", word)),
     };
     let named = named(node, &found.address, kind, order)?;
-    Ok(if named.table.is_bits() { named } else { named.scaled(found.scale, found.offset) })
+    match (named.table.is_bits(), (found.scale, found.offset)) {
+        (false, (scale, offset)) => Ok(named.scaled(scale, offset)),
+        (true, (1.0, 0.0)) => Ok(named),
+        (true, _) => Err(unsaid("expression")),
+    }
 }
 
 fn wide(is_little: bool) -> ByteOrder {

@@ -210,6 +210,10 @@ fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Resul
     };
     let kind = if table.is_bits() { DataType::Bool } else { kind };
     let named = Named { access: access(item, table), ..Named::new(table, first, kind, order, name) };
+    let more = ["inverted", "inverse", "lookup", "scale", "divide", "multiply", "offset"];
+    if let Some(key) = more.into_iter().find(|key| table.is_bits() && item.get(key).is_some()) {
+        return Err(unsaid(key));
+    }
     if kind.is_text() || table.is_bits() || rule == 6 {
         return Ok(named.with_text_access());
     }

@@ -49,9 +49,13 @@ fn hexadecimal(cell: &str) -> Option<String> {
     (is_hex && !digits.is_empty()).then(|| format!("0x{digits}"))
 }
 
-/// `40 019`, `40.019`: five or six digits in groups of three; a bit of a register has two digits at most.
+/// `40 019`, `40.019`: five or six digits in groups of three; a bit of a register has two digits at most. `450 451` are two.
 fn grouped(cell: &str) -> Option<String> {
     let (first, last) = cell.split_once([' ', '\u{A0}', '.'])?;
+    let number = |text: &str| text.parse::<u32>().ok();
+    if first.len() == last.len() && !last.starts_with('0') && number(first)?.checked_add(1) == number(last) {
+        return Some(format!("{first}-{last}"));
+    }
     let is_number = |text: &str, lengths: std::ops::RangeInclusive<usize>| {
         lengths.contains(&text.len()) && text.bytes().all(|byte| byte.is_ascii_digit())
     };

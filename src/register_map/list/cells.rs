@@ -195,8 +195,11 @@ fn without_markup(cell: &str) -> &str {
     ["**", "__", "`", "*"].iter().find_map(within).map_or(cell, without_markup)
 }
 
+/// Lines of digits alone are several numbers, not the groups of one.
 fn one_line(cell: &str) -> String {
-    cell.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join(" ").replace(ESCAPED_BAR, "|")
+    let lines: Vec<&str> = cell.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let are_numbers = lines.iter().all(|line| line.bytes().all(|byte| byte.is_ascii_digit()));
+    lines.join(if are_numbers { ", " } else { " " }).replace(ESCAPED_BAR, "|")
 }
 
 /// The cells of a line of a PDF: at two blanks, else at every blank; or at what separates them in this line alone.

@@ -47,6 +47,17 @@ pub struct Columns {
 }
 
 impl Columns {
+    /// The table of a list of ioBroker: only registers have types, and only what may be written is polled.
+    pub fn table_of_iobroker(&self) -> Option<Table> {
+        let has = |word: &str| self.headings.iter().any(|heading| heading == word);
+        self.is_iobroker.then(|| match (has("type"), has("poll") || has("wp")) {
+            (true, true) => Table::Holding,
+            (true, false) => Table::Input,
+            (false, true) => Table::Coil,
+            (false, false) => Table::Discrete,
+        })
+    }
+
     /// What the columns of a heading mean, by what stands in the rows below it and what its reader has said.
     pub fn new(heading: &[String], rows: &[Cells], said: &Said) -> Columns {
         let headings = distinct(heading);

@@ -11,7 +11,7 @@ use super::{
     reader::{Reader, with_unit},
     row::{Row, differ},
     tables,
-    words::{area, length_of, number_of, order_of, width_of, yes_or_no},
+    words::{area, length_of, offset_of, order_of, unit_with_factor, width_of, yes_or_no},
 };
 use crate::{
     plant::address::{AddressBase, of_modicon},
@@ -63,18 +63,21 @@ impl Row {
         read.is_tabled = columns.means.iter().flatten().any(|means| matches!(means, Column::Table | Column::Area));
         read.table = reader.read(Column::Table, tables::table_of).or_else(|| reader.read(Column::Area, area));
         read.take_table_of_address(&mut reader);
+        read.table_of_list = columns.table_of_iobroker();
         read.device = reader.read(Column::Device, |cell| cell.parse().ok());
         let unit = || reader.text(Column::Address).and_then(address_forms::of_unit).map(|(unit, _)| unit);
         read.device = read.device.or_else(unit);
         read.order = reader.read(Column::Order, order_of);
         read.scale = reader.factor();
-        read.offset = reader.read(Column::Offset, number_of).unwrap_or_default();
+        read.offset = reader.read(Column::Offset, offset_of).unwrap_or_default();
+        read.is_below_zero = reader.is_below_zero();
         read.take_formula(&mut reader);
         read.more = reader.more();
         read.more.write_with = read.more.write_with.or(Some(16).filter(|_| columns.is_of_manager));
         read.take_writes(&reader);
         read.unused = reader.unused();
         read.read_unit(&mut reader);
+        read.take_factor_of_name(&mut reader);
         read.wrong = reader.wrong;
         read
     }
@@ -141,6 +144,28 @@ impl Row {
     }
 
     /// The unit, and a factor that stands in front of it.
+    /// `Frequency (0.01 Hz)` says what the last digit is worth; `Voltage (x10)` does not say which way.
+    fn take_factor_of_name(&mut self, reader: &mut Reader<'_>) {
+        let bracketed =
+            self.name.rsplit_once(['(', '[', '（']).and_then(|(_, rest)| Some(rest.split_once([')', ']', '）'])?.0));
+        let Some(cell) = bracketed.filter(|_| !reader.columns.is_sure).map(str::to_owned) else { return };
+        let digits = cell.strip_prefix(['x', 'X', '×', '*']).unwrap_or_default().trim_start();
+        if digits.starts_with(|sign: char| sign.is_ascii_digit()) && self.scale.is_none() {
+            reader.refuse(t!("`{cell}` in its name: is it a factor or a divisor?", cell));
+        }
+        let Some((factor, unit)) = unit_with_factor(&cell).ok().filter(|(factor, _)| factor.abs() < 1.0) else {
+            return;
+        };
+        match self.scale {
+            None => self.scale = Some(factor),
+            Some(scale) if scale != factor => reader.refuse(differ(&cell, &scale.to_string())),
+            Some(_) => {}
+        }
+        if self.unit.is_empty() {
+            self.unit = unit;
+        }
+    }
+
     fn read_unit(&mut self, reader: &mut Reader<'_>) {
         let columns = reader.columns;
         let of_scale = reader.text(Column::Scale).and_then(|cell| Some((cell, with_unit(columns, cell)?.1)));

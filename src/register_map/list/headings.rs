@@ -275,6 +275,11 @@ impl Heading {
         self.has(&["resolution", "auflösung", "résolution", "risoluzione"])
     }
 
+    /// Its column says between which values a number lies.
+    pub fn is_of_bounds(&self) -> bool {
+        self.has(&["range", "min", "minimum", "wertebereich", "messbereich", "plage", "rango", "диапазон", "范围"])
+    }
+
     /// Makers multiply by such a number as well as they divide by it.
     pub fn is_scale_factor(&self) -> bool {
         self.has(&["scalefactor", "gain"]) || self.has(&["scale"]) && self.has(&["factor"])

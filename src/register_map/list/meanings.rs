@@ -109,12 +109,15 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
         Column::Table => 60 <= share(cells, |cell| table_of(cell).is_some()),
         Column::Device => 80 <= share(cells, |cell| cell.parse::<u8>().is_ok()) && !cells.is_empty(),
         Column::Width => {
-            80 <= share(cells, |cell| width_of(cell).is_some()) && cells.iter().any(|cell| width_of(cell) == Some(16))
+            // The same bit of all registers is none.
+            let is_width = |cell: &&str| width_of(cell) == Some(16);
+            80 <= share(cells, |cell| width_of(cell).is_some())
+                && (cells.iter().any(is_width) || are_of_one_width(cells))
         }
         Column::Field => !cells.is_empty() && 60 <= share(cells, |cell| bit_field_of(cell).is_some()),
         Column::Access => !cells.is_empty() && 60 <= share(cells, |cell| access_of(cell).is_some()),
         Column::Length => 60 <= share(cells, |cell| length_of(cell, false).is_some()),
-        Column::Offset => 60 <= share(cells, |cell| number_of(cell).is_some()),
+        Column::Offset => 60 <= share(cells, |cell| is_numeric(cell)),
         Column::Exponent => {
             60 <= share(cells, |cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number)))
         }
@@ -143,6 +146,17 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
         | Column::WriteWith
         | Column::Poll => false,
     }
+}
+
+/// Have all registers 8, or all 32 bits?
+fn are_of_one_width(cells: &[&str]) -> bool {
+    1 < cells.len() && matches!(width_of(cells[0]), Some(8 | 32 | 64)) && cells.iter().all(|cell| *cell == cells[0])
+}
+
+/// Does a cell begin as a number does? One that then is none makes its row wrong.
+fn is_numeric(cell: &str) -> bool {
+    let digits = cell.trim_start_matches(['-', '+', '−', '–', ' ']);
+    digits.starts_with(|sign: char| sign.is_ascii_digit()) && !digits.contains(['x', 'X'])
 }
 
 /// Do the digits of a column of addresses without a mark count as hexadecimal? Most of them prove it, one with a letter does

@@ -139,6 +139,17 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Does a range or a least value begin below zero?
+    pub fn is_below_zero(&self) -> bool {
+        let bounds =
+            (0..self.columns.headings.len()).filter(|n| Heading::new(&self.columns.headings[*n]).is_of_bounds());
+        let is_negative = |cell: &String| {
+            let digits = cell.trim_start().strip_prefix(['-', '−', '–']).unwrap_or_default();
+            digits.trim_start().starts_with(|sign: char| sign.is_ascii_digit())
+        };
+        bounds.filter_map(|n| self.row.cells.get(n)).any(is_negative)
+    }
+
     /// Headings of what stands in no column that is used, and of a second name.
     pub fn unused(&self) -> Vec<String> {
         let names = self.columns.places(Column::Name);

@@ -37,6 +37,8 @@ pub struct Row {
     /// A column says the types of all rows.
     pub(super) is_typed: bool,
     pub(super) signed: Option<bool>,
+    /// Its range or least value is below zero.
+    pub(super) is_below_zero: bool,
     pub(super) length: Option<u16>,
     /// Bits of a number whose type does not say it.
     pub(super) width: Option<u16>,
@@ -47,6 +49,8 @@ pub struct Row {
     pub(super) unit: String,
     /// As the row states it.
     pub table: Option<Table>,
+    /// That of a list with such columns, in a program that has one for each table.
+    pub(super) table_of_list: Option<Table>,
     /// Only a title above it says so.
     pub is_titled: bool,
     pub(super) order: Option<ByteOrder>,
@@ -144,7 +148,8 @@ impl Row {
 
     /// Table and address, as assumed where the row does not say more.
     fn place(&self, written: &str, assumed: Assumed) -> Option<(Table, u16)> {
-        let table = self.table.unwrap_or(assumed.table);
+        let of_list = self.table_of_list.filter(|_| !assumed.is_stated && assumed.alias.is_none());
+        let table = self.table.or(of_list).unwrap_or(assumed.table);
         if let Some(first) = assumed.alias.filter(|_| self.is_register) {
             return Some((table, u16::try_from(written.parse::<u32>().ok()?.checked_sub(first)?).ok()?));
         }
@@ -175,6 +180,7 @@ impl Row {
             None if self.length.is_some_and(|length| length != 1) => {
                 return Err(t!("{length} registers, and no type", length = self.length.unwrap_or_default()));
             }
+            None if self.is_below_zero => return Ok((DataType::I16, None)),
             None => return Ok((DataType::U16, None)),
             Some("int" | "INT" | "Int" | "integer" | "Integer" | "INTEGER") if !whole.is_empty() => whole,
             Some(word) => word,

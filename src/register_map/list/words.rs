@@ -42,6 +42,16 @@ pub fn number_of(text: &str) -> Option<f64> {
     number(text.trim_start_matches(['x', 'X', '*', '×']))
 }
 
+/// `-40`, `−40`, `-40 °C`: what is added to a value, in its unit.
+pub fn offset_of(text: &str) -> Option<f64> {
+    let text = text.replace(['−', '–'], "-");
+    let is_of_number = |sign: char| sign.is_ascii_digit() || matches!(sign, '-' | '+' | '.' | ',' | ' ');
+    let end = text.find(|sign| !is_of_number(sign)).unwrap_or(text.len());
+    let (number, unit) = text.split_at(end);
+    let has_unit = !unit.is_empty() && is_known_unit(unit.trim());
+    number_of(&text).or_else(|| number_of(&number.replace("- ", "-")).filter(|_| unit.is_empty() || has_unit))
+}
+
 /// Does a factor say itself whether it multiplies or divides?
 pub fn is_marked(text: &str) -> bool {
     text.contains(['x', 'X', '*', '×', '/', '÷', ':', '^'])

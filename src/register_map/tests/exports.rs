@@ -115,8 +115,8 @@ fn essence(tag: &TagDef, target: Target) -> String {
         tag.offset
     );
     if target != Target::Telegraf && point.kind != DataType::Bool {
-        let bad = &tag.bad_if;
-        words.push_str(&format!(" {} {:?} {bad:?}", tag.unit, tag.decimals));
+        let (bad, unit) = (&tag.bad_if, if tag.unit_from.is_some() { "" } else { &tag.unit });
+        words.push_str(&format!(" {unit} {:?} {bad:?}", tag.decimals));
     }
     if target == Target::Csv {
         let (labels, bits) = (&tag.enum_labels, &tag.bit_labels);

@@ -82,10 +82,10 @@ pub fn binary_sensors(item: &Node) -> Result<Vec<Named>, String> {
     let named = plain(table, item.wire_address("address")?, name_of(item)?);
     let named = if table.is_bits() { named } else { Named { field: Some((0, 1)), ..named } };
     let more = item.opt_whole("slave_count")?.or(item.opt_whole("virtual_count")?).unwrap_or(0);
+    // The next ones are the lowest bits of the next registers.
     array(named, more, |named, n| {
-        let (by, bit) = if table.is_bits() { (n, None) } else { (n / 16, u8::try_from(n % 16).ok()) };
-        let address = named.address.checked_add(u16::try_from(by).ok()?)?;
-        Some(Named { address, field: bit.map(|bit| (bit, 1)), ..named.clone() })
+        let address = named.address.checked_add(u16::try_from(n).ok()?)?;
+        Some(Named { address, ..named.clone() })
     })
 }
 

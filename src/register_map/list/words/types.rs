@@ -191,11 +191,13 @@ fn ordered(text: &str) -> Option<(DataType, ByteOrder)> {
     let word = text.trim().to_lowercase();
     let suffixed = || {
         let (kind, suffix) = word.split_at_checked(word.len().checked_sub(2)?)?;
+        // Apart from a type `LE` does not say which of two orders it means.
+        let is_apart = kind.ends_with([' ', '_', '-', '(', ',']);
         let kind = kind_of(kind)?;
         let order = match (suffix, kind.registers()) {
             ("be", _) => ByteOrder::Abcd,
             ("le", 1) => ByteOrder::Badc,
-            ("le", _) => ByteOrder::Dcba,
+            ("le", _) if !is_apart => ByteOrder::Dcba,
             ("sw", 2..) => ByteOrder::Cdab,
             ("sb", 2..) => ByteOrder::Badc,
             _ => return None,
