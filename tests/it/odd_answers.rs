@@ -45,7 +45,7 @@ fn send_compares_every_field_of_an_answer() {
         ("01 06 00 66 00 01", "response to function 1 / 0x01, expected 6 / 0x06"),
     ] {
         let (code, said) = run(&["send", &unit, "--yes", bytes]);
-        assert!(code == Some(1) && said.contains(&format!("no answer to this: {why}")), "{code:?} {said}");
+        assert!(code == Some(1) && said.contains(&format!("not the response to this: {why}")), "{code:?} {said}");
     }
     let next = peer(answers(|request| vec![0, request[1] + 1, 0, 0, 0, 5, 1, 3, 2, 0, 7]));
     let (code, said) = run(&["send", &next, "01 03 00 00 00 01", "--timeout", "200"]);
