@@ -51,7 +51,7 @@ fn are_of_one(first: &str, second: &str) -> bool {
     let ((first, one), (second, other)) = (split(first), split(second));
     let (Some(one), Some(other)) = (one, other) else { return false };
     let is_pair = |(high, low): &(&str, &str)| (one == *high && other == *low) || (one == *low && other == *high);
-    !first.is_empty() && first == second && HALVES.iter().any(|pair| is_pair(pair))
+    !first.is_empty() && first == second && HALVES.iter().any(is_pair)
 }
 
 #[cfg(test)]

@@ -117,7 +117,7 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
         Column::Field => !cells.is_empty() && 60 <= share(cells, |cell| bit_field_of(cell).is_some()),
         Column::Access => !cells.is_empty() && 60 <= share(cells, |cell| access_of(cell).is_some()),
         Column::Length => 60 <= share(cells, |cell| length_of(cell, false).is_some()),
-        Column::Offset => 60 <= share(cells, |cell| is_numeric(cell)),
+        Column::Offset => 60 <= share(cells, is_numeric),
         Column::Exponent => {
             60 <= share(cells, |cell| cell.parse::<i8>().is_ok_and(|number| (-10..=10).contains(&number)))
         }
