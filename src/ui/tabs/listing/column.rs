@@ -199,14 +199,18 @@ fn run_on(cells: &mut [(u16, String)], text: &str) {
 
 /// The figure that a text begins with.
 pub fn figure(text: &str) -> Option<f64> {
-    text.trim_start_matches(['>', '<', '≥', '≤', ' ']).split_whitespace().next()?.parse().ok()
+    let figure = text.trim_start_matches(['>', '<', '≥', '≤', ' ']).split_whitespace().next()?;
+    // What is uncertain is marked behind its figure.
+    figure.trim_end_matches('?').parse().ok()
 }
 
 /// Numbers by their size, `9:05` before `10:01`, other texts by their letters.
 fn natural(a: &str, b: &str) -> Ordering {
     match (figure(a), figure(b)) {
         (Some(a), Some(b)) => a.total_cmp(&b),
-        _ => parts(a).cmp(&parts(b)),
+        (Some(_), None) => Ordering::Less,
+        (None, Some(_)) => Ordering::Greater,
+        (None, None) => parts(a).cmp(&parts(b)),
     }
 }
 
@@ -241,6 +245,22 @@ mod tests {
         check(&["9:05", "10:01", "10:15", "never"]);
         check(&["anna", "Berta", "carl"]);
         check(&["hot-water-9", "hot-water-10"]);
+    }
+
+    /// A sort panics where three texts are each below the next.
+    #[test]
+    fn any_three_cells_have_one_order() {
+        let texts =
+            ["-5.0", "-3.0?", "-1.0", "9.25", "9.3?", "2", "3/4", "9:05", "never", "–", "20 °C", "-3 °C?", ">1.2"];
+        for a in texts {
+            for b in texts {
+                assert_eq!(natural(a, b), natural(b, a).reverse(), "{a} {b}");
+                for c in texts.into_iter().filter(|c| natural(a, b).is_le() && natural(b, c).is_le()) {
+                    assert!(natural(a, c).is_le(), "{a} {b} {c}");
+                }
+            }
+        }
+        assert_eq!(natural("-3.0?", "-1.0"), Ordering::Less, "an uncertain figure is one");
     }
 
     #[test]
