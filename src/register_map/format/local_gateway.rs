@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{swapped, text_of, unsaid, wrong};
+use super::{beside, swapped, text_of, unsaid, wrong};
 use crate::{
     plant::{
         number::to_u8,
@@ -108,7 +108,8 @@ fn bit(item: &Node, named: Named) -> Result<Named, String> {
             return Err(unsaid(key));
         }
     }
-    match ["map", "options", "flags", "multiplier", "offset"].into_iter().find(|key| item.get(key).is_some()) {
+    let scaled = beside(item, &[("multiplier", 1.0), ("offset", 0.0)]);
+    match scaled.or(["map", "options", "flags"].into_iter().find(|key| item.get(key).is_some())) {
         Some(key) => Err(unsaid(key)),
         None => Ok(named),
     }

@@ -32,6 +32,14 @@ pub fn unsaid(key: &str) -> String {
     t!("a profile cannot express `{key}`", key)
 }
 
+/// The first of these keys that says another number than the one which changes nothing.
+pub fn beside(item: &Node, plain: &[(&'static str, f64)]) -> Option<&'static str> {
+    plain
+        .iter()
+        .find(|(key, plain)| item.get(key).is_some_and(|node| node.number() != Some(*plain)))
+        .map(|(key, _)| *key)
+}
+
 /// A key that is needed and is not there.
 pub fn missing(key: &str) -> String {
     t!("`{key}` is missing", key)

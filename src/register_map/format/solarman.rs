@@ -5,7 +5,7 @@ mod sums;
 
 use std::time::Duration;
 
-use super::{apart, field_of, missing, unsaid, wrong};
+use super::{apart, beside, field_of, missing, unsaid, wrong};
 use crate::{
     plant::{
         data_type::Clock,
@@ -210,8 +210,9 @@ fn item_of(item: &Node, usual: Table, tables: &Tables, is_stated: bool) -> Resul
     };
     let kind = if table.is_bits() { DataType::Bool } else { kind };
     let named = Named { access: access(item, table), ..Named::new(table, first, kind, order, name) };
-    let more = ["inverted", "inverse", "lookup", "scale", "divide", "multiply", "offset"];
-    if let Some(key) = more.into_iter().find(|key| table.is_bits() && item.get(key).is_some()) {
+    let turning = beside(item, &[("scale", 1.0), ("divide", 1.0), ("multiply", 1.0), ("offset", 0.0)]);
+    let turning = turning.or(["inverted", "inverse"].into_iter().find(|key| item.get(key).is_some_and(Node::is_true)));
+    if let Some(key) = turning.or(item.get("lookup").map(|_| "lookup")).filter(|_| table.is_bits()) {
         return Err(unsaid(key));
     }
     if kind.is_text() || table.is_bits() || rule == 6 {

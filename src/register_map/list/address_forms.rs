@@ -53,7 +53,11 @@ fn hexadecimal(cell: &str) -> Option<String> {
 fn grouped(cell: &str) -> Option<String> {
     let (first, last) = cell.split_once([' ', '\u{A0}', '.'])?;
     let number = |text: &str| text.parse::<u32>().ok();
-    if first.len() == last.len() && !last.starts_with('0') && number(first)?.checked_add(1) == number(last) {
+    if !cell.contains('.')
+        && first.len() == last.len()
+        && !last.starts_with('0')
+        && number(first)?.checked_add(1) == number(last)
+    {
         return Some(format!("{first}-{last}"));
     }
     let is_number = |text: &str, lengths: std::ops::RangeInclusive<usize>| {

@@ -11,7 +11,7 @@ use super::{
     reader::{Reader, with_unit},
     row::{Row, differ},
     tables,
-    words::{area, length_of, offset_of, order_of, unit_with_factor, width_of, yes_or_no},
+    words::{area, length_of, offset_of, order_of, power_of_ten, unit_with_factor, width_of, yes_or_no},
 };
 use crate::{
     plant::address::{AddressBase, of_modicon},
@@ -149,11 +149,15 @@ impl Row {
         let bracketed =
             self.name.rsplit_once(['(', '[', '（']).and_then(|(_, rest)| Some(rest.split_once([')', ']', '）'])?.0));
         let Some(cell) = bracketed.filter(|_| !reader.columns.is_sure).map(str::to_owned) else { return };
-        let digits = cell.strip_prefix(['x', 'X', '×', '*']).unwrap_or_default().trim_start();
-        if digits.starts_with(|sign: char| sign.is_ascii_digit()) && self.scale.is_none() {
+        let is_power = |factor: f64| (1..=6).any(|places| power_of_ten(f64::from(places)) == factor);
+        // `*1` leads to a footnote, `x2` may be how many there are.
+        let by = cell.strip_prefix(['x', 'X', '×', '*']).and_then(|digits| digits.trim().parse::<f64>().ok());
+        if by.is_some_and(is_power) && self.scale.is_none() {
             reader.refuse(t!("`{cell}` in its name: is it a factor or a divisor?", cell));
         }
-        let Some((factor, unit)) = unit_with_factor(&cell).ok().filter(|(factor, _)| factor.abs() < 1.0) else {
+        // A class of accuracy is no power of ten.
+        let is_last_digit = |factor: f64| (1..=6).any(|places| power_of_ten(f64::from(-places)) == factor);
+        let Some((factor, unit)) = unit_with_factor(&cell).ok().filter(|(factor, _)| is_last_digit(*factor)) else {
             return;
         };
         match self.scale {

@@ -112,7 +112,7 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
             // The same bit of all registers is none.
             let is_width = |cell: &&str| width_of(cell) == Some(16);
             80 <= share(cells, |cell| width_of(cell).is_some())
-                && (cells.iter().any(is_width) || are_of_one_width(cells))
+                && (cells.iter().any(is_width) || are_of_one_width(heading, cells))
         }
         Column::Field => !cells.is_empty() && 60 <= share(cells, |cell| bit_field_of(cell).is_some()),
         Column::Access => !cells.is_empty() && 60 <= share(cells, |cell| access_of(cell).is_some()),
@@ -148,9 +148,13 @@ fn fits(column: Column, heading: &Heading, cells: &[&str]) -> bool {
     }
 }
 
-/// Have all registers 8, or all 32 bits?
-fn are_of_one_width(cells: &[&str]) -> bool {
-    1 < cells.len() && matches!(width_of(cells[0]), Some(8 | 32 | 64)) && cells.iter().all(|cell| *cell == cells[0])
+/// Have all registers 8, or all 32 bits? Below `bit` it may be the same one of each.
+fn are_of_one_width(heading: &Heading, cells: &[&str]) -> bool {
+    let is_of_sizes = heading.has(&["bits", "size", "length", "width", "länge", "größe", "bitbreite"]);
+    is_of_sizes
+        && 1 < cells.len()
+        && matches!(width_of(cells[0]), Some(8 | 32 | 64))
+        && cells.iter().all(|cell| *cell == cells[0])
 }
 
 /// Does a cell begin as a number does? One that then is none makes its row wrong.

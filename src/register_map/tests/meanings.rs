@@ -283,3 +283,20 @@ fn the_same_number_of_bits_in_every_row_is_no_bit() {
         list.named.iter().map(super::shown).collect::<Vec<_>>()
     );
 }
+
+#[test]
+fn what_only_looks_like_a_factor_or_a_width_is_none() {
+    let rows = "Address,Name,Type\n0x10,Voltage (*1),uint16\n0x11,Energy (0.5S),uint16\n0x12,Relay (x2),uint16\n";
+    let (named, problems) = read(rows);
+    assert!(problems.is_empty() && named.iter().all(|row| row.contains(" x1")), "{named:?} {problems:?}");
+    let list = super::list_of("Address,Name,Bit\n0x10,Alarm 1,8\n0x11,Alarm 2,8\n");
+    assert!(list.named.iter().all(|named| named.field == Some((8, 1))), "{:?}", list.problems);
+    let grouped = "Address,Name,Type\n400.401,Energy,uint16\n400.003,Other,uint16\n";
+    check(grouped, &["40401 Energy uint16 ABCD x1", "40003 Other uint16 ABCD x1"], &[]);
+    let solarman = "parameters:
+  - group: g
+    items:
+      - { name: Plain, rule: 1, code: 1, registers: [7], scale: 1, offset: 0, inverted: 0 }
+";
+    check(solarman, &["00008 Plain bool ABCD x1"], &[]);
+}
