@@ -186,26 +186,23 @@ impl TabView for Controllers {
             return overlay.view(cx, frame, area);
         }
         let mut canvas = Canvas::new(frame.buffer_mut(), area);
-        if *self.page() == Page::List {
-            return match self.is_wall(cx) {
-                true => wall::view(cx, &mut canvas, &self.devices, &self.trend),
-                false => self.devices.view(cx, &mut canvas),
-            };
-        }
-        let Some(device) = self.device(cx) else { return };
-        match (self.page(), &device.program) {
-            (Page::List, _) => {}
-            (Page::Lamps, _) => lamps::view(cx, &mut canvas, device, &self.lamps),
-            (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
-            (Page::Device | Page::Program, _) => {
-                let trend = self.trend.value.as_ref().and_then(|series| series.first());
-                device::view(cx, &mut canvas, device, &self.table, trend)
-            }
+        match (self.page(), self.device(cx)) {
+            (Page::List, _) if self.is_wall(cx) => wall::view(cx, &mut canvas, &self.devices, &self.trend),
+            (Page::List, _) => self.devices.view(cx, &mut canvas),
             (Page::Procedures, _) => self.procedures.view(cx, &mut canvas),
             (Page::Runs | Page::Overlay, _) => self.runs.list.view(cx, &mut canvas),
             (Page::Sets, _) => self.sets.view(cx, &mut canvas),
-            (Page::Compare(compare), _) => compare.view(cx, &mut canvas, device),
             (Page::Guide(page), _) => guide::view(cx, &mut canvas, *page),
+            (Page::Lamps, Some(device)) => lamps::view(cx, &mut canvas, device, &self.lamps),
+            (Page::Compare(compare), Some(device)) => compare.view(cx, &mut canvas, device),
+            (Page::Device | Page::Program, Some(device)) => match (self.page(), &device.program) {
+                (Page::Program, Some(program)) => program::view(cx, &mut canvas, device, program, self.cell),
+                _ => {
+                    let trend = self.trend.value.as_ref().and_then(|series| series.first());
+                    device::view(cx, &mut canvas, device, &self.table, trend)
+                }
+            },
+            (Page::Device | Page::Program | Page::Lamps | Page::Compare(_), None) => {}
         }
     }
 }

@@ -33,6 +33,8 @@ pub trait Listing: Debug + 'static {
     const TRENDS: bool = false;
     /// Has it columns to be sorted by?
     const SORTS: bool = true;
+    /// Do its newest rows come first, so that at the top it is the newest that is selected, whichever that is?
+    const NEWEST_FIRST: bool = true;
     /// Is something done with a row, which its operator must have seen?
     const ACTS: bool = true;
 
@@ -104,7 +106,7 @@ pub trait Listing: Debug + 'static {
     }
 
     /// What is copied of a row in place of its cells; an empty text where there is nothing to copy.
-    fn copied(&self, _row: &Self::Row, _answer: Option<&Self::Answer>) -> Option<String> {
+    fn copied(&self, _cx: &ViewContext, _row: &Self::Row, _answer: Option<&Self::Answer>) -> Option<String> {
         None
     }
 }
@@ -308,8 +310,7 @@ impl<L: Listing> ListPage for List<L> {
     fn step(&mut self, cx: &ViewContext, motion: Motion) {
         let rows = self.rows(cx);
         let place = motion.to(self.place(&rows), rows.len(), self.room(cx, &rows));
-        // At the top it is the newest that is selected.
-        let id = rows.get(place).filter(|_| 0 < place).map(|row| L::id(row));
+        let id = rows.get(place).filter(|_| 0 < place || !L::NEWEST_FIRST).map(|row| L::id(row));
         self.selected = id;
     }
 
@@ -334,7 +335,7 @@ impl<L: Listing> ListPage for List<L> {
         let (place, marks) = (self.place(&rows), rows.iter().any(|row| self.is_marked(row)));
         let meant = rows.iter().enumerate().filter(|(n, row)| if marks { self.is_marked(row) } else { *n == place });
         let line = |row: &L::Row| {
-            let own = self.of.copied(row, self.answered.value.as_ref());
+            let own = self.of.copied(cx, row, self.answered.value.as_ref());
             own.unwrap_or_else(|| self.cells(cx, row).join("\t").trim_end().to_owned())
         };
         meant.map(|(_, row)| line(row)).filter(|line| !line.is_empty()).collect()

@@ -22,12 +22,11 @@ use crate::{
 
 /// What a key needs that is known only when it is pressed.
 impl Controllers {
-    /// The device that is shown or selected.
+    /// The device whose page is shown, or lies below; else the one that is selected in the list.
     pub(super) fn device<'a>(&self, cx: &ViewContext<'a>) -> Option<&'a DeviceDef> {
-        match self.page() {
-            Page::List => self.devices.selected(cx).and_then(|device| cx.def().devices.get(device.id.index())),
-            _ => cx.def().devices.get(self.device.index()),
-        }
+        let is_open = self.pages.contains(&Page::Device);
+        let id = if is_open { Some(self.device) } else { self.devices.selected(cx).map(|device| device.id) };
+        cx.def().devices.get(id?.index())
     }
 
     /// In the footer only for a device that has what the key is for.

@@ -51,6 +51,7 @@ impl Listing for Devices {
     type Id = DeviceId;
 
     const TRENDS: bool = true;
+    const NEWEST_FIRST: bool = false;
 
     fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a ()>) -> Heading<'a> {
         Heading::new("", t!("this plant has no devices")).words(summary(cx), cx.theme.normal())
@@ -97,6 +98,11 @@ impl Listing for Devices {
         let title = of_plant(&device.title);
         let gap = if title.is_empty() { "" } else { "  " };
         vec![(format!("{}  {title}{gap}{words}", device.name), style)]
+    }
+
+    /// What it controls, if it does.
+    fn copied(&self, cx: &ViewContext, device: &DeviceDef, _: Option<&()>) -> Option<String> {
+        device.faceplate.as_ref().map(|faceplate| value::line(cx, faceplate.pv))
     }
 
     /// The curve of what it controls, over the last hour.

@@ -108,20 +108,13 @@ impl<R: ?Sized> Column<R> {
 
     /// The rows in the order of this column; what it does not know comes last either way.
     pub fn sorted<T: Deref<Target = R>>(&self, cx: &ViewContext, rows: Vec<T>, reversed: bool) -> Vec<T> {
-        let is_known = |row: &T| self.text(cx, row, u16::MAX).contains(char::is_alphanumeric);
-        let (mut known, unknown): (Vec<T>, Vec<T>) = rows.into_iter().partition(is_known);
-        known.sort_by(|a, b| self.compare(cx, a, b));
+        let texts = rows.into_iter().map(|row| (self.text(cx, &row, u16::MAX), row));
+        let (mut known, unknown): (Vec<_>, Vec<_>) = texts.partition(|(text, _)| text.contains(char::is_alphanumeric));
+        known.sort_by(|(one, a), (other, b)| self.order.map_or_else(|| natural(one, other), |order| order(a, b)));
         if reversed {
             known.reverse();
         }
-        known.into_iter().chain(unknown).collect()
-    }
-
-    fn compare(&self, cx: &ViewContext, a: &R, b: &R) -> Ordering {
-        match self.order {
-            Some(order) => order(a, b),
-            None => natural(&self.text(cx, a, u16::MAX), &self.text(cx, b, u16::MAX)),
-        }
+        known.into_iter().chain(unknown).map(|(_, row)| row).collect()
     }
 }
 

@@ -153,7 +153,7 @@ impl Listing for AutomaticReports {
     }
 
     /// The line that fetches the file.
-    fn copied(&self, report: &ReportRecord, made: Option<&MadeReports>) -> Option<String> {
+    fn copied(&self, _cx: &ViewContext, report: &ReportRecord, made: Option<&MadeReports>) -> Option<String> {
         Some(made.and_then(|made| fetch(made, report)).unwrap_or_default())
     }
 }

@@ -37,6 +37,7 @@ impl Listing for RecordRows {
     type Id = Timestamp;
 
     const TRENDS: bool = true;
+    const NEWEST_FIRST: bool = false;
     const ACTS: bool = false;
 
     fn heading<'a>(&self, cx: &ViewContext<'a>, report: Option<&'a Box<ShiftReport>>) -> Heading<'a> {

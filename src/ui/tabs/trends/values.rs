@@ -26,6 +26,7 @@ impl Listing for StoredValues {
     type Row = StoredValue;
     type Id = TagId;
 
+    const NEWEST_FIRST: bool = false;
     const ACTS: bool = false;
 
     fn heading<'a>(&self, cx: &ViewContext<'a>, _: Option<&'a Vec<Series>>) -> Heading<'a> {
@@ -64,6 +65,10 @@ impl Listing for StoredValues {
             right(7, t!("1 h max"), |cx, row: &StoredValue| bound(cx, row, |(_, _, max)| max)).rank(2).unsorted().dim(),
             rest(8, t!("last hour"), last_hour).rank(3).unsorted(),
         ]
+    }
+
+    fn copied(&self, cx: &ViewContext, row: &StoredValue, _: Option<&Vec<Series>>) -> Option<String> {
+        Some(value::line(cx, row.tag))
     }
 
     fn searched(&self, cx: &ViewContext, row: &StoredValue) -> Option<String> {

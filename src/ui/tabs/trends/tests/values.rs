@@ -17,3 +17,12 @@ fn the_list_of_all_values_is_filtered_while_it_is_typed() {
         assert!(stand.screen().contains(expect), "{expect}: {}", stand.screen());
     }
 }
+
+#[test]
+fn a_listed_value_is_copied_with_unit_quality_and_time() {
+    let mut stand = Stand::new(Theme::FULL, 80, 24);
+    stand.press("v↓");
+    let copied = TabView::copied(&stand.model.tabs.trends, &stand.model.cx());
+    let expect = value::line(&stand.model.cx(), TagId(1));
+    assert_eq!(copied, [expect]);
+}
